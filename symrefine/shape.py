@@ -1,0 +1,118 @@
+"""Shape: what every source of data becomes before any mathematics sees it."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symrefine.errors import DegenerateShapeError, InputError
+from symrefine.geometry import Array, read_only
+
+Measure = Literal["points", "surface", "solid"]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Shape:
+    """Weighted points in n-space, with normals or triangles where the source has them.
+
+    Args:
+        points: [N, n] finite coordinates in the units of the input; the vertices, for a mesh.
+        weights: [N] non-negative, not all zero; equal if absent. A mesh takes its weights from its measure.
+        normals: [N, n], any length but zero, any sign; estimated where needed if absent.
+        faces: [F, 3] vertex indices of a triangle mesh in 3-space, or None.
+        measure: "points" for a cloud; "surface" or "solid" for a mesh: what carries the mass.
+        source: where the data came from, for messages.
+
+    Raises:
+        InputError: wrong shape, NaN or infinite values, negative weights, indices out of range.
+        DegenerateShapeError: fewer than two distinct points.
+    """
+
+    points: Array
+    weights: Array | None = None
+    normals: Array | None = None
+    faces: Index | None = None
+    measure: Measure = "points"
+    source: str = "array"
+
+    def __post_init__(self) -> None:
+        points = _matrix(self.points, "points", self.source)
+        object.__setattr__(self, "points", points)
+        if self.weights is not None:
+            object.__setattr__(self, "weights", _weights(self.weights, len(points), self.source))
+        if self.normals is not None:
+            object.__setattr__(self, "normals", _normals(self.normals, points, self.source))
+        if self.faces is not None:
+            object.__setattr__(self, "faces", _faces(self.faces, points, self.source))
+        if (self.faces is None) != (self.measure == "points"):
+            raise InputError(
+                f"{self.source}: measure is {self.measure!r}, but a cloud has measure 'points' "
+                "and a mesh has 'surface' or 'solid'"
+            )
+        if np.ptp(points, axis=0).max() == 0.0:
+            raise DegenerateShapeError(
+                f"{self.source}: all {len(points)} points coincide; a shape needs at least two distinct points"
+            )
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the ambient space."""
+        return int(self.points.shape[1])
+
+    @property
+    def diagonal(self) -> float:
+        """Diagonal of the axis-aligned bounding box, in input units."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+
+def _matrix(values: ArrayLike, name: str, source: str) -> Array:
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{source}: {name} are not numbers: {error}") from None
+    if array.ndim != 2 or array.shape[1] < 2:
+        raise InputError(f"{source}: {name} have shape {array.shape}; expected [N, n] with n >= 2")
+    if len(array) == 0:
+        raise InputError(f"{source}: no {name}; expected at least two distinct points")
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if bad.size:
+        raise InputError(
+            f"{source}: {bad.size} of {len(array)} {name} hold NaN or infinity, the first in row {bad[0]}; "
+            "remove those rows"
+        )
+    return read_only(array)
+
+
+def _weights(values: ArrayLike, count: int, source: str) -> Array:
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape != (count,):
+        raise InputError(f"{source}: weights have shape {array.shape}; expected ({count},), one for each point")
+    if not np.isfinite(array).all() or (array < 0).any() or array.sum() == 0:
+        raise InputError(f"{source}: weights must be finite, non-negative and not all zero")
+    return read_only(array)
+
+
+def _normals(values: ArrayLike, points: Array, source: str) -> Array:
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape != points.shape:
+        raise InputError(f"{source}: normals have shape {array.shape}; expected {points.shape}, one for each point")
+    length = np.linalg.norm(array, axis=1)
+    bad = np.flatnonzero(~(np.isfinite(length) & (length > 0)))
+    if bad.size:
+        raise InputError(f"{source}: normal of row {bad[0]} is {array[bad[0]].tolist()}; expected a finite, non-zero vector")
+    return read_only(array / length[:, None])
+
+
+def _faces(values: ArrayLike, points: Array, source: str) -> Index:
+    array = np.array(values)
+    if array.ndim != 2 or array.shape[1] != 3 or not np.issubdtype(array.dtype, np.integer) or len(array) == 0:
+        raise InputError(f"{source}: faces have shape {array.shape} of {array.dtype}; expected [F, 3] integers, F >= 1")
+    if points.shape[1] != 3:
+        raise InputError(f"{source}: faces need points in 3-space, these have {points.shape[1]} coordinates")
+    if array.min() < 0 or array.max() >= len(points):
+        raise InputError(f"{source}: face index {array.max()} is out of range; there are {len(points)} vertices")
+    array = array.astype(np.int64)
+    array.flags.writeable = False
+    return array
