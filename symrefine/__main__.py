@@ -1,0 +1,6 @@
+"""`python -m symrefine` is the command `symrefine`."""
+
+from symrefine.cli import main
+
+if __name__ == "__main__":
+    main()
