@@ -19,6 +19,7 @@ help: ## what each target does
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
 
 setup: $(READY) ## build .venv with the pinned packages and this checkout
+	@echo "Ready for: make demo, make test, make bench"
 
 demo: $(READY) ## find, refine and show symmetries
 	@$(PY) -m experiments.demo
@@ -36,7 +37,7 @@ lint: $(READY) ## style, formatting, types, directions of imports
 	@$(call check,ruff check,$(PY) -m ruff check .)
 	@$(call check,ruff format --check,$(PY) -m ruff format --check .)
 	@$(call check,mypy --strict,$(PY) -m mypy)
-	@$(call check,lint-imports,$(VENV)/bin/lint-imports --no-logo)
+	@$(call check,lint-imports,$(VENV)/bin/lint-imports --no-logo --no-cache)
 
 lock: $(READY) ## pin the newest packages that fit, for every platform
 	@$(PY) -m venv .make/uv && .make/uv/bin/python -m pip install -q uv 2>$(LOG) || { cat $(LOG); exit 1; }
@@ -55,9 +56,9 @@ fail = { tail -n 40 $(LOG); echo "error: $(1); all of it in $(LOG)"; exit 1; } >
 
 $(READY): requirements.lock pyproject.toml
 	@mkdir -p .make; : > $(LOG); python=; \
-	if ! { $(PY) $(NEW_ENOUGH) && $(PY) -m pip --version; } >>$(LOG) 2>&1; then \
+	if ! { $(PY) $(NEW_ENOUGH) && $(PY) -m pip --version; } >/dev/null 2>&1; then \
 	  for p in $(or $(PYTHON),python3 python3.14 python3.13 python3.12 python3.11 python); do \
-	    if "$$p" $(NEW_ENOUGH) >>$(LOG) 2>&1; then python=$$p; break; fi; \
+	    if "$$p" $(NEW_ENOUGH) >/dev/null 2>&1; then python=$$p; break; fi; \
 	  done; \
 	  if [ -z "$$python" ]; then \
 	    echo "error: symrefine needs Python 3.11 or newer, found $$($(or $(PYTHON),python3) --version 2>&1 | tail -n 1);" \
@@ -66,7 +67,7 @@ $(READY): requirements.lock pyproject.toml
 	  "$$python" -m venv --clear $(VENV) >>$(LOG) 2>&1 \
 	    || $(call fail,cannot create $(VENV) (Debian and Ubuntu keep what it takes in the package python3-venv)); \
 	fi; \
-	echo "Setting up .venv: pinned Python packages, 1.5 GB on disk, a few minutes the first time"; \
+	echo "Setting up .venv: pinned Python packages, 2 GB on disk, a few minutes the first time"; \
 	$(PIP) -r requirements.lock >>$(LOG) 2>&1 || $(call fail,cannot install requirements.lock); \
 	$(PIP) --no-deps --no-build-isolation -e . >>$(LOG) 2>&1 || $(call fail,cannot install symrefine itself)
-	@touch $@; echo "Set-up done."
+	@touch $@
