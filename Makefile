@@ -41,7 +41,7 @@ lint: $(READY) ## style, formatting, types, directions of imports
 
 lock: $(READY) ## pin the newest packages that fit, for every platform
 	@$(PY) -m venv .make/uv && .make/uv/bin/python -m pip install -q uv 2>$(LOG) || { cat $(LOG); exit 1; }
-	@UV_CUSTOM_COMPILE_COMMAND="make lock" .make/uv/bin/uv pip compile --quiet --no-config --universal --upgrade \
+	@UV_CUSTOM_COMPILE_COMMAND="make lock" .make/uv/bin/uv pip compile --quiet --no-config --universal --fork-strategy fewest --upgrade \
 	  --python-version 3.11 --extra dev --no-emit-index-url --no-emit-find-links -o requirements.lock pyproject.toml
 
 clean: ## remove .venv and every cache; out/ stays
