@@ -1,0 +1,111 @@
+"""Content: what a file holds, exactly as written; the readers make it, `mesh` and `load` judge it."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symrefine.errors import InputError
+from symrefine.geometry import Array
+from symrefine.shape import Index
+
+# Squares of areas of such triangles are still numbers; no unit of length asks for more.
+LARGEST = 1e60
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Polygons:
+    """Faces of any number of corners, one after the other.
+
+    Args:
+        corners: [sum of counts] vertex indices, counted from 0.
+        counts: [F] corners of each face.
+    """
+
+    corners: Index
+    counts: Index
+
+    def __len__(self) -> int:
+        return len(self.counts)
+
+    @property
+    def starts(self) -> Index:
+        """[F] where each face begins in `corners`."""
+        return np.cumsum(self.counts) - self.counts
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Content:
+    """Points, normals and faces of one file, not yet checked against one another.
+
+    Args:
+        points: [N, n] coordinates, possibly not finite.
+        normals: [N, n] or None.
+        weights: [N] or None.
+        faces: polygons over `points`, or None for a cloud.
+        point_lines: line of the file that each point stands in, for text formats.
+        face_lines: the same for the faces.
+        first_index: number the format gives its first vertex (1 in OBJ), for messages.
+        split: the format repeats a vertex for each face or each attribute (STL, glTF).
+    """
+
+    points: Array
+    normals: Array | None = None
+    weights: Array | None = None
+    faces: Polygons | None = None
+    point_lines: Sequence[int] | None = None
+    face_lines: Sequence[int] | None = None
+    first_index: int = 0
+    split: bool = False
+
+    def point_name(self, row: int) -> str:
+        """Point as a message calls it: `point 7 (line 12)`, numbered as the format does."""
+        return _name("point", row + self.first_index, self.point_lines, row)
+
+    def face_name(self, row: int) -> str:
+        """Face as a message calls it: `face 7 (line 12)`, numbered as the format does."""
+        return _name("face", row + self.first_index, self.face_lines, row)
+
+
+def polygons(rows: Iterable[Sequence[int]]) -> Polygons:
+    """Faces given one by one, each a list of vertex indices counted from 0."""
+    faces = list(rows)
+    corners = [corner for face in faces for corner in face]
+    counts = [len(face) for face in faces]
+    return Polygons(corners=np.array(corners, dtype=np.int64), counts=np.array(counts, dtype=np.int64))
+
+
+def as_float64(values: NDArray[Any]) -> Array:
+    """Values as float64, without the warning that NumPy gives for some NaNs: they are refused by name later."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(np.float64)
+
+
+def check_finite(content: Content, source: str) -> None:
+    """Refuse coordinates that are NaN, infinite or so large that areas overflow, naming the first such point."""
+    bad = np.flatnonzero(~(np.abs(content.points) <= LARGEST).all(axis=1))
+    if bad.size:
+        raise InputError(
+            f"{source}: {content.point_name(int(bad[0]))} is {content.points[bad[0]].tolist()} "
+            f"({bad.size} such of {len(content.points)}); coordinates must be finite and at most {LARGEST:g}: "
+            "remove these points"
+        )
+
+
+def check_distinct(content: Content, source: str) -> None:
+    """Refuse files without two distinct points."""
+    points = content.points
+    if len(points) == 0:
+        raise InputError(f"{source}: no points; a shape needs at least two distinct points")
+    if len(points) == 1:
+        raise InputError(f"{source}: only one point, {points[0].tolist()}; a shape needs at least two distinct points")
+    if (points == points[0]).all():
+        raise InputError(
+            f"{source}: all {len(points)} points are {points[0].tolist()}; a shape needs at least two distinct points"
+        )
+
+
+def _name(kind: str, number: int, lines: Sequence[int] | None, row: int) -> str:
+    return f"{kind} {number}" + (f" (line {lines[row]})" if lines is not None else "")

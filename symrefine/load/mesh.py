@@ -1,0 +1,61 @@
+"""Faces as a file holds them, made into a triangle mesh in which every vertex counts and every triangle has area."""
+
+import logging
+
+import numpy as np
+
+from symrefine.errors import InputError
+from symrefine.geometry import Array
+from symrefine.load.content import Content, Polygons
+from symrefine.load.polygons import negligible, triangulate
+from symrefine.shape import Index, Measure, Shape
+
+_LOG = logging.getLogger(__name__)
+
+
+def mesh_shape(content: Content, faces: Polygons, measure: Measure, source: str) -> Shape:
+    """Triangle mesh of a file with faces.
+
+    Polygons are triangulated; vertices that the format repeats are merged; triangles without area and vertices
+    without a face carry no mass and go, so that they influence nothing.
+
+    Raises:
+        InputError: indices out of range, crossing outlines, no area at all.
+    """
+    _check_range(content, faces, source)
+    triangles, owner = triangulate(content, faces, source)
+    points, triangles = _merged(content.points, triangles) if content.split else (content.points, triangles)
+    flat = negligible(points, triangles)
+    if flat.all():
+        raise InputError(
+            f"{source}: no face has an area (first: {content.face_name(int(owner[0]))}, corners "
+            f"{points[triangles[0]].tolist()}); a mesh needs faces that are not collapsed to a line or a point"
+        )
+    used, compact = np.unique(triangles[~flat], return_inverse=True)
+    _LOG.info(
+        "%s: %d vertices, %d triangles; left out %d triangles without area and %d vertices without a face",
+        source, len(used), int((~flat).sum()), int(flat.sum()), len(points) - len(used),
+    )  # fmt: skip
+    return Shape(points=points[used], faces=compact.reshape(-1, 3), measure=measure, source=source)
+
+
+def _check_range(content: Content, faces: Polygons, source: str) -> None:
+    bad = np.flatnonzero((faces.corners < 0) | (faces.corners >= len(content.points)))
+    if bad.size:
+        row = int(np.searchsorted(faces.starts, bad[0], side="right")) - 1
+        first = content.first_index
+        raise InputError(
+            f"{source}: {content.face_name(row)} refers to vertex {faces.corners[bad[0]] + first}; the file has "
+            f"{len(content.points)} vertices, numbered {first} to {len(content.points) - 1 + first}"
+        )
+
+
+def _merged(points: Array, triangles: Index) -> tuple[Array, Index]:
+    """One vertex for each set of exactly equal ones, in the order of their first appearance."""
+    order = np.lexsort(points.T[::-1])
+    # Stable sorting: the first of equal vertices comes first. -0.0 equals 0.0 here, as it should.
+    new = np.concatenate([[True], (points[order[1:]] != points[order[:-1]]).any(axis=1)])
+    first = np.empty(len(points), dtype=np.int64)
+    first[order] = order[new][np.cumsum(new) - 1]
+    kept, compact = np.unique(first, return_inverse=True)
+    return points[kept], compact[triangles]

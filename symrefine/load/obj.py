@@ -1,0 +1,100 @@
+"""Wavefront OBJ: the polygonal part of the format, one statement a line."""
+
+import re
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from symrefine.errors import InputError
+from symrefine.geometry import Array
+from symrefine.load.content import Content, polygons
+from symrefine.load.text import Line, count, numbered_lines, parse_table, shorten
+
+# Looks, names and smoothing: nothing of the shape.
+_IGNORED = frozenset("vt o g s usemtl usemap mtllib lod".split())
+# Corners of a face, each a vertex, vertex/texture, vertex//normal or vertex/texture/normal.
+_CORNERS = re.compile(r"(\s+[+-]?[0-9]{1,18}(/[+-]?[0-9]*){0,2})+")
+
+
+def read_obj(data: bytes, source: str) -> Content:
+    """Content of an OBJ file; colours behind the coordinates, texture and materials are not part of a shape."""
+    vertices: list[Line] = []
+    normals: list[Line] = []
+    faces: list[tuple[int, list[int]]] = []
+    other: dict[str, int] = {}
+    for number, text in _statements(numbered_lines(data, source, comment="#")):
+        keyword, _, rest = text.replace("\t", " ").partition(" ")
+        if keyword == "v":
+            vertices.append((number, rest))
+        elif keyword == "vn":
+            normals.append((number, rest))
+        elif keyword == "f":
+            faces.append((number, _face((number, rest), len(vertices), source)))
+        elif keyword in ("l", "p"):
+            other.setdefault(keyword, number)
+        elif keyword not in _IGNORED:
+            raise InputError(
+                f"{source}: line {number}: {shorten(keyword)} is no statement of a polygonal OBJ file; expected "
+                f"v vn f l p {' '.join(sorted(_IGNORED))}"
+            )
+    if not faces and "l" in other:
+        raise InputError(f"{source}: line {other['l']}: lines but no faces; expected faces, or vertices alone")
+    return Content(
+        points=_vertices(vertices, source),
+        normals=_normals(normals, len(vertices), source) if normals and not faces else None,
+        faces=polygons(corners for _, corners in faces) if faces else None,
+        point_lines=[number for number, _ in vertices],
+        face_lines=[number for number, _ in faces],
+        first_index=1,
+    )
+
+
+def _statements(lines: Iterable[Line]) -> Iterator[Line]:
+    """Lines, joined where they end in a backslash; the first gives the number."""
+    begun, held = 0, ""
+    for number, text in lines:
+        begun = begun if held else number
+        if text.endswith("\\"):
+            held += text[:-1] + " "
+            continue
+        yield begun, held + text
+        held = ""
+    if held:
+        yield begun, held
+
+
+def _vertices(lines: list[Line], source: str) -> Array:
+    table = parse_table(
+        lines, source, columns=(3, 4, 6), layout="v x y z, a weight of 1 or a colour of three numbers behind it"
+    )
+    if table.shape[1] == 4 and (bad := np.flatnonzero(table[:, 3] != 1.0)).size:
+        raise InputError(
+            f"{source}: line {lines[bad[0]][0]}: weight {table[bad[0], 3]} of a rational vertex; expected 1 or none"
+        )
+    return table[:, :3]
+
+
+def _normals(lines: list[Line], points: int, source: str) -> Array:
+    """Normals of a cloud, which belong to the points in their order."""
+    if len(lines) != points:
+        raise InputError(f"{source}: {count(len(lines), 'normal')} (vn) for {points} points (v); expected as many")
+    return parse_table(lines, source, columns=(3,), layout="vn x y z")
+
+
+def _face(line: Line, vertices: int, source: str) -> list[int]:
+    """Corners of a face, counted from 0; negative numbers in the file count back from the latest vertex."""
+    number, text = line
+    fields = text.split()
+    if not _CORNERS.fullmatch(" " + text):
+        field = next((field for field in fields if not _CORNERS.fullmatch(" " + field)), "")
+        raise InputError(f"{source}: line {number}: {shorten(field)} is no corner; expected v, v/vt or v/vt/vn")
+    corners = [int(field.partition("/")[0]) for field in fields]
+    if min(corners) > 0:
+        return [index - 1 for index in corners]
+    bad = next((index for index in corners if index == 0 or index < -vertices), None)
+    if bad is not None:
+        raise InputError(
+            f"{source}: line {number}: a face refers to vertex {bad}; vertices count from 1, or back from -1 to "
+            f"-{vertices} here"
+        )
+    return [index - 1 if index > 0 else vertices + index for index in corners]

@@ -1,0 +1,167 @@
+"""Point clouds of the Point Cloud Library (PCD 0.7), in its three encodings."""
+
+import ctypes
+import itertools
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symrefine.errors import InputError
+from symrefine.geometry import Array
+from symrefine.load.content import Content, as_float64
+from symrefine.load.text import NATURAL, count, numbered_lines, parse_table, shorten
+
+_KEYS = frozenset("VERSION FIELDS SIZE TYPE COUNT WIDTH HEIGHT VIEWPOINT POINTS DATA".split())
+_ENCODINGS = ("ascii", "binary", "binary_compressed")
+_TYPES = frozenset({"F4", "F8", "I1", "I2", "I4", "I8", "U1", "U2", "U4", "U8"})
+_COORDINATES = ("x", "y", "z")
+_NORMAL = ("normal_x", "normal_y", "normal_z")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Header:
+    """Fields with their NumPy types and numbers of values, points, encoding; where the data begin."""
+
+    names: list[str]
+    types: list[str]
+    counts: list[int]
+    points: int
+    encoding: str
+    size: int
+    lines: int
+
+    @property
+    def record(self) -> np.dtype[np.void]:
+        """One point as the binary encoding stores it."""
+        # Names need not be unique ("_" pads); positions are.
+        return np.dtype(
+            [(str(k), "<" + t.lower(), (c,)) for k, (t, c) in enumerate(zip(self.types, self.counts, strict=True))]
+        )
+
+
+def read_pcd(data: bytes, source: str) -> Content:
+    """Content of a PCD file; the viewpoint is where the sensor stood and moves no point."""
+    header = _parse_header(data, source)
+    normals = set(_NORMAL) <= set(header.names)
+    wanted = [*_COORDINATES, *(_NORMAL if normals else ())]
+    if header.encoding == "ascii":
+        table, lines = _read_text(data, header, wanted, source)
+    else:
+        read = _read_binary if header.encoding == "binary" else _read_compressed
+        table, lines = read(data, header, wanted, source), None
+    return Content(points=table[:, :3], normals=table[:, 3:] if normals else None, point_lines=lines)
+
+
+def _parse_header(data: bytes, source: str) -> _Header:
+    entries: dict[str, list[str]] = {}
+    size = lines = 0
+    for line in data.splitlines(keepends=True):
+        size, lines = size + len(line), lines + 1
+        text = line.decode("utf-8", errors="replace").partition("#")[0]
+        words = text.split()
+        if words and words[0] not in _KEYS:
+            raise InputError(
+                f"{source}: line {lines}: {shorten(text.strip())}; the header of a PCD file has lines FIELDS SIZE TYPE "
+                "COUNT WIDTH HEIGHT POINTS and ends with DATA"
+            )
+        if words:
+            entries[words[0]] = words[1:]
+        if "DATA" in entries:
+            return _interpret(entries, size, lines, source)
+    raise InputError(f"{source}: the header has no line DATA; the file is cut off or not a PCD file")
+
+
+def _interpret(entries: dict[str, list[str]], size: int, lines: int, source: str) -> _Header:
+    names = entries.get("FIELDS", [])
+    types = [kind + width for kind, width in zip(entries.get("TYPE", []), entries.get("SIZE", []), strict=False)]
+    counts = entries.get("COUNT", ["1"] * len(names))
+    if not 0 < len(names) == len(entries.get("SIZE", [])) == len(entries.get("TYPE", [])) == len(counts):
+        raise InputError(f"{source}: FIELDS, SIZE, TYPE and COUNT of the header differ in length or are missing")
+    if not set(types) <= _TYPES:
+        raise InputError(f"{source}: TYPE and SIZE give {' '.join(types)}; expected of {' '.join(sorted(_TYPES))}")
+    if any(names.count(name) != 1 or counts[names.index(name)] != "1" for name in _COORDINATES):
+        raise InputError(f"{source}: FIELDS are {' '.join(names)}; expected one x, one y and one z, each of COUNT 1")
+    encoding = " ".join(entries["DATA"])
+    if encoding not in _ENCODINGS:
+        raise InputError(f"{source}: line {lines}: DATA {shorten(encoding)}; expected one of {', '.join(_ENCODINGS)}")
+    return _Header(
+        names=names, types=types, counts=_whole(counts, "COUNT", source), points=_points(entries, source),
+        encoding=encoding, size=size, lines=lines,
+    )  # fmt: skip
+
+
+def _points(entries: dict[str, list[str]], source: str) -> int:
+    """Number of points, which the header gives twice."""
+    given = {key: entries.get(key, []) for key in ("WIDTH", "HEIGHT", "POINTS")}
+    if any(len(words) != 1 for words in given.values()):
+        raise InputError(f"{source}: the header needs WIDTH, HEIGHT and POINTS, each with one number")
+    width, height, points = (_whole(words, key, source)[0] for key, words in given.items())
+    if width * height != points:
+        raise InputError(f"{source}: the header gives POINTS {points}, but WIDTH {width} times HEIGHT {height}")
+    return points
+
+
+def _whole(words: list[str], key: str, source: str) -> list[int]:
+    if not all(NATURAL.fullmatch(word) for word in words):
+        raise InputError(f"{source}: {key} {shorten(' '.join(words))} in the header; expected whole numbers")
+    return [int(word) for word in words]
+
+
+def _read_text(data: bytes, header: _Header, wanted: list[str], source: str) -> tuple[Array, list[int]]:
+    lines = [(number + header.lines, text) for number, text in numbered_lines(data[header.size :], source)]
+    layout = f"one line for each point: {' '.join(header.names)}"
+    table = parse_table(lines, source, columns=(sum(header.counts),), layout=layout)
+    if len(table) != header.points:
+        raise InputError(f"{source}: the header gives POINTS {header.points}, {len(table)} lines of points follow it")
+    starts = [0, *itertools.accumulate(header.counts)]
+    columns = [starts[header.names.index(name)] for name in wanted]
+    return table[:, columns], [number for number, _ in lines]
+
+
+def _read_binary(data: bytes, header: _Header, wanted: list[str], source: str) -> Array:
+    record = header.record
+    if len(data) - header.size != header.points * record.itemsize:
+        raise InputError(
+            f"{source}: the header gives {count(header.points, 'point')} of {record.itemsize} bytes, "
+            f"{header.points * record.itemsize} in all; {len(data) - header.size} follow it"
+        )
+    table = np.frombuffer(data, record, offset=header.size)
+    return _pick(table, header, wanted)
+
+
+def _pick(table: NDArray[Any], header: _Header, wanted: list[str]) -> Array:
+    return np.stack([as_float64(table[str(header.names.index(name))][:, 0]) for name in wanted], axis=1)
+
+
+def _read_compressed(data: bytes, header: _Header, wanted: list[str], source: str) -> Array:
+    """Compressed data through open3d, after the checks of size that it leaves out."""
+    full = header.points * header.record.itemsize
+    packed = int.from_bytes(data[header.size : header.size + 4], "little")
+    unpacked = int.from_bytes(data[header.size + 4 : header.size + 8], "little")
+    follow = len(data) - header.size - 8
+    if follow != packed or unpacked != full:
+        raise InputError(
+            f"{source}: compressed data of {packed} bytes for {unpacked} are announced; {max(follow, 0)} follow, and "
+            f"the header asks for {full}"
+        )
+    if any(header.types[header.names.index(name)] != "F4" for name in wanted):
+        raise InputError(f"{source}: compressed coordinates must be of TYPE F and SIZE 4; save it as binary or ascii")
+    return _open3d_points(source, header, len(wanted))
+
+
+def _open3d_points(path: str, header: _Header, columns: int) -> Array:
+    # Here, for it takes a second; libusb first, for open3d needs it and bare machines lack it.
+    import libusb_package
+
+    ctypes.CDLL(str(libusb_package.get_library_path()))
+    import open3d as o3d
+
+    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+        cloud = o3d.io.read_point_cloud(Path(path), format="pcd")
+    arrays = [np.asarray(cloud.points), np.asarray(cloud.normals)][: columns // 3]
+    if any(len(array) != header.points for array in arrays):
+        raise InputError(f"{path}: the compressed data cannot be unpacked to {count(header.points, 'point')}")
+    return np.concatenate(arrays, axis=1)

@@ -1,0 +1,75 @@
+"""Polygon files (PLY), text and binary in either byte order."""
+
+import numpy as np
+
+from symrefine.errors import InputError
+from symrefine.geometry import Array
+from symrefine.load.content import Content, Polygons, as_float64
+from symrefine.load.ply_body import Rows, read_rows
+from symrefine.load.ply_header import Element, parse_header
+
+_COORDINATES = ("x", "y", "z")
+_NORMAL = ("nx", "ny", "nz")
+_CORNERS = ("vertex_indices", "vertex_index")
+
+
+def read_ply(data: bytes, source: str) -> Content:
+    """Content of a PLY file; colours and other properties, edges and camera data are not part of a shape."""
+    header = parse_header(data, source)
+    elements = {element.name: element for element in header.elements}
+    vertex = elements.get("vertex", Element(name="vertex", count=0))
+    _check_elements(elements, vertex, source)
+    face = elements.get("face")
+    corners = _corner_property(face, source) if face is not None and face.count else ""
+    rows = read_rows(data, header, source)
+    vertices = rows["vertex"]
+    return Content(
+        points=_stack(vertices, _COORDINATES),
+        normals=_stack(vertices, _NORMAL) if not corners and set(_NORMAL) <= _scalars(vertex) else None,
+        faces=_polygons(rows["face"], corners, source) if corners else None,
+        point_lines=vertices.lines,
+        face_lines=rows["face"].lines if corners else None,
+    )
+
+
+def _check_elements(elements: dict[str, Element], vertex: Element, source: str) -> None:
+    missing = [name for name in _COORDINATES if name not in _scalars(vertex)]
+    if missing:
+        raise InputError(
+            f"{source}: the header declares no {' '.join(missing)} of element 'vertex' (elements: "
+            f"{', '.join(elements) or 'none'}); a PLY file needs vertices with x, y and z"
+        )
+    counts = {name: element.count for name, element in elements.items()}
+    if counts.get("tristrips"):
+        raise InputError(f"{source}: holds triangle strips, which are not supported; save it with an element 'face'")
+    if counts.get("edge") and not counts.get("face"):
+        raise InputError(f"{source}: holds edges but no faces; expected faces, or vertices alone")
+
+
+def _scalars(element: Element) -> set[str]:
+    return {p.name for p in element.properties if not p.length_type}
+
+
+def _corner_property(face: Element, source: str) -> str:
+    for p in face.properties:
+        if p.name in _CORNERS and p.length_type:
+            return p.name
+    names = ", ".join(p.name for p in face.properties)
+    raise InputError(f"{source}: element 'face' has properties {names}; expected a list {' or '.join(_CORNERS)}")
+
+
+def _stack(rows: Rows, names: tuple[str, ...]) -> Array:
+    return np.stack([as_float64(rows.columns[name].values) for name in names], axis=1)
+
+
+def _polygons(rows: Rows, name: str, source: str) -> Polygons:
+    column = rows.columns[name]
+    counts = column.counts if column.counts is not None else np.empty(0, dtype=np.int64)
+    corners = column.values
+    # Text, and some binary files, give indices as floating-point numbers.
+    whole = (corners == np.rint(corners)) & (np.abs(corners) < 2.0**53) if corners.dtype.kind == "f" else True
+    if (bad := np.flatnonzero(np.logical_not(whole))).size:
+        row = int(np.searchsorted(np.cumsum(counts), bad[0], side="right"))
+        at = f" (line {rows.lines[row]})" if rows.lines else ""
+        raise InputError(f"{source}: face {row}{at} refers to vertex {corners[bad[0]]}; expected whole numbers")
+    return Polygons(corners=corners.astype(np.int64), counts=counts)

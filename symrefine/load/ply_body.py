@@ -1,0 +1,222 @@
+"""Rows of a PLY file: all of them, and nothing behind them."""
+
+import struct
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symrefine.errors import InputError
+from symrefine.load.ply_header import Element, Header
+from symrefine.load.text import Line, count, numbered_lines, parse_numbers, parse_table, shorten
+from symrefine.shape import Index
+
+Values = NDArray[Any]
+
+_STRUCT = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q", "f4": "f", "f8": "d"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Column:
+    """One property of all rows: a value each, or the lists one after the other and their lengths."""
+
+    values: Values
+    counts: Index | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rows:
+    """Columns of one element by name, and for text the line of each row."""
+
+    columns: dict[str, Column]
+    lines: list[int] | None = None
+
+
+def read_rows(data: bytes, header: Header, source: str) -> dict[str, Rows]:
+    """Rows of every element of the header, by its name.
+
+    Raises:
+        InputError: fewer or more rows than declared, or rows that do not have the declared form.
+    """
+    return _read_binary(data, header, source) if header.byte_order else _read_text(data, header, source)
+
+
+def _read_binary(data: bytes, header: Header, source: str) -> dict[str, Rows]:
+    offset = header.size
+    rows = {}
+    for element in header.elements:
+        table = _equal_rows(data, offset, element, header.byte_order)
+        if table is not None:
+            rows[element.name] = _columns(table, element)
+            offset += table.nbytes
+        elif element.has_lists:
+            rows[element.name], offset = _unequal_rows(data, offset, element, header.byte_order, source)
+        else:
+            raise _cut_off(element, (len(data) - offset) // _record(element, header.byte_order, []).itemsize, source)
+    if offset != len(data):
+        raise InputError(
+            f"{source}: {count(len(data) - offset, 'byte')} behind {_declared(header)}; "
+            "the counts in the header are wrong, or something was added to the file"
+        )
+    return rows
+
+
+def _equal_rows(data: bytes, offset: int, element: Element, byte_order: str) -> NDArray[np.void] | None:
+    """All rows at once if their lists are as long as those of the first, and if they are all there; else None."""
+    lengths: list[int] = []
+    for p in element.properties if element.count else []:
+        if p.length_type:
+            start = offset + _record(element, byte_order, lengths, until=p.name).itemsize
+            length = np.dtype(byte_order + p.length_type)
+            if start + length.itemsize > len(data):
+                return None
+            lengths.append(int(np.frombuffer(data, length, count=1, offset=start)[0]))
+            if not 0 <= lengths[-1] <= len(data):
+                return None
+    record = _record(element, byte_order, lengths)
+    if element.count * record.itemsize > len(data) - offset:
+        return None
+    table = np.frombuffer(data, record, count=element.count, offset=offset) if element.count else np.empty(0, record)
+    lists = [p.name for p in element.properties if p.length_type]
+    equal = all((table[_length(name)] == length).all() for name, length in zip(lists, lengths, strict=False))
+    return table if equal else None
+
+
+def _record(element: Element, byte_order: str, lengths: list[int], until: str = "") -> np.dtype[np.void]:
+    """Layout of a row, given the lengths of its lists; optionally of its part before one property."""
+    fields: list[tuple[str, str, tuple[int, ...]]] = []
+    remaining = iter(lengths)
+    for p in element.properties:
+        if p.name == until:
+            break
+        if p.length_type:
+            fields.append((_length(p.name), byte_order + p.length_type, ()))
+        fields.append((p.name, byte_order + p.type, (next(remaining, 0),) if p.length_type else ()))
+    return np.dtype(fields)
+
+
+def _length(name: str) -> str:
+    return name + " length"  # names hold no space, so that it is free
+
+
+def _columns(table: NDArray[np.void], element: Element) -> Rows:
+    return Rows(
+        columns={
+            p.name: Column(values=table[p.name].ravel(), counts=table[_length(p.name)].astype(np.int64))
+            if p.length_type
+            else Column(values=table[p.name])
+            for p in element.properties
+        }
+    )
+
+
+def _unequal_rows(data: bytes, offset: int, element: Element, byte_order: str, source: str) -> tuple[Rows, int]:
+    """Rows one by one, and where they end."""
+    builder = _Builder(element)
+    for row in range(element.count):
+        try:
+            for p in element.properties:
+                size = 1
+                if p.length_type:
+                    (size,) = struct.unpack_from(byte_order + _STRUCT[p.length_type], data, offset)
+                    offset += struct.calcsize(byte_order + _STRUCT[p.length_type])
+                    if size < 0:
+                        raise InputError(f"{source}: row {row} of element '{element.name}': list of length {size}")
+                layout = f"{byte_order}{size}{_STRUCT[p.type]}"
+                builder.add(p.name, struct.unpack_from(layout, data, offset))
+                offset += struct.calcsize(layout)
+        except struct.error:
+            raise _cut_off(element, row, source) from None
+    return builder.rows(None), offset
+
+
+class _Builder:
+    """Columns that grow row by row."""
+
+    def __init__(self, element: Element) -> None:
+        self._element = element
+        self._values: dict[str, list[float]] = {p.name: [] for p in element.properties}
+        self._counts: dict[str, list[int]] = {p.name: [] for p in element.properties}
+
+    def add(self, name: str, values: tuple[float, ...] | list[float]) -> None:
+        self._values[name].extend(values)
+        self._counts[name].append(len(values))
+
+    def rows(self, lines: list[int] | None) -> Rows:
+        columns = {
+            p.name: Column(
+                values=np.array(self._values[p.name]),
+                counts=np.array(self._counts[p.name], dtype=np.int64) if p.length_type else None,
+            )
+            for p in self._element.properties
+        }
+        return Rows(columns=columns, lines=lines)
+
+
+def _read_text(data: bytes, header: Header, source: str) -> dict[str, Rows]:
+    lines = [(number + header.lines, text) for number, text in numbered_lines(data[header.size :], source)]
+    rows = {}
+    start = 0
+    for element in header.elements:
+        part = lines[start : start + element.count]
+        read = _text_lists if element.has_lists else _text_values
+        rows[element.name] = read(part, element, source)
+        # After the rows themselves: where one count is too large, the first row of the wrong form says more.
+        if len(part) < element.count:
+            raise _cut_off(element, len(part), source)
+        start += element.count
+    if start < len(lines):
+        raise InputError(
+            f"{source}: line {lines[start][0]}: {shorten(lines[start][1])} behind {_declared(header)}; "
+            "the counts in the header are wrong, or something was added to the file"
+        )
+    return rows
+
+
+def _text_values(lines: list[Line], element: Element, source: str) -> Rows:
+    names = [p.name for p in element.properties]
+    layout = f"a row of element '{element.name}': {' '.join(names)}"
+    table = parse_table(lines, source, columns=(len(names),), layout=layout)
+    columns = {name: Column(values=table[:, k]) for k, name in enumerate(names)}
+    return Rows(columns=columns, lines=[number for number, _ in lines])
+
+
+def _text_lists(lines: list[Line], element: Element, source: str) -> Rows:
+    names = " ".join(f"LENGTH {p.name}..." if p.length_type else p.name for p in element.properties)
+    layout = f"a row of element '{element.name}': {names}"
+    builder = _Builder(element)
+    for line in lines:
+        parts = _split(parse_numbers(line, source, layout), element)
+        if len(parts) != len(element.properties):
+            raise InputError(f"{source}: line {line[0]}: {shorten(line[1])}; expected {layout}")
+        for p, part in zip(element.properties, parts, strict=True):
+            builder.add(p.name, part)
+    return builder.rows([number for number, _ in lines])
+
+
+def _split(numbers: list[float], element: Element) -> list[list[float]]:
+    """Values of each property in a row; too few or too many parts if the row has not the form of the element."""
+    parts: list[list[float]] = []
+    position = 0
+    for p in element.properties:
+        size = 1.0
+        if p.length_type:
+            size = numbers[position] if position < len(numbers) else -1.0
+            position += 1
+        if not (size.is_integer() and 0 <= size <= len(numbers) - position):
+            return []
+        parts.append(numbers[position : position + int(size)])
+        position += int(size)
+    return parts if position == len(numbers) else [*parts, numbers[position:]]
+
+
+def _cut_off(element: Element, rows: int, source: str) -> InputError:
+    return InputError(
+        f"{source}: cut off in element '{element.name}': the header declares {count(element.count, 'row')}, "
+        f"only {rows} {'is' if rows == 1 else 'are'} there"
+    )
+
+
+def _declared(header: Header) -> str:
+    return "the " + " and ".join(f"{e.count} {e.name}" for e in header.elements) + " rows that the header declares"

@@ -1,0 +1,154 @@
+"""Polygons to triangles without changing the surface: no overlap on concave faces, no preference for a vertex order."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symrefine.errors import InputError
+from symrefine.geometry import Array, frame_with_z
+from symrefine.load.content import Content, Polygons
+from symrefine.shape import Index
+
+Flags = NDArray[np.bool_]
+
+# Relative to the polygon's own area: far above rounding, far below any corner that is meant to be concave.
+FLAT = 1e-9
+
+
+def triangulate(content: Content, faces: Polygons, source: str) -> tuple[Index, Index]:
+    """Triangles [T, 3] of all faces and the face [T] each is part of, in the order of the faces.
+
+    A quadrilateral is cut along its shorter diagonal, so that mirror images are cut alike even where they are not
+    flat; other polygons are fans where convex, cut ear by ear where not.
+
+    Raises:
+        InputError: fewer than three corners; outlines that cross themselves.
+    """
+    few = np.flatnonzero(faces.counts < 3)
+    if few.size:
+        row = int(few[0])
+        raise InputError(f"{source}: {content.face_name(row)} has {faces.counts[row]} corners; expected at least 3")
+    triples = np.flatnonzero(faces.counts == 3)
+    quads = np.flatnonzero(faces.counts == 4)
+    pieces = [_gather(faces, triples, 3), _quads(content, faces, quads, source)]
+    owners = [triples, np.repeat(quads, 2)]
+    for row in np.flatnonzero(faces.counts > 4).tolist():
+        corners = faces.corners[faces.starts[row] :][: faces.counts[row]]
+        local = _polygon(content.points[corners])
+        if len(local) == 0:
+            raise _crossing(content, row, source)
+        pieces.append(corners[local])
+        owners.append(np.full(len(local), row))
+    owner = np.concatenate(owners)
+    order = np.argsort(owner, kind="stable")
+    return np.concatenate(pieces)[order], owner[order]
+
+
+def negligible(points: Array, triangles: Index) -> Flags:
+    """[T] triangles whose area is within the rounding of their own coordinates."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    edges = np.stack([b - a, c - b, a - c])
+    longest = np.sqrt((edges**2).sum(axis=2).max(axis=0))
+    reach = np.abs(np.stack([a, b, c])).max(axis=(0, 2))
+    doubled_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    # |da x e| <= |e| |da|, da the rounding of the coordinates and of their differences.
+    small: Flags = doubled_area <= 8.0 * np.finfo(np.float64).eps * longest * (longest + reach)
+    return small
+
+
+def _gather(faces: Polygons, rows: Index, corners: int) -> Index:
+    gathered: Index = faces.corners[faces.starts[rows][:, None] + np.arange(corners)]
+    return gathered
+
+
+def _quads(content: Content, faces: Polygons, rows: Index, source: str) -> Index:
+    """Both halves [2Q, 3] of each quadrilateral, along the shorter of the diagonals that lie inside."""
+    if len(rows) == 0:
+        return np.empty((0, 3), dtype=np.int64)
+    quads = _gather(faces, rows, 4)
+    first, second = quads[:, [[0, 1, 2], [0, 2, 3]]], quads[:, [[0, 1, 3], [1, 2, 3]]]
+    p = content.points[quads]
+    # The Newell normal of a quadrilateral, twice its area vector, is the product of its diagonals.
+    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+    valid_first, valid_second = (_inside(content.points, halves, normal) for halves in (first, second))
+    bad = np.flatnonzero(~(valid_first | valid_second))
+    if bad.size:
+        raise _crossing(content, int(rows[bad[0]]), source)
+    shorter = ((p[:, 2] - p[:, 0]) ** 2).sum(axis=1) <= ((p[:, 3] - p[:, 1]) ** 2).sum(axis=1)
+    use_first = valid_first & (shorter | ~valid_second)
+    return np.where(use_first[:, None, None], first, second).reshape(-1, 3)
+
+
+def _inside(points: Array, halves: Index, normal: Array) -> Flags:
+    """[Q] whether both halves [Q, 2, 3] turn the way the whole does, that is, do not overlap."""
+    p = points[halves]
+    area = np.cross(p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0])
+    size = np.linalg.norm(area, axis=2)
+    agrees = np.einsum("qhk,qk->qh", area, normal) > -FLAT * size * np.linalg.norm(normal, axis=1)[:, None]
+    # The halves of a symmetric bow tie cancel: its normal is zero, though it has area.
+    cancels = np.linalg.norm(normal, axis=1) <= FLAT * size.sum(axis=1)
+    empty = negligible(points, halves.reshape(-1, 3)).reshape(-1, 2)
+    inside: Flags = (agrees | empty).all(axis=1) & (~cancels | empty.all(axis=1))
+    return inside
+
+
+def _polygon(points: Array) -> Index:
+    """Triangles [n - 2, 3] of one polygon [n, 3]; none if its outline crosses itself."""
+    fan = np.array([(0, k, k + 1) for k in range(1, len(points) - 1)], dtype=np.int64)
+    if negligible(points, fan).all():
+        return fan
+    following = np.roll(points, -1, axis=0)
+    areas = np.cross(points - points[0], following - points[0])
+    normal = areas.sum(axis=0)
+    if np.linalg.norm(normal) <= FLAT * np.linalg.norm(areas, axis=1).sum():
+        return np.empty((0, 3), dtype=np.int64)
+    flat = (points - points[0]) @ frame_with_z(normal)[:2].T
+    return fan if _is_convex(flat) else _clip_ears(flat)
+
+
+def _is_convex(flat: Array) -> bool:
+    """Whether the outline [n, 2] only turns left, and once around in total."""
+    edge = np.roll(flat, -1, axis=0) - flat
+    edge = edge[edge.any(axis=1)]
+    after = np.roll(edge, -1, axis=0)
+    turn = np.arctan2(_cross(edge, after), (edge * after).sum(axis=1))
+    return bool((turn > -FLAT).all() and abs(turn.sum() - 2.0 * np.pi) < 1e-6)
+
+
+def _clip_ears(flat: Array) -> Index:
+    """Cut off the ear with the shortest diagonal until a triangle is left; nothing if there is no ear."""
+    ring = np.arange(len(flat))
+    triangles = []
+    while len(ring) > 3:
+        before, after = np.roll(ring, 1), np.roll(ring, -1)
+        length = ((flat[after] - flat[before]) ** 2).sum(axis=1)
+        length[~_ears(flat[before], flat[ring], flat[after])] = np.inf
+        k = int(np.argmin(length))
+        if not np.isfinite(length[k]):
+            return np.empty((0, 3), dtype=np.int64)
+        triangles.append((before[k], ring[k], after[k]))
+        ring = np.delete(ring, k)
+    a, b, c = flat[ring]
+    if _cross(b - a, c - a) < -FLAT * np.ptp(flat, axis=0).max() ** 2:
+        return np.empty((0, 3), dtype=np.int64)
+    return np.array([*triangles, tuple(ring)], dtype=np.int64)
+
+
+def _ears(a: Array, b: Array, c: Array) -> Flags:
+    """[n] corners b, between a and c, that turn left and whose triangle holds no other corner."""
+    tolerance = FLAT * np.ptp(b, axis=0).max() ** 2
+    ab, bc, ca = (_cross((v - u)[:, None], b[None] - u[:, None]) for u, v in ((a, b), (b, c), (c, a)))
+    # A corner on the diagonal would pinch what is left; one on the two sides belongs to a bridge to a hole.
+    occupied = ((ab > tolerance) & (bc > tolerance) & (ca > -tolerance)).any(axis=1)
+    ears: Flags = (_cross(b - a, c - b) >= -tolerance) & ~occupied
+    return ears
+
+
+def _cross(u: Array, v: Array) -> Array:
+    product: Array = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+    return product
+
+
+def _crossing(content: Content, row: int, source: str) -> InputError:
+    return InputError(
+        f"{source}: the outline of {content.face_name(row)} crosses or folds over itself; split it into triangles"
+    )

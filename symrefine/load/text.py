@@ -1,0 +1,129 @@
+"""Text files: numbered lines, and tables of numbers in which no line is skipped or repaired."""
+
+import re
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from symrefine.errors import InputError
+from symrefine.geometry import Array
+
+# One line of a file: its number, counted from 1, and its text without the white space around it.
+Line = tuple[int, str]
+
+# Eighteen digits fit into int64; Python itself refuses to convert thousands of them.
+INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
+NATURAL = re.compile(r"[0-9]{1,18}")
+
+
+def numbered_lines(data: bytes, source: str, *, comment: str | None = None) -> list[Line]:
+    """Lines that hold something; `comment` begins a remark that lasts to the end of its line.
+
+    Raises:
+        InputError: bytes that no text file holds.
+    """
+    if b"\0" in data:
+        raise InputError(f"{source}: not a text file: zero byte at offset {data.index(0)}")
+    # Names and remarks may be in any encoding; a number that is not ASCII is refused where it is parsed.
+    text = data.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
+    lines = enumerate(text.split("\n"), start=1)
+    if comment is None:
+        return [(number, stripped) for number, line in lines if (stripped := line.strip())]
+    return [(number, stripped) for number, line in lines if (stripped := line.partition(comment)[0].strip())]
+
+
+def parse_table(
+    lines: Sequence[Line],
+    source: str,
+    *,
+    columns: Collection[int] = (),
+    layout: str = "one row of numbers a line",
+    delimiter: str | None = None,
+) -> Array:
+    """Rows of numbers as [N, n] float64, each as precise as it is written.
+
+    Args:
+        lines: the rows.
+        source: file, for messages.
+        columns: numbers of columns that are right; any, if empty, as long as all rows agree.
+        layout: what would be right, for messages.
+        delimiter: between the columns; white space if None.
+
+    Raises:
+        InputError: a row of another length or an entry that is not a number, with line and column.
+    """
+    if not lines:
+        return np.empty((0, max(columns, default=0)))
+    if not all(text for _, text in lines):
+        # NumPy would leave the row out.
+        _explain(lines, source, columns, layout, delimiter)
+    try:
+        table = np.loadtxt([text for _, text in lines], comments=None, delimiter=delimiter, ndmin=2)
+    except ValueError as error:
+        # NumPy counts rows, not lines, and stops at the first fault of any kind: look again, slowly, for a message.
+        _explain(lines, source, columns, layout, delimiter)
+        raise InputError(f"{source}: {error}; expected {layout}") from None
+    if columns and table.shape[1] not in columns:
+        _explain(lines, source, columns, layout, delimiter)
+    return table
+
+
+def parse_integers(line: Line, source: str, what: str) -> list[int]:
+    """All entries of a line as whole numbers."""
+    number, text = line
+    fields = text.split()
+    for field in fields:
+        if not INTEGER.fullmatch(field):
+            raise InputError(f"{source}: line {number}: {shorten(field)} is not a whole number; expected {what}")
+    return [int(field) for field in fields]
+
+
+def parse_numbers(line: Line, source: str, layout: str) -> list[float]:
+    """All entries of a line, for rows that differ in length."""
+    number, text = line
+    fields = text.split()
+    try:
+        if "_" not in text and text.isascii():
+            return [float(field) for field in fields]
+    except ValueError:
+        pass
+    column, field = next((k, field) for k, field in enumerate(fields, start=1) if not _is_number(field))
+    raise InputError(f"{source}: line {number}, column {column}: {shorten(field)} is not a number; expected {layout}")
+
+
+def shorten(text: str, limit: int = 40) -> str:
+    """Quotation of at most `limit` characters, in ASCII: it may be garbage and must stay on one line."""
+    return ascii(text if len(text) <= limit else text[: limit - 3] + "...")
+
+
+def _explain(lines: Sequence[Line], source: str, columns: Collection[int], layout: str, delimiter: str | None) -> None:
+    width = 0
+    for number, text in lines:
+        fields = [field.strip() for field in text.split(delimiter)]
+        for column, field in enumerate(fields, start=1):
+            if not _is_number(field):
+                raise InputError(
+                    f"{source}: line {number}, column {column}: {shorten(field)} is not a number; expected {layout}"
+                )
+        if columns and len(fields) not in columns:
+            raise InputError(f"{source}: line {number} has {count(len(fields), 'column')}; expected {layout}")
+        if width and len(fields) != width:
+            raise InputError(
+                f"{source}: line {number} has {count(len(fields), 'column')}, the lines above have {width}; "
+                f"expected {layout}"
+            )
+        width = len(fields)
+
+
+def count(number: int, noun: str) -> str:
+    """`1 column`, `2 columns`."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def _is_number(field: str) -> bool:
+    try:
+        float(field)
+    except ValueError:
+        return False
+    # Python reads 1_000 and digits of other scripts; NumPy and every other program that reads such files do not.
+    return field.isascii() and "_" not in field
