@@ -1,0 +1,157 @@
+"""Closure of operations that share one line: counted in whole steps about it, so no error can build up.
+
+Such an operation is (e, f, j): it multiplies z by e = +-1 and, in the plane across, it rotates (f = +1) or reflects
+(f = -1) by j steps of 2 pi / N. Products are (e e', f f', j + f j'): exact integers once N and the phase are known.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from symrefine.geometry import Array, frame_with_z, rotation
+from symrefine.groups.names import MAX_FOLD
+from symrefine.groups.orthogonal import Index, axes_and_angles, determinants, nearest_in_span
+
+_EXACT = 1e-3
+_ACCIDENTS = 2.0
+Step = tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Planar:
+    """What operations do to a common axis, `ends` e [k], and across it: `dets` f [k] and `angles_rad` [k].
+
+    An in-plane reflection of angle psi keeps the direction psi / 2.
+    """
+
+    ends: Index
+    dets: Index
+    angles_rad: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lattice:
+    """Angles j 2 pi / `fold` for rotations, `phase_rad` + j 2 pi / `fold` for in-plane reflections."""
+
+    fold: int
+    phase_rad: float
+
+
+def common_axes(operations: Array) -> list[tuple[Array, float]]:
+    """Lines that operations [k, 3, 3] may share, and the largest angle by which one of them moves each.
+
+    First the best of their own axes; then the best normal to two of them, which is right if all axes lie across the
+    common one, but meaningless for two noisy copies of one axis.
+    """
+    axes, angles = axes_and_angles(operations)
+    crosses = np.cross(axes[np.argmax(angles)], axes)
+    sizes = np.linalg.norm(crosses, axis=1, keepdims=True)
+    normals = (crosses / np.maximum(sizes, 0.01))[sizes[:, 0] > 0.01]
+    return [_kept_best(operations, candidates) for candidates in (axes, normals) if len(candidates)]
+
+
+def _kept_best(operations: Array, candidates: Array) -> tuple[Array, float]:
+    """The candidate direction [c, 3] that operations keep best, refined by least squares, and how far they move it."""
+    cosines = np.sum(candidates @ operations * candidates, axis=2).T
+    best = int(np.argmax(np.abs(cosines).min(axis=1)))
+    moved = operations - np.where(cosines[best] < 0.0, -1.0, 1.0)[:, None, None] * np.eye(3)
+    values, vectors = np.linalg.eigh(np.einsum("kij,kil->jl", moved, moved))
+    direction = nearest_in_span(vectors[:, values < values[0] + 1e-9], candidates[best])
+    sines = np.linalg.norm(np.cross(operations @ direction, direction), axis=1)
+    return direction, float(np.arcsin(np.minimum(sines, 1.0)).max())
+
+
+def planar_parts(operations: Array, frame: Array) -> Planar:
+    """Decompose operations [k, 3, 3] that nearly keep the z axis of `frame`."""
+    turned = frame @ operations @ frame.T
+    ends = np.where(turned[:, 2, 2] < 0.0, -1, 1)
+    dets = np.rint(determinants(turned)).astype(np.intp) * ends
+    sines, cosines = turned[:, 1, 0] - dets * turned[:, 0, 1], turned[:, 0, 0] + dets * turned[:, 1, 1]
+    return Planar(ends=ends, dets=dets, angles_rad=np.arctan2(sines, cosines))
+
+
+def fit_lattice(parts: Planar, tolerance_rad: float, multiple_of: int, max_fold: int) -> Lattice | None:
+    """The lattice of angles the operations point to, its fold a multiple of `multiple_of`; None if there is none.
+
+    A fold that fits far better than chance (N^2 times the error) is taken as exact, the smallest first. Otherwise the
+    errors are weighed as Gaussian, sigma = tolerance / 2, against the N places each angle might have had, among the
+    folds of which fewer than `_ACCIDENTS` would fit as well by accident.
+    """
+    turns = _distinct(parts.angles_rad[parts.dets > 0], tolerance_rad, drop_zero=True)
+    flips = _distinct(parts.angles_rad[parts.dets < 0], tolerance_rad)
+    folds = multiple_of * np.arange(1, max(max_fold // multiple_of, 1) + 1)
+    phases = np.angle(np.exp(1j * np.outer(folds, flips)).sum(axis=1)) / folds
+    angles = np.concatenate([np.tile(turns, (len(folds), 1)), flips - phases[:, None]], axis=1)
+    errors = np.angle(np.exp(1j * folds[:, None] * angles)) / folds[:, None]
+    best = _likeliest(folds, errors, len(turns) + max(len(flips) - 1, 0), tolerance_rad)
+    return None if best is None else Lattice(fold=int(folds[best]), phase_rad=float(phases[best]))
+
+
+def _likeliest(folds: Index, errors: Array, count: int, tolerance_rad: float) -> int | None:
+    """Row of `errors` [n, m] to trust, `count` of the m angles being informative."""
+    worst, squares = np.abs(errors).max(axis=1, initial=0.0), np.sum(errors**2, axis=1)
+    within = worst <= tolerance_rad
+    exact = within & (folds**2 * worst <= _EXACT)
+    if exact.any():
+        return int(np.argmax(exact))
+    rms = np.sqrt(3.0 * squares / max(count, 1)) / np.pi  # times N: 1 for angles at random
+    within &= folds / folds[0] * (folds * rms) ** count <= _ACCIDENTS
+    cost = (count + 1) * np.log(folds) + 2.0 * squares / tolerance_rad**2
+    return int(np.argmin(np.where(within, cost, np.inf))) if within.any() else None
+
+
+def _distinct(angles: Array, tolerance_rad: float, drop_zero: bool = False) -> Array:
+    """One angle for every run of angles on the circle closer than the tolerance; without the run at zero on demand."""
+    ordered = np.sort(np.mod(angles + tolerance_rad, 2.0 * np.pi)) - tolerance_rad
+    if drop_zero:
+        ordered = ordered[ordered > tolerance_rad]
+    runs = np.split(ordered, np.flatnonzero(np.diff(ordered) > tolerance_rad) + 1)
+    return np.array([run.mean() for run in runs if run.size])
+
+
+def closed_operations(parts: Planar, lattice: Lattice, frame: Array) -> Array:
+    """All operations [m, 3, 3], exact, that the operations in `parts` generate on `lattice`."""
+    offsets = np.where(parts.dets < 0, parts.angles_rad - lattice.phase_rad, parts.angles_rad)
+    steps = np.rint(offsets * lattice.fold / (2.0 * np.pi)).astype(int) % lattice.fold
+    generators = set(zip(parts.ends.tolist(), parts.dets.tolist(), steps.tolist(), strict=True))
+    e, f, j = np.array(sorted(_close_steps(generators, lattice.fold))).T
+    angle = 2.0 * np.pi * j / lattice.fold
+    exact = np.zeros((len(j), 3, 3))
+    exact[:, 0, 0], exact[:, 0, 1] = np.cos(angle), -f * np.sin(angle)
+    exact[:, 1, 0], exact[:, 1, 1] = np.sin(angle), f * np.cos(angle)
+    exact[:, 2, 2] = e
+    phased = rotation([0.0, 0.0, 1.0], -0.5 * lattice.phase_rad) @ frame
+    return np.asarray(phased.T @ exact @ phased)
+
+
+def _close_steps(generators: set[Step], fold: int) -> set[Step]:
+    """The group generated: every new element times every generator until nothing new appears."""
+    group: set[Step] = {(1, 1, 0)}
+    fresh = group
+    while fresh:
+        fresh = {(e * g, f * h, (j + f * k) % fold) for e, f, j in fresh for g, h, k in generators} - group
+        group = group | fresh
+    return group
+
+
+def axial_operations(operations: Array, tolerance_rad: float, orders: Index, max_fold: int) -> Iterator[Array]:
+    """Exact closures [m, 3, 3] of noisy operations [k, 3, 3] about each line they may share; nothing if none closes.
+
+    Args:
+        operations: generators.
+        tolerance_rad: largest error of one of them, as an angle of rotation.
+        orders: [k] the exact order of each, 0 where unknown.
+        max_fold: largest number N of steps about the axis to consider, unless `orders` say more.
+    """
+    for direction, moved in common_axes(operations):
+        frame = frame_with_z(direction)
+        parts = planar_parts(operations, frame)
+        known = (parts.dets > 0) & (orders > 0)
+        multiple = int(np.lcm.reduce(orders[known], initial=1))
+        if moved > 3.0 * tolerance_rad or multiple > MAX_FOLD:
+            continue
+        unknown = Planar(ends=parts.ends[~known], dets=parts.dets[~known], angles_rad=parts.angles_rad[~known])
+        lattice = fit_lattice(unknown, tolerance_rad, multiple, max_fold)
+        if lattice is not None:
+            yield closed_operations(parts, lattice, frame)

@@ -1,0 +1,91 @@
+"""Schoenflies symbols: one canonical spelling for every point group of 3-space, and its aliases."""
+
+import math
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+
+from symrefine.errors import InputError
+
+MAX_FOLD = 360
+_AXIAL = {"C", "Cv", "Ch", "S", "D", "Dh", "Dd"}
+_CONTINUOUS = {"C", "Cv", "Ch", "D", "Dh"}
+_FIXED = ("T", "Td", "Th", "O", "Oh", "I", "Ih", "K", "Kh")
+_ALIASES: dict[tuple[str, float], tuple[str, float]] = {
+    ("Cv", 1): ("Ch", 1),
+    ("D", 1): ("C", 2),
+    ("Dh", 1): ("Cv", 2),
+    ("Dd", 1): ("Ch", 2),
+}
+_WORDS: dict[str, tuple[str, float]] = {
+    "cs": ("Ch", 1),
+    "ci": ("S", 1),
+    "v": ("D", 2),  # Klein's Vierergruppe
+    "vh": ("Dh", 2),
+    "vd": ("Dd", 2),
+}
+_SPECIAL: dict[tuple[str, float], str] = {("Ch", 1): "Cs", ("S", 1): "Ci"}
+_PATTERN = re.compile(r"([cds])([1-9][0-9]{0,5}|inf|∞)([vhdi]?)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Symbol:
+    """A point group up to its placement.
+
+    `family` is the symbol without its number: C, Cv, Ch, S, D, Dh, Dd (axial) or T ... Kh. `fold` is the n of
+    Cn, Cnv, Cnh, S2n, Dn, Dnh, Dnd (an int or `math.inf`), and 0 for T ... Kh, which have no principal axis.
+    Cs is (Ch, 1) and Ci is (S, 1).
+    """
+
+    family: str
+    fold: float
+
+    @property
+    def name(self) -> str:
+        """The canonical Schoenflies symbol."""
+        if self.fold == 0:
+            return self.family
+        number = "inf" if math.isinf(self.fold) else str(int(self.fold) * (2 if self.family == "S" else 1))
+        return _SPECIAL.get((self.family, self.fold), self.family[0] + number + self.family[1:])
+
+
+@lru_cache(maxsize=1024)
+def parse(name: str) -> Symbol:
+    """The group a Schoenflies symbol names; letter case is free and `∞` stands for `inf`.
+
+    Aliases: C1h = C1v = S1 = Cs, S2 = Ci, Sn = Cnh and Cni = S2n for odd n, D1 = C2, D1h = C2v, D1d = C2h, V = D2.
+
+    Raises:  InputError: no such group, or n above `MAX_FOLD`.
+    """
+    text = str(name).strip().lower()
+    if text.capitalize() in _FIXED:
+        return Symbol(family=text.capitalize(), fold=0)
+    family, fold = _WORDS.get(text) or _axial(text)
+    family, fold = _ALIASES.get((family, fold), (family, fold))
+    if family not in (_CONTINUOUS if math.isinf(fold) else _AXIAL) or MAX_FOLD < fold < math.inf:
+        raise InputError(
+            f"{name!r} is not a point group; use C1, Cs, Ci, Cn, Cnv, Cnh, S2n, Dn, Dnh, Dnd (n <= {MAX_FOLD}), "
+            "Cinf, Cinfv, Cinfh, Dinf, Dinfh, T, Td, Th, O, Oh, I, Ih, K or Kh"
+        )
+    return Symbol(family=family, fold=fold)
+
+
+def _axial(text: str) -> tuple[str, float]:
+    """Family and fold of a symbol with a number; the family is "" for nonsense."""
+    match = _PATTERN.fullmatch(text)
+    if not match:
+        return "", 0
+    letter, number, suffix = match.groups()
+    fold = math.inf if number in ("inf", "∞") else int(number)
+    if letter == "s":
+        return _rotoreflection_family(fold, suffix)
+    if suffix == "i":  # Cni is Cn with an inversion: S2n for odd n, and no name of its own for even n
+        return ("S", fold) if letter == "c" and fold % 2 == 1 else ("", fold)
+    return letter.upper() + suffix, fold
+
+
+def _rotoreflection_family(order: float, suffix: str) -> tuple[str, float]:
+    """S_k generates C_kh for odd k, and the group S_2n of k = 2n elements for even k."""
+    if suffix or math.isinf(order):
+        return "", 0
+    return ("Ch", order) if order % 2 else ("S", order // 2)

@@ -1,0 +1,152 @@
+"""Sets of matrices of O(3): axes, angles, quaternions, and the frame that best maps one set to another.
+
+A quaternion is (w, x, y, z) with w >= 0. An improper matrix (determinant -1) is represented by the quaternion of its
+negative: -1 commutes with everything, so it plays no part in any fit.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from symrefine.errors import InputError
+from symrefine.geometry import Array
+
+Index = NDArray[np.intp]
+_FAR_FROM_ORTHOGONAL = 0.3
+_FLAT = 1e-9
+
+
+def nearest_orthogonal(matrices: ArrayLike) -> Array:
+    """The orthogonal matrices [k, 3, 3], each with its own determinant +-1, nearest to `matrices` [k, 3, 3].
+
+    Raises:  InputError: wrong shape, not finite, or not even roughly orthogonal.
+    """
+    given = np.asarray(matrices, dtype=np.float64)
+    if given.ndim != 3 or given.shape[1:] != (3, 3) or not np.isfinite(given).all():
+        raise InputError(f"operations must be finite with shape [k, 3, 3]; the shape here is {list(given.shape)}")
+    u, s, vt = np.linalg.svd(given)
+    worst = float(np.abs(s - 1.0).max(initial=0.0))
+    if worst > _FAR_FROM_ORTHOGONAL:
+        raise InputError(f"operations must be orthogonal; a singular value is off 1 by {worst:.2g}")
+    return np.asarray(u @ vt)
+
+
+def determinants(operations: Array) -> Array:
+    """+1.0 or -1.0 for every orthogonal matrix [k, 3, 3]."""
+    return np.asarray(np.sign(np.linalg.det(operations)))
+
+
+def quaternions(operations: Array) -> Array:
+    """Quaternions [k, 4], w >= 0, of `det(S) S`, accurate at every angle.
+
+    The matrix 4 q q' is linear in the rotation; the row of its largest diagonal entry is never small.
+    """
+    r = operations * determinants(operations)[:, None, None]
+    xx, yy, zz = r[:, 0, 0], r[:, 1, 1], r[:, 2, 2]
+    wx, wy, wz = r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]
+    xy, xz, yz = r[:, 0, 1] + r[:, 1, 0], r[:, 0, 2] + r[:, 2, 0], r[:, 1, 2] + r[:, 2, 1]
+    rows = np.array([
+        [1 + xx + yy + zz, wx, wy, wz],
+        [wx, 1 + xx - yy - zz, xy, xz],
+        [wy, xy, 1 - xx + yy - zz, yz],
+        [wz, xz, yz, 1 - xx - yy + zz],
+    ]).transpose(2, 0, 1)  # fmt: skip
+    best = np.argmax(np.diagonal(rows, axis1=1, axis2=2), axis=1)
+    q = rows[np.arange(len(rows)), best]
+    q = q / np.linalg.norm(q, axis=1, keepdims=True)
+    return np.asarray(q * np.where(q[:, :1] < 0.0, -1.0, 1.0))
+
+
+def axes_and_angles(operations: Array) -> tuple[Array, Array]:
+    """Axis [k, 3] and angle [k] in [0, pi] of the rotations `det(S) S`; the axis is z where the angle vanishes.
+
+    A mirror therefore has its normal as axis and the angle pi; the inversion has the angle 0.
+    """
+    q = quaternions(operations)
+    sine = np.linalg.norm(q[:, 1:], axis=1)
+    still = sine < _FLAT
+    axes = np.where(still[:, None], [0.0, 0.0, 1.0], q[:, 1:] / np.where(still, 1.0, sine)[:, None])
+    return axes, 2.0 * np.arctan2(sine, q[:, 0])
+
+
+def half_turns(directions: Array) -> Array:
+    """Rotations [k, 3, 3], determinant +1, by pi about unit `directions` [k, 3]: each stands for an unsigned line."""
+    return 2.0 * directions[:, :, None] * directions[:, None, :] - np.eye(3)
+
+
+def chord_angles(a: Array, b: Array) -> Array:
+    """Angle [...] of `a' b` for orthogonal matrices [..., 3, 3]; pi where the determinants differ much."""
+    chord = np.linalg.norm(a - b, axis=(-2, -1))
+    return np.asarray(2.0 * np.arcsin(np.minimum(chord / np.sqrt(8.0), 1.0)))
+
+
+def unique_lines(directions: Array) -> tuple[Array, Index]:
+    """Distinct unsigned directions [m, 3] and how often each occurs [m], for directions exact to 1e-9."""
+    key = np.round(directions, 9) + 0.0
+    last = np.where(key[:, 2] != 0.0, key[:, 2], np.where(key[:, 1] != 0.0, key[:, 1], key[:, 0]))
+    sign = np.where(last < 0.0, -1.0, 1.0)[:, None]
+    _, first, counts = np.unique(key * sign + 0.0, axis=0, return_index=True, return_counts=True)
+    return (directions * sign)[first] + 0.0, counts
+
+
+def nearest_operations(operations: Array, group: Array, frame: Array) -> tuple[Index, Array]:
+    """For each operation [k, 3, 3] the nearest `F' G F`, G in `group` [m, 3, 3]: its index [k] and angle away [k]."""
+    turned = frame @ operations @ frame.T
+    index = np.argmax(turned.reshape(len(turned), 9) @ group.reshape(len(group), 9).T, axis=1)
+    return index, chord_angles(turned, group[index])
+
+
+def fit_frame(sources: Array, targets: Array, start: Array) -> Array:
+    """Least-squares frame F, determinant +1, with `F S_i F' = A_i` for corresponding operations [k, 3, 3].
+
+    `F S = A F` reads `q_F q_S = +- q_A q_F` in quaternions: linear in q_F, so the sum of squares (of half the residual
+    angles, in small-angle terms) has its exact minimum at an eigenvector of a 4 x 4 matrix. Where the minimum is not
+    unique (a single axis leaves its phase free), the solution nearest to `start` is taken.
+    """
+    q_start = quaternions(start[None])[0]
+    q_source, q_target = quaternions(sources), quaternions(targets)
+    right, left = _right(q_source), _left(q_target)
+    sign = np.where(np.sum((right @ q_start) * (left @ q_start), axis=1) < 0.0, -1.0, 1.0)
+    overlap = np.einsum("k,kji,kjl->il", sign, right, left)
+    values, vectors = np.linalg.eigh(overlap + overlap.T)
+    top = vectors[:, values > values[-1] - _FLAT * (1.0 + abs(values[-1]))]
+    return rotation_matrix(nearest_in_span(top, q_start))
+
+
+def nearest_in_span(basis: Array, vector: Array) -> Array:
+    """Unit vector [n] nearest to `vector` in the span of orthonormal columns [n, m]; the first if none is nearest."""
+    shadow = basis @ (basis.T @ vector)
+    size = float(np.linalg.norm(shadow))
+    return np.asarray(shadow / size if size > _FLAT else basis[:, 0])
+
+
+def register(operations: Array, group: Array, start: Array) -> tuple[Array, Array]:
+    """Fit a frame to `operations` [k, 3, 3] by alternating nearest elements of `group` [m, 3, 3] and `fit_frame`.
+
+    Returns: the frame [3, 3] and the angle [k] left between each operation and its element.
+    """
+    frame = start
+    index, errors = nearest_operations(operations, group, frame)
+    for _ in range(8):
+        frame = fit_frame(operations, group[index], frame)
+        previous = index
+        index, errors = nearest_operations(operations, group, frame)
+        if np.array_equal(index, previous):
+            break
+    return frame, errors
+
+
+def rotation_matrix(q: Array) -> Array:
+    """Rotation [3, 3], determinant +1, of the unit quaternion `q`."""
+    return np.asarray((_left(q[None])[0] @ _right(q[None] * [1.0, -1.0, -1.0, -1.0])[0])[1:, 1:])
+
+
+def _left(q: Array) -> Array:
+    """Matrices [k, 4, 4] of `p -> q p`."""
+    w, x, y, z = q.T
+    return np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]]).transpose(2, 0, 1)
+
+
+def _right(q: Array) -> Array:
+    """Matrices [k, 4, 4] of `p -> p q`."""
+    w, x, y, z = q.T
+    return np.array([[w, -x, -y, -z], [x, w, z, -y], [y, -z, w, x], [z, y, -x, w]]).transpose(2, 0, 1)

@@ -1,0 +1,222 @@
+"""A point group placed in space: its operations and elements in the coordinates of the object.
+
+`frame` F has determinant +1 and maps object coordinates to the standard placement (`groups.standard`): its rows are the
+standard x, y and z axes written in object coordinates, as in `geometry.frame_with_z`. An operation G of the standard
+group acts on the object as `F' G F`.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from symrefine.errors import InputError
+from symrefine.geometry import Array, read_only, unit
+from symrefine.groups.names import Symbol, parse
+from symrefine.groups.orthogonal import chord_angles, nearest_operations, nearest_orthogonal
+from symrefine.groups.standard import Elements, OrderedAxis, standard_elements, standard_operations
+
+_DEFAULT_TOLERANCE_RAD = 1e-6
+_PROPER = {"C": "C", "Cv": "C", "Ch": "C", "S": "C", "D": "D", "Dh": "D", "Dd": "D"}
+_POINT_SET = {"C": "Cv", "Cv": "Cv", "Ch": "Dh", "D": "Dh", "Dh": "Dh", "K": "Kh", "Kh": "Kh"}
+# One member of each continuous family of mirrors (rows) and of perpendicular two-fold axes.
+_MIRRORS = {"C": "", "Cv": "y", "Ch": "z", "D": "", "Dh": "yz", "K": "", "Kh": "z"}
+_HALF_TURNS = {"D": "x", "Dh": "x"}
+# What a group does to its continuous axis (sign of z) and to the plane across it (determinant there).
+_ENDS = {"C": [(1, 1)], "Cv": [(1, 1), (1, -1)], "Ch": [(1, 1), (-1, 1)], "D": [(1, 1), (-1, -1)]}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PointGroup:
+    """Point group `name` (canonical Schoenflies symbol) placed by the rotation `frame` [3, 3] (rows: its x, y, z)."""
+
+    name: str
+    frame: Array = field(default_factory=lambda: np.eye(3))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", parse(self.name).name)
+        frame = np.asarray(self.frame, dtype=np.float64)
+        if frame.shape != (3, 3) or not np.allclose(frame @ frame.T, np.eye(3), atol=1e-6) or np.linalg.det(frame) < 0:
+            raise InputError(f"the frame of {self.name} must be a rotation matrix [3, 3], determinant +1")
+        object.__setattr__(self, "frame", read_only(nearest_orthogonal(frame[None])[0]))
+
+    @property
+    def symbol(self) -> Symbol:
+        """Family and fold of the name."""
+        return parse(self.name)
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether the group has no axis of infinite order."""
+        return not math.isinf(self.symbol.fold) and self.symbol.family not in ("K", "Kh")
+
+    @property
+    def order(self) -> float:
+        """Number of operations: an int, or `math.inf`."""
+        return len(standard_operations(self.symbol)) if self.is_finite else math.inf
+
+    @property
+    def has_inversion(self) -> bool:
+        """Whether -1 is an operation."""
+        return self._elements().inversion
+
+    @property
+    def is_chiral(self) -> bool:
+        """Whether every operation is a rotation, so that the object differs from its mirror image."""
+        return self.proper_subgroup().name == self.name
+
+    def operations(self) -> Array:
+        """All operations [order, 3, 3], rotations first, the identity leading.
+
+        Raises:  InputError: the group is continuous; `sampled` gives a finite subgroup.
+        """
+        if not self.is_finite:
+            raise InputError(f"{self.name} has infinitely many operations: take those of group.sampled(fold)")
+        return np.asarray(self.frame.T @ standard_operations(self.symbol) @ self.frame)
+
+    def mirrors(self) -> Array:
+        """Unit normals [m, 3] of the mirror planes; a continuous family is represented by one member."""
+        return np.asarray(self._elements().mirrors @ self.frame)
+
+    def rotation_axes(self) -> list[OrderedAxis]:
+        """(direction, highest order) of every rotation axis, by falling order; `math.inf` for a continuous axis.
+
+        The perpendicular two-fold axes of Dinf and Dinfh are represented by one, the axes of K and Kh by x, y, z.
+        """
+        return _turned(self._elements().axes, self.frame)
+
+    def improper_axes(self) -> list[OrderedAxis]:
+        """(direction, k) of every rotoreflection axis S_k, k >= 3 (S1 is a mirror, S2 the inversion).
+
+        On an n-fold axis, k = n if a mirror lies across it (Cnh, Dnh, Oh's S4), else k = 2n (S2n, Dnd, Td, Oh's S6).
+        """
+        return _turned(self._elements().improper, self.frame)
+
+    def continuous_axes(self) -> Array:
+        """Directions [0 | 1 | 3, 3] about which any angle is an operation (x, y, z for K and Kh)."""
+        directions = [u for u, order in self.rotation_axes() if math.isinf(order)]
+        return np.array(directions).reshape(-1, 3)
+
+    def proper_subgroup(self) -> "PointGroup":
+        """The rotations among the operations, in the same frame."""
+        family = self.symbol.family
+        name = Symbol(family=_PROPER.get(family, family[0]), fold=self.symbol.fold).name
+        return PointGroup(name=name, frame=self.frame)
+
+    def for_point_set(self) -> "PointGroup":
+        """The group that a set of points (or a mesh, or a density) has if it has this one.
+
+        A set invariant under all turns about z consists of circles: it has every mirror through z too. So Cinf means
+        Cinfv, Cinfh and Dinf mean Dinfh, K means Kh; finite groups stay as they are.
+        """
+        if self.is_finite:
+            return self
+        name = Symbol(family=_POINT_SET[self.symbol.family], fold=self.symbol.fold).name
+        return PointGroup(name=name, frame=self.frame)
+
+    def sampled(self, fold: int) -> "PointGroup":
+        """A finite subgroup: Cinf.. and Dinf.. with `fold` in place of inf, I and Ih for K and Kh."""
+        family, number = self.symbol.family, self.symbol.fold
+        if family in ("K", "Kh"):
+            return PointGroup(name=family.replace("K", "I"), frame=self.frame)
+        name = Symbol(family=family, fold=fold if math.isinf(number) else number).name
+        return PointGroup(name=name, frame=self.frame)
+
+    def distance_rad(self, operations: ArrayLike) -> Array:
+        """Angle [k] between each orthogonal matrix [k, 3, 3] and the nearest operation of the group."""
+        given = nearest_orthogonal(operations)
+        if self.is_finite:
+            return nearest_operations(given, standard_operations(self.symbol), self.frame)[1]
+        turned = self.frame @ given @ self.frame.T
+        return np.asarray(np.min([chord_angles(turned, near) for near in self._closest_continuous(turned)], axis=0))
+
+    def equivalent(self, directions: ArrayLike) -> Array:
+        """Orbit [j, 3] of one direction [3] or several [m, 3]: all distinct images, merged within 1e-6."""
+        images = np.einsum("kij,mj->mki", self.operations(), np.atleast_2d(unit(directions))).reshape(-1, 3)
+        keep: list[Array] = []
+        for image in images:
+            if not keep or np.min(np.linalg.norm(np.array(keep) - image, axis=1)) > _DEFAULT_TOLERANCE_RAD:
+                keep.append(image)
+        return np.array(keep)
+
+    def _elements(self) -> Elements:
+        return standard_elements(self.symbol) if self.is_finite else _continuous_elements(self.symbol.family)
+
+    def _closest_continuous(self, turned: Array) -> Iterable[Array]:
+        """The nearest operation to each given one, once for every connected part of the continuous group."""
+        family = self.symbol.family
+        if family == "Kh":
+            return [turned]
+        if family == "K":
+            return [_nearest_rotation(turned)]
+        parts = _ENDS.get(family, [(1, 1), (1, -1), (-1, 1), (-1, -1)])
+        return [_nearest_about_z(turned, z_sign, det) for z_sign, det in parts]
+
+
+def point_group(name: str, frame: ArrayLike | None = None) -> PointGroup:
+    """The point group of any Schoenflies symbol or alias, placed by `frame` (default: the standard placement).
+
+    Args:
+        name: `C4v`, `d24h`, `S8`, `Ih`, `Cinfv`, `C∞v`, ...; an alias (`C1h`) is read as the canonical group (`Cs`).
+        frame: rotation [3, 3]; rows are the x, y and z axes of the group: `frame_with_z(axis)` puts it on an axis.
+    Raises:
+        InputError: no such group, or the frame is no rotation.
+    """
+    return PointGroup(name=name, frame=np.eye(3) if frame is None else np.asarray(frame, dtype=np.float64))
+
+
+def fixed_subspace(group: PointGroup) -> Array:
+    """Orthonormal basis [d, 3] of the vectors every operation leaves alone; d is the rank of the n-tuple matrix.
+
+    C1 has d = 3, Cs has 2 (its plane), Cn and Cnv with n >= 2 have 1 (the axis), all others 0.
+    """
+    family, fold = group.symbol.family, group.symbol.fold
+    if fold == 1 and family in ("C", "Ch"):
+        return group.frame.copy() if family == "C" else group.frame[:2].copy()
+    return group.frame[2:].copy() if family in ("C", "Cv") else np.zeros((0, 3))
+
+
+def is_subgroup(a: PointGroup, b: PointGroup, tolerance_rad: float = _DEFAULT_TOLERANCE_RAD) -> bool:
+    """Whether every operation of `a` is, within `tolerance_rad`, an operation of `b`, both where they stand."""
+    if b.is_finite and not a.is_finite:
+        return False
+    return bool(b.distance_rad(a.sampled(7).operations()).max() <= tolerance_rad)
+
+
+def _nearest_rotation(operations: Array) -> Array:
+    """A rotation nearest to each operation [k, 3, 3]: itself, or one of many where its determinant is -1."""
+    u, _, vt = np.linalg.svd(operations)
+    u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
+    return np.asarray(u @ vt)
+
+
+def _turned(axes: Iterable[OrderedAxis], frame: Array) -> list[OrderedAxis]:
+    return [(u @ frame, order) for u, order in axes]
+
+
+def _nearest_about_z(turned: Array, z_sign: int, det: int) -> Array:
+    """Nearest matrices to `turned` [k, 3, 3] that map z to `z_sign` z and act on xy with determinant `det`."""
+    (a, b), (c, d) = turned[:, 0, :2].T, turned[:, 1, :2].T
+    angle = np.arctan2(c - det * b, a + det * d)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    nearest = np.zeros_like(turned)
+    nearest[:, 0, 0], nearest[:, 0, 1] = cosine, -det * sine
+    nearest[:, 1, 0], nearest[:, 1, 1] = sine, det * cosine
+    nearest[:, 2, 2] = z_sign
+    return nearest
+
+
+def _continuous_elements(family: str) -> Elements:
+    """Elements of a continuous group in the standard placement, one member standing for each continuous family."""
+    rows = dict(zip("xyz", np.eye(3), strict=True))
+    main = "xyz" if family in ("K", "Kh") else "z"
+    two_fold = [(rows[k], 2) for k in _HALF_TURNS.get(family, "")]
+    improper = main if family in ("Ch", "Dh", "Kh") else ""
+    return Elements(
+        mirrors=np.array([rows[k] for k in _MIRRORS[family]]).reshape(-1, 3),
+        axes=(*((rows[k], math.inf) for k in main), *two_fold),
+        improper=tuple((rows[k], math.inf) for k in improper),
+        inversion=bool(improper),
+    )

@@ -1,0 +1,111 @@
+"""The finite point groups in their standard placement: all operations, and the elements a chemist lists.
+
+The main axis is z. Vertical mirrors of Cnv and Dnh include the xz plane (normal y); two-fold axes of Dn, Dnh and Dnd
+include x. T, Td, Th, O, Oh have the cube axes along x, y, z; I and Ih have three two-fold axes there and five-fold axes
+along (0, 1, golden ratio) and its cyclic permutations.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symrefine.geometry import Array, householder, read_only, rotation, rotoreflection
+from symrefine.groups.names import Symbol
+from symrefine.groups.orthogonal import Index, axes_and_angles, determinants, unique_lines
+
+OrderedAxis = tuple[Array, float]
+GOLDEN = (1.0 + np.sqrt(5.0)) / 2.0
+_X, _Y, _Z = np.eye(3)
+_SMALL = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Elements:
+    """Symmetry elements of one group: unit normals [m, 3], (direction, order) pairs, and whether -1 belongs to it."""
+
+    mirrors: Array
+    axes: tuple[OrderedAxis, ...]
+    improper: tuple[OrderedAxis, ...]
+    inversion: bool
+
+
+@lru_cache(maxsize=512)
+def standard_operations(symbol: Symbol) -> Array:
+    """All matrices [order, 3, 3] of a finite group, read-only, proper ones (determinant +1) first."""
+    operations = _polyhedral(symbol.family) if symbol.fold == 0 else _axial(symbol.family, int(symbol.fold))
+    operations = np.where(np.abs(operations) < 1e-15, 0.0, operations)
+    return read_only(operations[np.argsort(-determinants(operations), kind="stable")])
+
+
+def _axial(family: str, fold: int) -> Array:
+    """Cosets of the rotations about z: one representative each."""
+    rotations = [rotation(_Z, 2.0 * np.pi * k / fold) for k in range(fold)]
+    flip, alternate = rotation(_X, np.pi), rotoreflection(_Z, np.pi / fold)
+    one, across, through = np.eye(3), householder(_Z), householder(_Y)
+    cosets = {
+        "C": [one],
+        "Cv": [one, through],
+        "Ch": [one, across],
+        "S": [one, alternate],
+        "D": [one, flip],
+        "Dh": [one, flip, across, through],
+        "Dd": [one, flip, alternate, alternate @ flip],
+    }[family]
+    return _products(rotations, cosets)
+
+
+def _polyhedral(family: str) -> Array:
+    """Signed permutation matrices for the cube groups; I is T times the five rotations about one five-fold axis."""
+    signed = np.array(
+        [np.diag(s) @ np.eye(3)[list(p)] for p in permutations(range(3)) for s in product((1, -1), repeat=3)]
+    )
+    det, sign = determinants(signed), signed.sum(axis=2).prod(axis=1)
+    even = det == sign  # the permutation part alone is a rotation
+    keep = {"T": even & (det > 0), "Th": even, "Td": sign > 0, "O": det > 0, "Oh": det != 0}
+    if family in keep:
+        return np.asarray(signed[keep[family]])
+    fifths = [rotation([0.0, 1.0, GOLDEN], 2.0 * np.pi * k / 5) for k in range(5)]
+    rotations = _products(signed[keep["T"]], fifths)
+    return rotations if family == "I" else np.concatenate([rotations, -rotations])
+
+
+def _products(first: Array | Sequence[Array], second: Sequence[Array]) -> Array:
+    return np.asarray(np.asarray(second)[:, None] @ np.asarray(first)[None]).reshape(-1, 3, 3)
+
+
+@lru_cache(maxsize=512)
+def standard_elements(symbol: Symbol) -> Elements:
+    """Mirrors, rotation axes and improper axes of a finite group.
+
+    An axis carries its highest order. An improper axis is listed as S_k with k = n if a mirror lies across the n-fold
+    axis (as in Cnh, Dnh) and k = 2n otherwise (as in S2n, Dnd, Td), and only for k >= 3: S1 is a mirror and S2 the
+    inversion.
+    """
+    operations = standard_operations(symbol)
+    det = determinants(operations)
+    axes, angles = axes_and_angles(operations)
+    turns = angles > _SMALL
+    lines, counts = unique_lines(axes[turns & (det > 0)])
+    mirrors, _ = unique_lines(axes[(det < 0) & (angles > np.pi - _SMALL)])
+    improper, _ = unique_lines(axes[turns & (det < 0)])
+    folds = 1 + _same_line(improper, lines) @ counts
+    orders = np.where(_same_line(improper, mirrors).any(axis=1), folds, 2 * folds)
+    return Elements(
+        mirrors=read_only(mirrors),
+        axes=_by_order(lines, counts + 1),
+        improper=_by_order(improper[orders >= 3], orders[orders >= 3]),
+        inversion=bool(np.any((det < 0) & ~turns)),
+    )
+
+
+def _same_line(a: Array, b: Array) -> NDArray[np.bool_]:
+    """Whether direction a_i and direction b_j span the same line."""
+    return np.asarray(np.abs(a @ b.T) > 1.0 - 1e-9)
+
+
+def _by_order(directions: Array, orders: Index) -> tuple[OrderedAxis, ...]:
+    return tuple((read_only(directions[i]), int(orders[i])) for i in np.argsort(-orders, kind="stable"))
