@@ -103,3 +103,63 @@ def line_angle_rad(a: ArrayLike, b: ArrayLike) -> float:
     u, v = unit(a), unit(b)
     s = np.linalg.norm(u - np.dot(u, v) * v)
     return float(np.arctan2(s, abs(np.dot(u, v))))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Isometry:
+    """Map x -> matrix x + shift with an orthogonal matrix of determinant +1 or -1."""
+
+    matrix: Array
+    shift: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "matrix", read_only(self.matrix))
+        object.__setattr__(self, "shift", read_only(self.shift))
+
+    @classmethod
+    def about(cls, center: ArrayLike, matrix: ArrayLike) -> "Isometry":
+        """The map that applies `matrix` while `center` stays where it is."""
+        c, m = np.asarray(center, dtype=np.float64), np.asarray(matrix, dtype=np.float64)
+        return cls(matrix=m, shift=c - m @ c)
+
+    @classmethod
+    def reflection(cls, plane: Plane) -> "Isometry":
+        """The reflection across `plane`."""
+        return cls(matrix=householder(plane.normal), shift=2.0 * plane.offset * plane.normal)
+
+    def apply(self, points: Array) -> Array:
+        """Images [N, n] of points [N, n]."""
+        return points @ self.matrix.T + self.shift
+
+    def turn(self, vectors: Array) -> Array:
+        """Images [N, n] of directions [N, n]."""
+        return vectors @ self.matrix.T
+
+
+def tight_diagonal(points: Array) -> float:
+    """Diagonal of the smallest box around points [N, 3] over all orientations, to about one percent.
+
+    Unlike the axis-aligned box of the input it does not change when the object is turned. The search starts from the
+    principal axes and a fixed set of rotations, then shrinks.
+    """
+    rng = np.random.default_rng(0)
+    centred = points - points.mean(axis=0)
+    _, principal = np.linalg.eigh(centred.T @ centred)
+    probes = unit(rng.standard_normal((300, 3)))
+    reach = centred @ probes.T
+    hull = centred[np.unique(np.concatenate([reach.argmax(axis=0), reach.argmin(axis=0)]))]
+    frames = np.stack([np.eye(3), *(random_orthogonal(rng) for _ in range(200))]) @ principal.T
+    best, frame = _smallest_box(hull, frames)
+    for width in (0.3, 0.1, 0.03, 0.01):
+        turns = np.stack([rotation(w, float(np.linalg.norm(w))) for w in width * rng.standard_normal((60, 3))])
+        trial, turned = _smallest_box(hull, turns @ frame)
+        if trial < best:
+            best, frame = trial, turned
+    return best
+
+
+def _smallest_box(points: Array, frames: Array) -> tuple[float, Array]:
+    extent = np.ptp(np.einsum("fij,nj->fni", frames, points), axis=1)
+    diagonals = np.linalg.norm(extent, axis=1)
+    best = int(diagonals.argmin())
+    return float(diagonals[best]), frames[best]

@@ -223,3 +223,16 @@ def recentred(values: Array, dim: int, order: int) -> Array:
     rows, kept, shifts, coefficients = _binomials(dim, order)
     powers = monomials(values[None, 1 : dim + 1], order)[:, 0]
     return np.bincount(rows, coefficients * values[kept] * powers[shifts], minlength=len(values))
+
+
+def transformed(moments: Moments, matrix: Array) -> Moments:
+    """Moments of the points after x -> matrix x about the centre, in the same units; replicates are left behind."""
+    values = np.empty_like(moments.values)
+    for degree in range(moments.order + 1):
+        tensor = moments.tensor(degree)
+        for _ in range(degree):
+            # Contract the leading index and append the new one: after `degree` rounds every index has had its turn.
+            tensor = np.tensordot(tensor, matrix, axes=([0], [1]))
+        index = tensor_index(moments.dim, degree, moments.order)
+        values[index.ravel()] = tensor.ravel()
+    return replace(moments, values=values, replicates=np.empty((0, values.size)))

@@ -1,0 +1,174 @@
+"""Local planes of a cloud, and which of them a mirrored point meets."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from symrefine.geometry import Array, Isometry, read_only
+from symrefine.shape import Index
+
+# Neighbourhood sizes tried, smallest first: large enough that noise does not decide the normal, no larger.
+NEIGHBOURS = (12, 24, 48, 96, 192)
+# Neighbourhoods wider than this (RMS radii) blur the shape itself, whatever the noise.
+WIDEST = 0.2
+# Thickness over width below which a neighbourhood counts as a plane.
+FLAT = 0.3
+# Flatness at which a local plane counts for little in a residual.
+WORTH = 1.0
+# Robust scale over the median absolute residual (three standard deviations), and its bound from below in spacings.
+ROBUST = 4.4
+SCALE_FLOOR = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LocalPlanes:
+    """Points projected on the planes fitted to their neighbours.
+
+    Attributes:
+        points: [M, 3] projected points.
+        normals: [M, 3] unit normals, any sign.
+        thickness: [M] standard deviation of the neighbours across the plane.
+        flatness: [M] thickness over the smaller width: 0 for a plane, 1 for a blob.
+        reach: [M] radius of the disc each local plane stands for: the distance to its fifth neighbour among these M.
+        spacing: median distance from a point to the nearest other one of these M.
+        redundancy: how many of the local planes each point of the cloud takes part in; >= 1.
+        tree: kd-tree over `points`.
+    """
+
+    points: Array
+    normals: Array
+    thickness: Array
+    flatness: Array
+    reach: Array
+    spacing: float
+    redundancy: float
+    tree: Any
+
+    def __post_init__(self) -> None:
+        for name in ("points", "normals", "thickness", "flatness", "reach"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+def smallest_eigenvectors(covariance: Array) -> tuple[Array, Array]:
+    """Eigenvalues [N, 3] ascending, and the eigenvector [N, 3] of the smallest, of symmetric matrices [N, 3, 3]."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.clip(values, 0.0, None), vectors[:, :, 0]
+
+
+def _fit(points: Array, neighbours: Index) -> tuple[Array, Array, Array]:
+    near = points[neighbours]
+    mean = near.mean(axis=1)
+    spread = near - mean[:, None]
+    values, normals = smallest_eigenvectors(np.einsum("nki,nkj->nij", spread, spread) / near.shape[1])
+    return mean, normals, values
+
+
+def choose_neighbours(points: Array, tree: Any, rng: np.random.Generator, *, probes: int = 200) -> int:
+    """Smallest neighbourhood that looks like a plane, or the one that looks most like it: noise decides, no parameter.
+
+    Flatness is compared with what a blob without any structure shows in a sample of the same size.
+    """
+    pick = rng.choice(len(points), min(probes, len(points)), replace=False)
+    distance, near = tree.query(points[pick], k=min(NEIGHBOURS[-1], len(points) // 8 + 4))
+    widths = np.median(distance, axis=0)
+    sizes = [k for k in NEIGHBOURS if k <= near.shape[1] and widths[k - 1] < WIDEST] or [min(NEIGHBOURS[0], near.shape[1])]
+    ratios = []
+    for k in sizes:
+        _, _, values = _fit(points, near[:, :k])
+        ratios.append(float(np.median(_flatness(values))) / _blob_flatness(k))
+        if ratios[-1] < FLAT:
+            return k
+    return next(k for k, ratio in zip(sizes, ratios, strict=True) if ratio <= 1.02 * min(ratios))
+
+
+def _flatness(values: Array) -> Array:
+    return np.sqrt(values[:, 0] / np.maximum(values[:, 1], 1e-300))
+
+
+@lru_cache(maxsize=32)
+def _blob_flatness(k: int) -> float:
+    """Median flatness of k points of an isotropic Gaussian."""
+    blob = np.random.default_rng(0).standard_normal((200, k, 3))
+    values, _ = smallest_eigenvectors(np.einsum("nki,nkj->nij", blob, blob) / k)
+    return float(np.median(_flatness(values)))
+
+
+def local_planes(
+    points: Array, count: int, rng: np.random.Generator, *, normals: Array | None = None, tree: Any = None
+) -> LocalPlanes:
+    """Local planes at `count` of the points [N, 3], from neighbourhoods among all of them.
+
+    Where exact `normals` are given (samples of a mesh), points and normals are taken as they are.
+    """
+    from scipy.spatial import cKDTree
+
+    pick = np.sort(rng.choice(len(points), min(count, len(points)), replace=False))
+    if normals is not None:
+        chosen, n, redundancy = points[pick], normals[pick], 1.0
+        thickness = flatness = np.zeros(len(pick))
+    else:
+        tree = cKDTree(points, balanced_tree=False, compact_nodes=False) if tree is None else tree
+        k = choose_neighbours(points, tree, rng)
+        redundancy = max(1.0, k * len(pick) / len(points))
+        _, near = tree.query(points[pick], k=k)
+        mean, n, values = _fit(points, near)
+        chosen = points[pick] - n * np.einsum("ij,ij->i", n, points[pick] - mean)[:, None]
+        thickness = np.sqrt(values[:, 0])
+        flatness = _flatness(values)
+    own = cKDTree(chosen)
+    distance, _ = own.query(chosen, k=min(6, len(chosen)))
+    return LocalPlanes(
+        points=chosen,
+        normals=n,
+        thickness=thickness,
+        flatness=flatness,
+        reach=distance[:, -1],
+        spacing=float(np.median(distance[:, 1])),
+        redundancy=redundancy,
+        tree=own,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Pairs:
+    """Correspondences under one operation: indices of sources and targets among the local planes, and their weights."""
+
+    sources: Index
+    targets: Index
+    weights: Array
+
+
+def match(cloud: LocalPlanes, motion: Isometry, uncertainty: float, *, stride: int = 1) -> Pairs:
+    """Pair every `stride`-th local plane, moved, with the nearest one; weight by how much the pair is worth.
+
+    Pairs are dropped when the moved normal disagrees by more than 45 degrees, when the point hardly moves, so that it
+    would meet itself, or when they are farther apart than a few spacings and what the present uncertainty can move a
+    point by. Weights: flatness times Geman-McClure, whose scale starts at the uncertainty (early on the informative
+    pairs are those that disagree: handles, spouts, legs) and falls to a robust scale of the residuals, bounded from
+    below: with exact data it would collapse (method.md, section 4).
+
+    Args:
+        uncertainty: how far the motion may still move a point, RMS radii.
+    """
+    source = np.arange(0, len(cloud.points), stride)
+    moved = motion.apply(cloud.points[source])
+    distance, target = cloud.tree.query(moved, distance_upper_bound=3.0 * (cloud.spacing + uncertainty))
+    travel = np.linalg.norm(moved - cloud.points[source], axis=1)
+    keep = np.isfinite(distance) & (travel > cloud.spacing)
+    source, target, moved = source[keep], target[keep], moved[keep]
+    turned = motion.turn(cloud.normals[source])
+    agree = np.abs(np.einsum("ij,ij->i", turned, cloud.normals[target])) > np.sqrt(0.5)
+    source, target, moved = source[agree], target[agree], moved[agree]
+    error = np.einsum("ij,ij->i", moved - cloud.points[target], cloud.normals[target])
+    floor = max(SCALE_FLOOR * cloud.spacing, uncertainty)
+    return Pairs(sources=source, targets=target, weights=_pair_weights(cloud, source, target, error, floor))
+
+
+def _pair_weights(cloud: LocalPlanes, source: Index, target: Index, error: Array, floor: float) -> Array:
+    if error.size == 0:
+        return np.empty(0)
+    flat = np.exp(-((cloud.flatness[source] / WORTH) ** 2) - (cloud.flatness[target] / WORTH) ** 2)
+    scale2 = max(ROBUST * float(np.median(np.abs(error))), floor) ** 2
+    return flat * (scale2 / (scale2 + error**2)) ** 2
