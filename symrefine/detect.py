@@ -1,0 +1,244 @@
+"""Detection, the story on one page: shape -> moments -> n-tuples and spectrum -> candidates -> refine -> judge -> group."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from symrefine.assemble import Assembly, Element, assemble
+from symrefine.axis import TupleClass, classify
+from symrefine.errors import InputError
+from symrefine.geometry import Array, Axis, Plane, read_only, tight_diagonal
+from symrefine.groups import PointGroup
+from symrefine.harmonics import harmonic_moments
+from symrefine.matching import local_planes
+from symrefine.moments import Moments, shape_moments
+from symrefine.ntuples.contract import NTuples, ntuples
+from symrefine.quadrature import sample_surface
+from symrefine.refine import Iterate
+from symrefine.search import Evidence
+from symrefine.shape import Shape
+from symrefine.verify import TOLERANCE, Deviation, confidence, make_judge
+
+ORDER = 8
+PARTS = 16
+SAMPLES = 20000
+LOCAL_PLANES = 4000
+FEWEST = 300
+"""Points below which local planes say too little for a decision."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FoundPlane:
+    """A mirror plane in input units: its miss as fractions of the bounding-box diagonal, and how sure it is."""
+
+    plane: Plane
+    residual: Deviation
+    confidence: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FoundAxis:
+    """A rotation axis (or rotoreflection, if `improper`) in input units; `order` is `math.inf` for revolution."""
+
+    axis: Axis
+    order: float
+    improper: bool
+    residual: Deviation
+    confidence: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NearMiss:
+    """A candidate that was refined and turned down, with what it misses by, for a person to judge."""
+
+    kind: str
+    direction: Array
+    point: Array
+    order: float
+    residual: Deviation
+    excess: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Detection:
+    """Everything `detect` found, in the frame and units of the input.
+
+    Attributes:
+        point_group: Schoenflies symbol; "C1" when there is nothing.
+        group: the same placed in space.
+        center: [3] the point all operations leave in place.
+        planes: discrete mirror planes, best first.
+        axes: rotation and rotoreflection axes, highest order first.
+        inversion: whether the inversion about the centre is a symmetry.
+        near_misses: candidates turned down, best first.
+        iterations: outer iterations of the refinement of all planes together.
+        tolerance: the tolerance the decisions were made at, as a fraction of `diagonal`.
+        diagonal: diagonal of the smallest bounding box over all orientations, input units.
+        undetermined: why the data support no decision; empty when they do.
+        tuples: class of the n-tuples, with singular values.
+        vectors: the n-tuples themselves, dimensionless.
+        history: the iterates of that refinement, in normalised units; `scale` and `origin` undo the normalisation.
+        points: [M, 3] the points the refinement used, normalised units.
+        timings: seconds by stage; everything else is a function of the input and the options alone.
+    """
+
+    point_group: str
+    group: PointGroup
+    center: Array
+    planes: tuple[FoundPlane, ...]
+    axes: tuple[FoundAxis, ...]
+    inversion: bool
+    near_misses: tuple[NearMiss, ...]
+    iterations: int
+    tolerance: float
+    diagonal: float
+    undetermined: str
+    tuples: TupleClass
+    vectors: NTuples
+    history: tuple[Iterate, ...]
+    points: Array
+    origin: Array
+    scale: float
+    timings: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("center", "points", "origin"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+def detect(
+    shape: Shape | ArrayLike,
+    *,
+    weights: ArrayLike | None = None,
+    normals: ArrayLike | None = None,
+    tolerance: float = TOLERANCE,
+    seed: int = 0,
+) -> Detection:
+    """Point group, mirror planes and rotation axes of an object in 3-space, with what it misses each of them by.
+
+    Args:
+        shape: a `Shape`, or points [N, 3].
+        weights: [N] masses of the points; not with a `Shape`, which carries its own.
+        normals: [N, 3] normals, any sign; estimated where absent. Not with a `Shape`.
+        tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal: 95 % of the
+            surface must come within it, 99 % within 1.4 of it, and the mean within 0.28 (see `verify`).
+        seed: of the random choices (samples of a mesh, subsets of a cloud).
+
+    Raises:
+        InputError: not a 3-D shape, or a tolerance outside (0, 0.2].
+        DegenerateShapeError: the points do not spread.
+    """
+    if not isinstance(shape, Shape):
+        shape = Shape(points=shape, weights=weights, normals=normals)
+    elif weights is not None or normals is not None:
+        raise InputError("weights and normals belong to the Shape; give them there, or give an array of points")
+    if shape.dim != 3:
+        raise InputError(f"{shape.source}: detect takes 3-D shapes; these points have {shape.dim} coordinates")
+    if not 0.0 < tolerance <= 0.2:
+        raise InputError(f"tolerance is {tolerance}; expected a fraction of the diagonal in (0, 0.2]")
+    clock = Clock()
+    with clock("moments"):
+        moments = shape_moments(shape, ORDER, parts=0 if shape.faces is not None else PARTS)
+        vectors = ntuples(moments)
+    with clock("local_planes"):
+        evidence = gather(shape, moments, vectors, tolerance, np.random.default_rng(seed))
+    with clock("search"):
+        found = assemble(evidence)
+    return _report(found, evidence, vectors, tolerance, clock.seconds)
+
+
+class Clock:
+    """Wall-clock seconds by stage."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        """Time one stage."""
+        start = time.perf_counter()
+        yield
+        self.seconds[stage] = time.perf_counter() - start
+
+
+def gather(
+    shape: Shape, moments: Moments, vectors: NTuples, tolerance: float, rng: np.random.Generator
+) -> Evidence:
+    """Moments, n-tuples and a judged cloud of local planes, in normalised units."""
+    if shape.faces is not None:
+        points, normals, _ = sample_surface(shape, SAMPLES, rng)
+        weights = np.full(len(points), 1.0 / len(points))
+    else:
+        points, normals = shape.points, shape.normals
+        weights = np.ones(len(points)) if shape.weights is None else shape.weights
+    local = (points - moments.center) / moments.scale
+    cloud = local_planes(local, LOCAL_PLANES, rng, normals=normals)
+    return Evidence(
+        moments=moments,
+        harmonics=harmonic_moments(moments),
+        tuples=classify(vectors),
+        points=local,
+        weights=weights / weights.sum(),
+        judge=make_judge(cloud, tight_diagonal(local), tolerance),
+    )
+
+
+def _report(
+    found: Assembly, evidence: Evidence, vectors: NTuples, tolerance: float, timings: dict[str, float]
+) -> Detection:
+    origin, scale = evidence.moments.center, evidence.moments.scale
+    planes = [e for e in found.elements if e.kind == "plane"]
+    axes = [e for e in found.elements if e.kind != "plane"]
+    return Detection(
+        point_group=found.group.name,
+        group=found.group,
+        center=origin + scale * found.center,
+        planes=tuple(
+            FoundPlane(
+                plane=_plane(e, origin, scale), residual=e.deviation, confidence=confidence(e.excess)
+            )
+            for e in sorted(planes, key=lambda e: e.excess)
+        ),
+        axes=tuple(
+            FoundAxis(
+                axis=Axis(point=origin + scale * e.point, direction=e.direction),
+                order=e.order,
+                improper=e.kind == "improper",
+                residual=e.deviation,
+                confidence=confidence(e.excess),
+            )
+            for e in axes
+        ),
+        inversion=found.group.has_inversion,
+        near_misses=tuple(
+            NearMiss(
+                kind=e.kind,
+                direction=e.direction,
+                point=origin + scale * e.point,
+                order=e.order,
+                residual=e.deviation,
+                excess=e.excess,
+            )
+            for e in found.rejected[:8]
+        ),
+        iterations=max(0, len(found.history) - 1),
+        tolerance=tolerance,
+        diagonal=evidence.judge.diagonal * scale,
+        undetermined="",
+        tuples=evidence.tuples,
+        vectors=vectors,
+        history=found.history,
+        points=evidence.judge.cloud.points,
+        origin=origin,
+        scale=scale,
+        timings=timings,
+    )
+
+
+def _plane(element: Element, origin: Array, scale: float) -> Plane:
+    point = origin + scale * element.point
+    return Plane(normal=element.direction, offset=float(element.direction @ point))
