@@ -5,12 +5,13 @@ no symmetry but the identity, two a mirror, one an axis; only where all vanish i
 """
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
 from symrefine.errors import DegenerateShapeError
-from symrefine.geometry import Array, Isometry, Plane, frame_with_z, householder, rotation, rotoreflection
+from symrefine.geometry import Array, Isometry, frame_with_z, householder, rotation, rotoreflection
 from symrefine.groups import PointGroup, from_elements
 from symrefine.refine import Framed, Iterate
 from symrefine.search import (
@@ -25,7 +26,7 @@ from symrefine.search import (
     refined,
     turns_about,
 )
-from symrefine.verify import Deviation
+from symrefine.verify import Verdict
 
 # Beside an element that holds exactly, one that misses this many times more, and by this share of the limit, is not
 # the same kind of truth: a wheel maps onto itself nearly as well between its spokes.
@@ -33,7 +34,20 @@ RIVAL = 4.0
 EXACT = 0.35
 # Directions of elements are known to this before the joint refinement.
 DIRECTION_ERROR_RAD = math.radians(1.5)
-MAX_OPERATIONS = 24
+# Angles that stand for a continuous axis.
+FREE_TURNS = (0.517, 1.234, 2.6833)
+KNOWN_RAD = math.radians(4.0)
+# Directions closer than this are the same start for an axis, which is then polished.
+APART_RAD = math.radians(1.0)
+MAX_OPERATIONS = 9
+# An object is called round only if it misses by less than this share of the limits; a nut with its eight sides is not.
+ROUND_LIMIT = 0.5
+# How many candidates are looked at for the list of near misses once the group is known.
+NEAR = 5
+NOTHING = np.zeros((0, 3))
+# Distances evaluated in all for the final judgement of a group's elements, and at least for each.
+JUDGED = 24000
+JUDGED_EACH = 1200
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,8 +58,7 @@ class Element:
     direction: Array
     point: Array
     order: float
-    deviation: Deviation
-    excess: float
+    verdict: Verdict
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -62,101 +75,167 @@ class Assembly:
 def assemble(evidence: Evidence) -> Assembly:
     """The largest group that holds, from the axis of the n-tuples where they have one, from the spectrum elsewhere."""
     bundle = _best_bundle(evidence)
-    if bundle is not None and math.isinf(bundle.fold):
+    if bundle is None:
+        return _from_parts(evidence)
+    if math.isinf(bundle.fold):
         return _round(evidence, bundle)
-    if bundle is not None and evidence.tuples.kind != "vanish":
-        group = PointGroup(name=f"C{int(bundle.fold)}v", frame=bundle.state.frame)
-        near = _near(evidence, group, mirrors(evidence, np.zeros((0, 3)), count=5))
-        return _finish(evidence, group, bundle.state.center, bundle.history, near)
-    seeds = np.zeros((0, 3)) if bundle is None else np.stack([p.normal for p in bundle.state.planes])
-    return _from_parts(evidence, np.concatenate([seeds, evidence.tuples.directions[2:]]))
+    group = PointGroup(name=f"C{int(bundle.fold)}v", frame=bundle.state.frame)
+    near = [_mirror_element(m) for m in mirrors(evidence, NOTHING, count=NEAR, known=_mirror_of(group))]
+    return _finish(evidence, group, bundle.state.center, bundle.history, near)
 
 
-def _limit(excesses: list[float]) -> float:
-    """Excess up to which candidates are taken for true, given the best of them."""
-    return min(1.0, max(EXACT, RIVAL * min(excesses, default=1.0)))
+def _limit(verdicts: Iterable[Verdict]) -> float:
+    """Bulk miss up to which candidates are taken for true, given the best of them."""
+    return min(1.0, max(EXACT, RIVAL * min((v.bulk for v in verdicts), default=1.0)))
+
+
+def _holds(verdict: Verdict, limit: float) -> bool:
+    return verdict.excess <= 1.0 and verdict.bulk <= limit
 
 
 def _axis_open(evidence: Evidence) -> Array:
-    """Directions that the n-tuples leave open for an axis of revolution or a bundle of mirrors."""
+    """Directions that the n-tuples leave open for an axis: anywhere the spectrum says, near one line, or none."""
     tuples = evidence.tuples
     if tuples.kind == "vanish":
-        return np.linalg.eigh(evidence.moments.covariance)[1].T
-    lone = tuples.kind == "axis" or tuples.significance[1] < 0.2 * tuples.significance[0]
-    return tuples.directions[:1] if lone else np.zeros((0, 3))
+        return axis_directions(evidence)
+    if tuples.kind != "axis" and tuples.significance[1] > 0.2 * tuples.significance[0]:
+        return NOTHING
+    along = tuples.directions[0]
+    cone = math.radians(15.0) + 2.0 / tuples.significance[0]
+    return np.stack([along, *(d for d in axis_directions(evidence) if abs(d @ along) > math.cos(min(cone, 1.0)))])
 
 
 def _best_bundle(evidence: Evidence) -> Bundle | None:
+    """Revolution about any open direction, or all the mirrors through the axis of the n-tuples."""
+    vanish = evidence.tuples.kind == "vanish"
+    directions = np.linalg.eigh(evidence.moments.covariance)[1].T if vanish else _axis_open(evidence)
     found: list[Bundle] = []
-    for direction in _axis_open(evidence):
-        found += [b for b in axis_bundle(evidence, direction) if b.excess <= 1.0]
-    if not found:
-        return None
-    limit = _limit([b.excess for b in found])
-    return max((b for b in found if b.excess <= limit), key=lambda b: b.fold)
+    for direction in _apart(directions, APART_RAD):
+        for bundle in axis_bundle(evidence, direction, mirrored=not vanish):
+            if bundle.verdict.excess <= (ROUND_LIMIT if math.isinf(bundle.fold) else 1.0):
+                found.append(bundle)
+        if any(b.verdict.bulk <= EXACT for b in found):
+            break
+    limit = _limit(b.verdict for b in found)
+    return max((b for b in found if _holds(b.verdict, min(limit, EXACT))), key=lambda b: b.fold, default=None)
 
 
 def _round(evidence: Evidence, bundle: Bundle) -> Assembly:
     """Cinfv, or with a mirror across the axis Dinfh, or the sphere."""
     axis, center = bundle.state.frame[2], bundle.state.center
+    name = "Cinfv"
     if evidence.tuples.kind == "vanish":
         tilted = Framed(standard=rotation([1, 0, 0], 1.0)[None], frame=bundle.state.frame, center=center)
-        sphere = evidence.judge.excess(evidence.judge.deviation(tilted.motions))
         across = refined(evidence, _plane_state(axis, center), sources=3000, outer=6)[-1].state
-        mirror = evidence.judge.excess(evidence.judge.deviation(across.motions))
-        if sphere <= max(EXACT, bundle.excess):
-            return _finish(evidence, PointGroup(name="Kh"), center, bundle.history, [])
-        if mirror <= _limit([bundle.excess, mirror]):
-            middle = center + axis * float(axis @ (across.center - center))
-            return _finish(evidence, PointGroup(name="Dinfh", frame=bundle.state.frame), middle, bundle.history, [])
-    return _finish(evidence, PointGroup(name="Cinfv", frame=bundle.state.frame), center, bundle.history, [])
+        mirror = evidence.judge(across.motions)
+        if evidence.judge(tilted.motions).excess <= max(EXACT, bundle.verdict.excess):
+            name = "Kh"
+        elif _holds(mirror, _limit([bundle.verdict, mirror])):
+            name, center = "Dinfh", center + axis * float(axis @ (across.center - center))
+    return _finish(evidence, PointGroup(name=name, frame=bundle.state.frame), center, bundle.history, [])
 
 
 def _plane_state(normal: Array, point: Array) -> Framed:
     return Framed(standard=np.diag([1.0, 1.0, -1.0])[None], frame=frame_with_z(normal), center=point)
 
 
-def _from_parts(evidence: Evidence, seeds: Array) -> Assembly:
-    planes = mirrors(evidence, seeds)
-    limit = _limit([m.excess for m in planes])
-    held = [m for m in planes if m.excess <= limit]
-    near = [_mirror_element(m) for m in planes if m.excess > limit]
-    turns = _turns(evidence, held, limit)
-    group, held, turns = _closed(held, turns)
+def _from_parts(evidence: Evidence) -> Assembly:
+    """Mirrors one by one, skipping those that the group so far implies; then axes; then inversion and the improper."""
+    held, near, group = _mirror_group(evidence)
+    turns = _turns(evidence, held, group)
+    while True:
+        group, held, turns = _closed(held, turns)
+        done = _group_of(evidence, group, held, turns, near)
+        if all(e.verdict.excess <= 1.0 for e in done.elements) or not held and not turns:
+            return done
+        near.extend(_mirror_element(m) for m in _without_worst(held, turns))
+
+
+def _group_of(
+    evidence: Evidence, group: PointGroup, held: list[Mirror], turns: list[Turn], near: list[Element]
+) -> Assembly:
+    """The group with what it may have of improper elements, refined as one frame and judged."""
     center = _common_point(held, turns)
     if evidence.tuples.kind == "vanish":
-        group = _with_improper(evidence, group, held, turns, center)
-    state = _joint(group, center)
-    history = refined(evidence, state, sources=max(600, 20000 // len(state.standard))) if state is not None else ()
-    if history:
-        frame = history[-1].state.frame
-        group, center = PointGroup(name=group.name, frame=frame), history[-1].state.center
-    done = _finish(evidence, group, center, history, near)
-    if done.elements and max(e.excess for e in done.elements) > 1.0 and len(held) + len(turns) > 1:
-        return _fallback(evidence, held, near)
+        group = _with_improper(evidence, group, [*(m.verdict for m in held), *(t.verdict for t in turns)], center)
+    start = _joint(group, center)
+    if start is None:
+        return _finish(evidence, group, center, (), near)
+    history = refined(evidence, start, sources=max(500, 12000 // len(start.standard)))
+    state = history[-1].state
+    done = _finish(evidence, PointGroup(name=group.name, frame=state.frame), state.center, history, near)
+    if any(e.verdict.excess > 1.0 for e in done.elements):
+        # Where the symmetry is only approximate, the closest fit of most points can be worse for the rest.
+        return _finish(evidence, group, center, history[:1], near)
     return done
 
 
-def _fallback(evidence: Evidence, held: list[Mirror], near: list[Element]) -> Assembly:
-    """The best mirror alone, where the closure of all that held does not hold itself."""
-    if not held:
-        return _finish(evidence, PointGroup(name="C1"), np.zeros(3), (), near)
-    best = held[0]
-    frame = frame_with_z(best.plane.normal)
-    group = PointGroup(name="Cs", frame=frame)
-    near = [*near, *(_mirror_element(m) for m in held[1:])]
-    return _finish(evidence, group, best.plane.offset * best.plane.normal, (), near)
+def _without_worst(held: list[Mirror], turns: list[Turn]) -> list[Mirror]:
+    """Take the least convincing element out of the lists; a mirror so taken is returned."""
+    worst_turn = max(turns, key=lambda t: t.verdict.bulk, default=None)
+    worst_mirror = max(held, key=lambda m: m.verdict.bulk, default=None)
+    if worst_mirror is None or (worst_turn is not None and worst_turn.verdict.bulk >= worst_mirror.verdict.bulk):
+        turns.remove(worst_turn)
+        return []
+    held.remove(worst_mirror)
+    return [worst_mirror]
 
 
-def _turns(evidence: Evidence, held: list[Mirror], limit: float) -> list[Turn]:
-    """Rotation axes worth having beside the mirrors: along the n-tuples, or anywhere if they vanish."""
-    normals = np.array([m.plane.normal for m in held]).reshape(-1, 3)
-    vanish = evidence.tuples.kind == "vanish"
-    directions = axis_directions(evidence, normals) if vanish else _axis_open(evidence)
+def _mirror_group(evidence: Evidence) -> tuple[list[Mirror], list[Element], PointGroup]:
+    held: list[Mirror] = []
+    near: list[Mirror] = []
+    group = PointGroup(name="C1")
+
+    def known(normal: Array) -> bool:
+        return _mirror_of(group)(normal)
+
+    lone = evidence.tuples.kind in ("plane", "none")
+    for mirror in mirrors(evidence, evidence.tuples.directions[2:], known=known):
+        (held if mirror.verdict.excess <= 1.0 else near).append(mirror)
+        limit = _limit(m.verdict for m in held)
+        near += [m for m in held if not _holds(m.verdict, limit)]
+        group, held, _ = _closed([m for m in held if _holds(m.verdict, limit)], [])
+        if lone and held and len(near) >= NEAR:
+            break
+    return held, [_mirror_element(m) for m in near], group
+
+
+def _mirror_of(group: PointGroup) -> Callable[[Array], bool]:
+    """Whether a direction is, within a few degrees, the normal of one of the group's mirrors."""
+    normals = group.mirrors()
+
+    def known(normal: Array) -> bool:
+        return bool(len(normals)) and bool(np.abs(normals @ normal).max() > np.cos(KNOWN_RAD))
+
+    return known
+
+
+def _turns(evidence: Evidence, held: list[Mirror], group: PointGroup) -> list[Turn]:
+    """Rotation axes worth having beside the mirrors: those the n-tuples leave open, or a higher order of the main axis.
+
+    Two mirrors or more imply their axes; then only the main one can be of a higher order than the mirrors show.
+    """
     center = _common_point(held, [])
-    found = [t for d in directions if (t := turns_about(evidence, d, center)) is not None]
-    best = min([limit / RIVAL, *(t.excess for t in found)])
-    return [t for t in found if t.excess <= min(1.0, max(EXACT, RIVAL * best))]
+    if len(held) > 1:
+        directions = np.array([u for u, _ in group.rotation_axes()[:1]]).reshape(-1, 3)
+    elif held and evidence.tuples.kind in ("plane", "none"):
+        return []
+    else:
+        normals = [m.plane.normal for m in held]
+        offered = _axis_open(evidence) if held or evidence.tuples.kind == "vanish" else axis_directions(evidence)
+        directions = np.concatenate([np.array(normals).reshape(-1, 3), evidence.tuples.directions[:1], offered])
+    found = [t for d in _apart(directions, KNOWN_RAD) if (t := turns_about(evidence, d, center)) is not None]
+    limit = _limit([*(m.verdict for m in held), *(t.verdict for t in found)])
+    return [t for t in found if _holds(t.verdict, limit)]
+
+
+def _apart(directions: Array, angle_rad: float) -> list[Array]:
+    """The directions without those within an angle of an earlier one."""
+    kept: list[Array] = []
+    for d in directions:
+        if all(abs(d @ k) < np.cos(angle_rad) for k in kept):
+            kept.append(d)
+    return kept
 
 
 def _closed(held: list[Mirror], turns: list[Turn]) -> tuple[PointGroup, list[Mirror], list[Turn]]:
@@ -171,25 +250,17 @@ def _closed(held: list[Mirror], turns: list[Turn]) -> tuple[PointGroup, list[Mir
             )
             return group, held, turns
         except DegenerateShapeError:
-            if turns and (not held or max(t.excess for t in turns) >= held[-1].excess):
-                turns.remove(max(turns, key=lambda t: t.excess))
-            else:
-                held.pop()
+            _without_worst(held, turns)
 
 
-def _with_improper(
-    evidence: Evidence, group: PointGroup, held: list[Mirror], turns: list[Turn], center: Array
-) -> PointGroup:
-    """The group with inversion and rotoreflections added, where they hold as well as its other elements."""
-    limit = _limit([*(m.excess for m in held), *(t.excess for t in turns)]) if held or turns else 1.0
-    inversion = group.has_inversion
-    if not inversion:
-        miss = evidence.judge.excess(evidence.judge.deviation([Isometry.about(center, -np.eye(3))]))
-        inversion = miss <= limit
-    improper = []
-    for direction, order in group.rotation_axes():
-        if math.isfinite(order) and order <= 8 and improper_about(evidence, direction, center, int(2 * order)) <= limit:
-            improper.append((direction, float(2 * order)))
+def _with_improper(evidence: Evidence, group: PointGroup, verdicts: list[Verdict], center: Array) -> PointGroup:
+    """The group with the inversion, or the rotoreflection of its main axis, where they hold as well as the rest."""
+    limit = _limit(verdicts)
+    axes = [(u, int(2 * k)) for u, k in group.rotation_axes()[:1] if k <= 12]
+    improper = [(u, k) for u, k in axes if _holds(improper_about(evidence, u, center, k), limit)] if not _has_all(group) else []
+    inversion = group.has_inversion or _holds(
+        improper_about(evidence, np.array([0.0, 0.0, 1.0]), center, 2), limit
+    )
     if inversion == group.has_inversion and not improper:
         return group
     try:
@@ -202,6 +273,11 @@ def _with_improper(
         )
     except DegenerateShapeError:
         return group
+
+
+def _has_all(group: PointGroup) -> bool:
+    """Whether the main axis carries a rotoreflection already."""
+    return bool(group.improper_axes())
 
 
 def _common_point(held: list[Mirror], turns: list[Turn]) -> Array:
@@ -233,36 +309,47 @@ def _joint(group: PointGroup, center: Array) -> Framed | None:
 def _finish(
     evidence: Evidence, group: PointGroup, center: Array, history: tuple[Iterate, ...], near: list[Element]
 ) -> Assembly:
-    elements = tuple(sorted(_elements(evidence, group, center), key=lambda e: (-e.order, e.excess)))
+    parts = _parts(group)
+    stride = evidence.stride(max(JUDGED_EACH, JUDGED // max(1, len(parts))))
+    judged = (_judged(evidence, part, center, stride) for part in parts)
+    elements = tuple(sorted(judged, key=lambda e: (-e.order, e.verdict.excess)))
     own = [e.direction for e in elements if e.kind == "plane"]
     rejected = [e for e in near if all(abs(e.direction @ n) < np.cos(np.radians(3.0)) for n in own)]
     return Assembly(
         group=group,
         center=center,
         elements=elements,
-        rejected=tuple(sorted(rejected, key=lambda e: e.excess)),
+        rejected=tuple(sorted(rejected, key=lambda e: e.verdict.excess)),
         history=history,
     )
 
 
-def _elements(evidence: Evidence, group: PointGroup, center: Array) -> list[Element]:
-    """Every discrete mirror, every axis and rotoreflection axis of the group, judged."""
-    found = []
-    lone = {"Cinfv": 0, "Kh": 0}.get(group.name)
-    normals = group.mirrors() if lone is None else []
-    if group.name == "Dinfh":
-        normals = [n for n in normals if abs(n @ group.frame[2]) > 0.9]
-    for normal in normals:
-        found.append(_judged(evidence, "plane", normal, center, 1.0, [householder(normal)]))
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Part:
+    """An element to be judged: what it is, and matrices that stand for it."""
+
+    kind: str
+    direction: Array
+    order: float
+    matrices: tuple[Array, ...]
+
+
+def _parts(group: PointGroup) -> list[_Part]:
+    """Every discrete mirror, every axis and rotoreflection axis of the group."""
+    normals = group.mirrors()
+    if group.name in ("Cinfv", "Kh"):
+        normals = NOTHING
+    elif group.name == "Dinfh":
+        normals = group.frame[2:]
+    parts = [_Part(kind="plane", direction=n, order=1.0, matrices=(householder(n),)) for n in normals]
     for direction, order in _listed_axes(group):
-        angles = 2 * np.pi / order if math.isfinite(order) else np.array([0.517, 1.234, 2.6833])
-        turns = [rotation(direction, float(a)) for a in np.atleast_1d(angles)]
-        found.append(_judged(evidence, "axis", direction, center, order, turns))
-    if group.is_finite:
-        for direction, order in group.improper_axes():
-            turn = rotoreflection(direction, 2 * np.pi / order)
-            found.append(_judged(evidence, "improper", direction, center, order, [turn]))
-    return found
+        angles = FREE_TURNS if math.isinf(order) else (2 * np.pi / order,)
+        turns = tuple(rotation(direction, float(a)) for a in angles)
+        parts.append(_Part(kind="axis", direction=direction, order=order, matrices=turns))
+    for direction, order in group.improper_axes() if group.is_finite else []:
+        turn = rotoreflection(direction, 2 * np.pi / order)
+        parts.append(_Part(kind="improper", direction=direction, order=order, matrices=(turn,)))
+    return parts
 
 
 def _listed_axes(group: PointGroup) -> list[tuple[Array, float]]:
@@ -272,11 +359,10 @@ def _listed_axes(group: PointGroup) -> list[tuple[Array, float]]:
     return [(u, k) for u, k in group.rotation_axes() if math.isinf(k)][:1]
 
 
-def _judged(evidence: Evidence, kind: str, direction: Array, center: Array, order: float, matrices: list[Array]) -> Element:
-    motions = [Isometry.about(center, m) for m in matrices]
-    deviation = evidence.judge.deviation(motions)
-    excess = evidence.judge.excess(deviation)
-    return Element(kind=kind, direction=direction, point=center, order=order, deviation=deviation, excess=excess)
+def _judged(evidence: Evidence, part: _Part, center: Array, stride: int) -> Element:
+    motions = [Isometry.about(center, m) for m in part.matrices]
+    verdict = evidence.judge(motions, stride=stride)
+    return Element(kind=part.kind, direction=part.direction, point=center, order=part.order, verdict=verdict)
 
 
 def _mirror_element(m: Mirror) -> Element:
@@ -285,15 +371,5 @@ def _mirror_element(m: Mirror) -> Element:
         direction=m.plane.normal,
         point=m.plane.offset * m.plane.normal,
         order=1.0,
-        deviation=m.deviation,
-        excess=m.excess,
+        verdict=m.verdict,
     )
-
-
-def _near(evidence: Evidence, group: PointGroup, planes: list[Mirror]) -> list[Element]:
-    return [_mirror_element(m) for m in planes]
-
-
-def shifted(plane: Plane, by: Array) -> Plane:
-    """The plane after a translation."""
-    return replace(plane, offset=plane.offset + float(plane.normal @ by))

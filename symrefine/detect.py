@@ -183,7 +183,7 @@ def gather(
         tuples=classify(vectors),
         points=local,
         weights=weights / weights.sum(),
-        judge=make_judge(cloud, tight_diagonal(local), tolerance),
+        judge=make_judge(cloud, tight_diagonal(cloud.points), tolerance),
     )
 
 
@@ -199,17 +199,17 @@ def _report(
         center=origin + scale * found.center,
         planes=tuple(
             FoundPlane(
-                plane=_plane(e, origin, scale), residual=e.deviation, confidence=confidence(e.excess)
+                plane=_plane(e, origin, scale), residual=e.verdict.deviation, confidence=confidence(e.verdict.excess)
             )
-            for e in sorted(planes, key=lambda e: e.excess)
+            for e in sorted(planes, key=lambda e: e.verdict.excess)
         ),
         axes=tuple(
             FoundAxis(
                 axis=Axis(point=origin + scale * e.point, direction=e.direction),
                 order=e.order,
                 improper=e.kind == "improper",
-                residual=e.deviation,
-                confidence=confidence(e.excess),
+                residual=e.verdict.deviation,
+                confidence=confidence(e.verdict.excess),
             )
             for e in axes
         ),
@@ -220,8 +220,8 @@ def _report(
                 direction=e.direction,
                 point=origin + scale * e.point,
                 order=e.order,
-                residual=e.deviation,
-                excess=e.excess,
+                residual=e.verdict.deviation,
+                excess=e.verdict.excess,
             )
             for e in found.rejected[:8]
         ),

@@ -5,6 +5,7 @@ direction u ~ -u; `T_a_b` maps b to a.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -136,23 +137,31 @@ class Isometry:
         return vectors @ self.matrix.T
 
 
+@lru_cache(maxsize=1)
+def _box_trials() -> tuple[Array, Array, Array]:
+    """Probe directions [P, 3], frames [F, 3, 3] and small turns [4, T, 3, 3] for `tight_diagonal`; fixed once and for all."""
+    rng = np.random.default_rng(0)
+    probes = unit(rng.standard_normal((120, 3)))
+    frames = np.stack([np.eye(3), *(random_orthogonal(rng) for _ in range(200))])
+    widths = (0.3, 0.1, 0.03, 0.01)
+    turns = [[rotation(w, width * float(np.linalg.norm(w))) for w in rng.standard_normal((60, 3))] for width in widths]
+    return probes, frames, np.array(turns)
+
+
 def tight_diagonal(points: Array) -> float:
     """Diagonal of the smallest box around points [N, 3] over all orientations, to about one percent.
 
     Unlike the axis-aligned box of the input it does not change when the object is turned. The search starts from the
     principal axes and a fixed set of rotations, then shrinks.
     """
-    rng = np.random.default_rng(0)
+    probes, frames, turns = _box_trials()
     centred = points - points.mean(axis=0)
     _, principal = np.linalg.eigh(centred.T @ centred)
-    probes = unit(rng.standard_normal((300, 3)))
-    reach = centred @ probes.T
+    reach = centred @ (principal @ probes.T)
     hull = centred[np.unique(np.concatenate([reach.argmax(axis=0), reach.argmin(axis=0)]))]
-    frames = np.stack([np.eye(3), *(random_orthogonal(rng) for _ in range(200))]) @ principal.T
-    best, frame = _smallest_box(hull, frames)
-    for width in (0.3, 0.1, 0.03, 0.01):
-        turns = np.stack([rotation(w, float(np.linalg.norm(w))) for w in width * rng.standard_normal((60, 3))])
-        trial, turned = _smallest_box(hull, turns @ frame)
+    best, frame = _smallest_box(hull, frames @ principal.T)
+    for nearby in turns:
+        trial, turned = _smallest_box(hull, nearby @ frame)
         if trial < best:
             best, frame = trial, turned
     return best

@@ -19,6 +19,8 @@ MAX_OUTER = 10
 SETTLED = 2e-4
 # ... and so does one that moves everything by less than this share of what the noise leaves uncertain.
 WITHIN_NOISE = 0.15
+# Largest ratio of successive steps that is extrapolated.
+LONGEST = 0.7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -165,7 +167,7 @@ def _remaining(x: Array, last: Array) -> float:
     if length == 0.0 or x @ last < 0.7 * length:
         return 1.0
     ratio = float(np.linalg.norm(x) / np.linalg.norm(last))
-    return 1.0 / (1.0 - min(ratio, 0.6)) if ratio < 0.9 else 1.0
+    return 1.0 / (1.0 - min(ratio, LONGEST)) if ratio < 0.95 else 1.0
 
 
 def _pair_gram(cloud: LocalPlanes, pairs: Pairs) -> Array:

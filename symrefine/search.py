@@ -4,24 +4,29 @@ The n-tuples speak first: where they do not vanish they give the axis, and the a
 the mirrors. The directional spectrum proposes what they cannot see. Everything is in normalised units (RMS radius 1).
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from symrefine.axis import FoldCandidate, TupleClass, fold_candidates, polish_frame
-from symrefine.geometry import Array, Isometry, Plane, frame_with_z, rotation, rotoreflection, unit
+from symrefine.geometry import Array, Isometry, Plane, frame_with_z, rotation, rotoreflection
 from symrefine.moments import Moments
 from symrefine.refine import Framed, Iterate, mirror_bundle, refine, single_plane
 from symrefine.spectrum import axis_misses, local_minima, mirror_candidates, whitened
-from symrefine.verify import Deviation, Judge
+from symrefine.verify import Judge, Verdict
 
 # Turns that no finite fold below 36 shares; a surface of revolution survives them all.
 IRRATIONAL_TURNS = 2.0 * np.pi * np.array([0.0823, 0.1381966, 0.2360680, 0.4270510])
 # A revolution that misses by less than this fraction of the limits is round, whatever folds its facets suggest.
 ROUND = 0.3
 # Sources of a first look: enough to tell hopeless from possible.
-LOOK = 600
+LOOK = 500
+# Excess at the start beyond which a candidate is not worth refining, and after a coarse fit, beyond which it is dropped.
+HOPELESS = 15.0
+PROMISING = 2.0
+# A fold that no moment reaches: only the coefficients with m = 0 are invariant.
+ROUND_FOLD = 10**6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,8 +50,7 @@ class Mirror:
     """A refined candidate plane and by how much it misses."""
 
     plane: Plane
-    deviation: Deviation
-    excess: float
+    verdict: Verdict
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,8 +60,7 @@ class Turn:
     point: Array
     direction: Array
     order: float
-    deviation: Deviation
-    excess: float
+    verdict: Verdict
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,8 +70,7 @@ class Bundle:
     state: Framed
     fold: float
     history: tuple[Iterate, ...]
-    deviation: Deviation
-    excess: float
+    verdict: Verdict
 
 
 def refined(evidence: Evidence, start: Framed, *, sources: int = 10**9, outer: int = 10, error_rad: float = 0.05) -> tuple[Iterate, ...]:
@@ -77,17 +79,24 @@ def refined(evidence: Evidence, start: Framed, *, sources: int = 10**9, outer: i
     return tuple(refine(cloud, start, start_error_rad=error_rad, max_outer=outer, stride=stride))
 
 
-def axis_bundle(evidence: Evidence, direction: Array) -> Iterator[Bundle]:
-    """C_infv, then C_bv by falling plausibility, about an axis through the centre; every one that passes a first look."""
-    round_one = _revolution(evidence, direction)
-    if round_one.excess <= ROUND:
-        yield round_one
-        return
-    for candidate in fold_candidates(evidence.points, evidence.weights, direction)[:3]:
-        found = _mirrors_through(evidence, candidate)
-        if found is not None:
-            yield found
-    yield round_one
+def axis_bundle(evidence: Evidence, direction: Array, *, mirrored: bool = True) -> Iterator[Bundle]:
+    """C_infv, then C_bv by falling plausibility, about an axis through the centre; every one that passes a first look.
+
+    Args:
+        mirrored: whether to try finite folds with their mirrors too.
+    """
+    frame = polish_frame(evidence.harmonics, frame_with_z(direction), ROUND_FOLD)
+    endless = _revolution(evidence, frame)
+    if endless is not None:
+        yield endless
+    if mirrored and (endless is None or endless.verdict.excess > ROUND):
+        for axis in (frame[2], direction):
+            for candidate in fold_candidates(evidence.points, evidence.weights, axis)[:3]:
+                found = _mirrors_through(evidence, candidate)
+                if found is not None:
+                    yield found
+                    if found.verdict.excess < ROUND:
+                        return
 
 
 def _mirrors_through(evidence: Evidence, candidate: FoldCandidate) -> Bundle | None:
@@ -97,49 +106,66 @@ def _mirrors_through(evidence: Evidence, candidate: FoldCandidate) -> Bundle | N
         return None
     history = refined(evidence, start, sources=max(LOOK, 16000 // candidate.fold))
     state = history[-1].state
-    deviation = evidence.judge.deviation(state.motions, stride=evidence.stride(20000 // candidate.fold))
-    return Bundle(
-        state=state, fold=candidate.fold, history=history, deviation=deviation, excess=evidence.judge.excess(deviation)
-    )
+    verdict = evidence.judge(state.motions, stride=evidence.stride(20000 // candidate.fold))
+    return Bundle(state=state, fold=candidate.fold, history=history, verdict=verdict)
 
 
 def _look(evidence: Evidence, motions: tuple[Isometry, ...]) -> float:
-    return evidence.judge.excess(evidence.judge.deviation(motions, stride=evidence.stride(LOOK)))
+    return evidence.judge(motions, stride=evidence.stride(LOOK)).excess
 
 
-def _revolution(evidence: Evidence, direction: Array) -> Bundle:
-    """The axis as if the object were round: polish on m = 0 alone, refine with five planes, judge by free turns."""
-    frame = polish_frame(evidence.harmonics, frame_with_z(direction), 10**6)
+def _revolution(evidence: Evidence, frame: Array) -> Bundle | None:
+    """The axis as if the object were round: refine with five planes, judge by free turns; None if hopeless."""
     start = mirror_bundle(5, frame, np.zeros(3))
-    state, history = start, ()
-    if _look(evidence, _free_turns(start)[:1]) <= 4.0:
-        history = refined(evidence, start, sources=1500)
-        state = history[-1].state
-    deviation = evidence.judge.deviation(_free_turns(state), stride=evidence.stride(2500))
-    return Bundle(state=state, fold=np.inf, history=history, deviation=deviation, excess=evidence.judge.excess(deviation))
+    if _look(evidence, _free_turns(start)[:1]) > 4.0:
+        return None
+    history = refined(evidence, start, sources=1500)
+    state = history[-1].state
+    verdict = evidence.judge(_free_turns(state), stride=evidence.stride(2500))
+    return Bundle(state=state, fold=np.inf, history=history, verdict=verdict)
 
 
 def _free_turns(state: Framed) -> tuple[Isometry, ...]:
     return tuple(Isometry.about(state.center, rotation(state.frame[2], a)) for a in IRRATIONAL_TURNS)
 
 
-def mirrors(evidence: Evidence, extra: Array, *, count: int = 16) -> list[Mirror]:
-    """Every candidate mirror of the spectrum, and the `extra` normals [E, 3]: refined and judged, best first."""
-    found: list[Mirror] = []
+def mirrors(
+    evidence: Evidence, extra: Array, *, count: int = 16, known: Callable[[Array], bool] = lambda _: False
+) -> Iterator[Mirror]:
+    """Candidate mirrors, the `extra` normals [E, 3] first, then those of the spectrum by falling promise.
+
+    Each is refined as far as it deserves and judged. Candidates that end up where `known` says so are passed over.
+    """
+    found: list[Plane] = []
     directions = np.concatenate([extra.reshape(-1, 3), mirror_candidates(evidence.moments, count=count).directions])
     for normal in directions:
-        plane = _settle(evidence, Plane(normal=normal, offset=0.0), sources=LOOK, outer=4)
-        if any(_same_plane(plane, m.plane) for m in found):
+        start = Plane(normal=normal, offset=0.0)
+        if known(normal) or _look(evidence, (Isometry.reflection(start),)) > HOPELESS:
             continue
-        excess = _look(evidence, (Isometry.reflection(plane),))
-        if excess <= 2.0:
-            plane = _settle(evidence, plane, sources=4000, outer=6)
-        if any(_same_plane(plane, m.plane) for m in found):
+        plane = _settle(evidence, start, sources=LOOK, outer=3)
+        if known(plane.normal) or any(_same_plane(plane, p) for p in found):
             continue
-        stride = evidence.stride(LOOK) if excess > 2.0 else 1
-        deviation = evidence.judge.deviation([Isometry.reflection(plane)], stride=stride)
-        found.append(Mirror(plane=plane, deviation=deviation, excess=evidence.judge.excess(deviation)))
-    return sorted(found, key=lambda m: m.excess)
+        mirror = _judged(evidence, plane, stride=evidence.stride(LOOK))
+        if mirror.verdict.excess <= PROMISING:
+            plane = _settle(evidence, plane, sources=3000, outer=6)
+            if known(plane.normal) or any(_same_plane(plane, p) for p in found):
+                continue
+            mirror = _judged(evidence, plane)
+            if 1.0 < mirror.verdict.excess < PROMISING:
+                mirror = min(mirror, _judged(evidence, _polished(evidence, normal)), key=lambda m: m.verdict.excess)
+        found.append(mirror.plane)
+        yield mirror
+
+
+def _judged(evidence: Evidence, plane: Plane, *, stride: int = 1) -> Mirror:
+    return Mirror(plane=plane, verdict=evidence.judge([Isometry.reflection(plane)], stride=stride))
+
+
+def _polished(evidence: Evidence, normal: Array) -> Plane:
+    """The plane where the moments alone put it: for approximate symmetry often a better mean than the closest fit."""
+    u, p0, p1 = frame_with_z(normal)[[0, 1, 2]]
+    frame = polish_frame(evidence.harmonics, np.stack([u, p1, -p0]), 1)
+    return Plane(normal=frame[1], offset=0.0)
 
 
 def _settle(evidence: Evidence, plane: Plane, *, sources: int, outer: int) -> Plane:
@@ -151,49 +177,38 @@ def _same_plane(a: Plane, b: Plane) -> bool:
     return abs(float(a.normal @ b.normal)) > np.cos(np.radians(2.0))
 
 
-def axis_directions(evidence: Evidence, normals: Array) -> Array:
-    """Directions [D, 3] worth trying as rotation axes: those the mirrors imply, then the spectrum's, then the tuples'."""
-    crossings = [unit(c) for i, a in enumerate(normals) for b in normals[:i] if np.linalg.norm(c := np.cross(a, b)) > 0.05]
+def axis_directions(evidence: Evidence) -> Array:
+    """Directions [D, 3] worth trying as rotation axes: minima of the whitened spectrum, and the principal axes."""
     white = whitened(evidence.moments)
     minima = [local_minima(axis_misses(white, k), count=n).directions for k, n in ((2, 4), (3, 5), (5, 3))]
     principal = np.linalg.eigh(evidence.moments.covariance)[1].T
-    all_of = np.concatenate([np.array(crossings).reshape(-1, 3), normals, *minima, principal, evidence.tuples.directions[:1]])
-    kept: list[Array] = []
-    for d in all_of:
-        if all(abs(d @ k) < np.cos(np.radians(4.0)) for k in kept):
-            kept.append(d)
-    return np.array(kept)
+    return np.concatenate([principal, *minima])
 
 
 def turns_about(evidence: Evidence, direction: Array, center: Array) -> Turn | None:
     """The rotation of highest order about a direction that holds, or None."""
     frame = frame_with_z(direction)
-    spectrum_folds = [c.fold for c in fold_candidates(evidence.points, evidence.weights, direction)]
+    folds = {c.fold for c in fold_candidates(evidence.points, evidence.weights, direction)}
     best: Turn | None = None
-    for fold in sorted({*spectrum_folds, 2, 3}, reverse=True):
+    for fold in sorted({*folds, 2, 3}, reverse=True):
         if best is not None and best.order % fold == 0:
             continue
         start = Framed(standard=rotation([0, 0, 1], 2 * np.pi / fold)[None], frame=frame, center=center)
-        if _look(evidence, start.motions) > 5.0:
+        if _look(evidence, start.motions) > HOPELESS:
+            continue
+        start = refined(evidence, start, sources=LOOK, outer=3, error_rad=0.1)[-1].state
+        if _look(evidence, start.motions) > PROMISING:
             continue
         state = refined(evidence, start, sources=2000, outer=6)[-1].state
-        deviation = evidence.judge.deviation(state.motions)
-        excess = evidence.judge.excess(deviation)
-        if excess <= 1.0 and (best is None or fold > best.order):
-            best = Turn(
-                point=state.center, direction=state.frame[2], order=float(fold), deviation=deviation, excess=excess
-            )
+        verdict = evidence.judge(state.motions)
+        if verdict.excess <= 1.0 and (best is None or fold > best.order):
+            best = Turn(point=state.center, direction=state.frame[2], order=float(fold), verdict=verdict)
     return best
 
 
-def improper_about(evidence: Evidence, direction: Array, center: Array, order: int) -> float:
-    """Excess of the rotoreflection S_order about a direction through the centre, after refinement."""
+def improper_about(evidence: Evidence, direction: Array, center: Array, order: int) -> Verdict:
+    """Verdict on the rotoreflection S_order about a direction through the centre, after refinement."""
     standard = rotoreflection([0, 0, 1], 2 * np.pi / order)[None]
     start = Framed(standard=standard, frame=frame_with_z(direction), center=center)
     state = refined(evidence, start, sources=2000, outer=6)[-1].state
-    return evidence.judge.excess(evidence.judge.deviation(state.motions))
-
-
-def at_center(state: Framed, center: Array) -> Framed:
-    """The same operations about another centre."""
-    return replace(state, center=center)
+    return evidence.judge(state.motions)

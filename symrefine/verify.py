@@ -5,17 +5,17 @@ distance is taken between denoised surfaces: each local plane, moved, against th
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from symrefine.geometry import Array, Isometry
 from symrefine.matching import LocalPlanes
 
-# An operation holds at tolerance t if mean, 95th and 99th percentile of the miss stay below these multiples of t. On the
-# 52 catalogued meshes true elements end at 0.27, 0.94, 1.40 of t = 2 % and false ones start at 0.3, 1.0, 1.3 in at
-# least one of the three.
-LIMITS = (0.28, 1.0, 1.4)
+# An operation holds at tolerance t if mean, 95th, 99th and 99.5th percentile of the miss stay below these multiples of
+# t = 2 % by default. On the 52 catalogued meshes every false element passes at least one of them (a propeller's blades
+# the first two, a mailbox's flag the last) and every true one stays below; the closest are a posed ant and a camera.
+LIMITS = (0.28, 1.0, 1.4, 1.85)
 TOLERANCE = 0.02
 DISCS = 6
 
@@ -27,17 +27,29 @@ class Deviation:
     mean: float
     p95: float
     p99: float
+    p995: float
     max: float
 
-    def excess(self, tolerance: float, floor: "Deviation | None" = None) -> float:
-        """Largest of the three statistics over its limit; <= 1 means the operation holds at `tolerance`.
+    def over_limits(self, tolerance: float, floor: "Deviation") -> tuple[float, float, float, float]:
+        """Each statistic over its limit, which is raised by `floor`: what the cloud shows against itself."""
+        own = (self.mean, self.p95, self.p99, self.p995)
+        base = (floor.mean, floor.p95, floor.p99, floor.p995)
+        return tuple(value / (limit * tolerance + b) for value, limit, b in zip(own, LIMITS, base, strict=True))
 
-        Args:
-            floor: what the cloud shows against itself: the miss that sampling alone explains.
-        """
-        own = (self.mean, self.p95, self.p99)
-        base = (floor.mean, floor.p95, floor.p99) if floor else (0.0, 0.0, 0.0)
-        return max(value / (limit * tolerance + b) for value, limit, b in zip(own, LIMITS, base, strict=True))
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """A miss weighed against the tolerance.
+
+    Attributes:
+        deviation: the miss.
+        excess: the largest of its statistics over its limit; the operation holds if this is <= 1.
+        bulk: the same from mean and 95th percentile alone: how well the object as a whole, but for details, agrees.
+    """
+
+    deviation: Deviation
+    excess: float
+    bulk: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,19 +61,12 @@ class Judge:
     tolerance: float
     floor: Deviation
 
-    def deviation(self, motions: Iterable[Isometry], *, stride: int = 1) -> Deviation:
-        """Miss of one or several operations together (the worst of each statistic)."""
+    def __call__(self, motions: Iterable[Isometry], *, stride: int = 1) -> Verdict:
+        """Verdict on one or several operations together (the worst of each statistic)."""
         found = [_summary(miss_distances(self.cloud, m, stride=stride) / self.diagonal) for m in motions]
-        return Deviation(
-            mean=max(f.mean for f in found),
-            p95=max(f.p95 for f in found),
-            p99=max(f.p99 for f in found),
-            max=max(f.max for f in found),
-        )
-
-    def excess(self, deviation: Deviation) -> float:
-        """Miss over limit; <= 1 means that the operation holds."""
-        return deviation.excess(self.tolerance, self.floor)
+        worst = Deviation(**{f.name: max(getattr(d, f.name) for d in found) for f in fields(Deviation)})
+        ratios = worst.over_limits(self.tolerance, self.floor)
+        return Verdict(deviation=worst, excess=max(ratios), bulk=max(ratios[:2]))
 
 
 def make_judge(cloud: LocalPlanes, diagonal: float, tolerance: float) -> Judge:
@@ -84,12 +89,14 @@ def disc_distances(cloud: LocalPlanes, queries: Array, *, skip_self: bool = Fals
     delta = queries[:, None] - cloud.points[near]
     across = np.abs(np.einsum("nki,nki->nk", delta, cloud.normals[near]))
     along = np.sqrt(np.maximum(np.einsum("nki,nki->nk", delta, delta) - across**2, 0.0))
-    return np.hypot(across, np.maximum(along - cloud.reach[near], 0.0)).min(axis=1)
+    # Inside a disc only the distance across counts; from twice its reach on, the whole distance to its centre does.
+    beyond = np.minimum(2.0 * np.maximum(along - cloud.reach[near], 0.0), along)
+    return np.hypot(across, beyond).min(axis=1)
 
 
 def _summary(distances: Array) -> Deviation:
-    p95, p99 = np.quantile(distances, [0.95, 0.99])
-    return Deviation(mean=float(distances.mean()), p95=float(p95), p99=float(p99), max=float(distances.max()))
+    p95, p99, p995 = (float(q) for q in np.quantile(distances, [0.95, 0.99, 0.995]))
+    return Deviation(mean=float(distances.mean()), p95=p95, p99=p99, p995=p995, max=float(distances.max()))
 
 
 def confidence(excess: float) -> float:
