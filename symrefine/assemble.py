@@ -361,7 +361,7 @@ def _listed_axes(group: PointGroup) -> list[tuple[Array, float]]:
 
 def _judged(evidence: Evidence, part: _Part, center: Array, stride: int) -> Element:
     motions = [Isometry.about(center, m) for m in part.matrices]
-    verdict = evidence.judge(motions, stride=stride)
+    verdict = evidence.verdict(motions, stride=stride)
     return Element(kind=part.kind, direction=part.direction, point=center, order=part.order, verdict=verdict)
 
 

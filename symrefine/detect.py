@@ -4,6 +4,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,12 +22,13 @@ from symrefine.quadrature import sample_surface
 from symrefine.refine import Iterate
 from symrefine.search import Evidence
 from symrefine.shape import Shape
-from symrefine.verify import TOLERANCE, Deviation, confidence, make_judge
+from symrefine.verify import TOLERANCE, Deviation, Judge, confidence, make_judge
 
 ORDER = 8
 PARTS = 16
 SAMPLES = 20000
 LOCAL_PLANES = 4000
+CLOSER_PLANES = 12000
 FEWEST = 300
 """Points below which local planes say too little for a decision."""
 
@@ -169,6 +171,8 @@ def gather(
     shape: Shape, moments: Moments, vectors: NTuples, tolerance: float, rng: np.random.Generator
 ) -> Evidence:
     """Moments, n-tuples and a judged cloud of local planes, in normalised units."""
+    from scipy.spatial import cKDTree
+
     if shape.faces is not None:
         points, normals, _ = sample_surface(shape, SAMPLES, rng)
         weights = np.full(len(points), 1.0 / len(points))
@@ -176,14 +180,23 @@ def gather(
         points, normals = shape.points, shape.normals
         weights = np.ones(len(points)) if shape.weights is None else shape.weights
     local = (points - moments.center) / moments.scale
-    cloud = local_planes(local, LOCAL_PLANES, rng, normals=normals)
+    tree = None if normals is not None else cKDTree(local, balanced_tree=False, compact_nodes=False)
+    cloud = local_planes(local, LOCAL_PLANES, rng, normals=normals, tree=tree)
+    diagonal = tight_diagonal(cloud.points)
+
+    @cache
+    def closer() -> Judge:
+        dense = local_planes(local, CLOSER_PLANES, rng, normals=normals, tree=tree)
+        return make_judge(dense, diagonal, tolerance)
+
     return Evidence(
         moments=moments,
         harmonics=harmonic_moments(moments),
         tuples=classify(vectors),
         points=local,
         weights=weights / weights.sum(),
-        judge=make_judge(cloud, tight_diagonal(cloud.points), tolerance),
+        judge=make_judge(cloud, diagonal, tolerance),
+        closer=closer,
     )
 
 

@@ -4,7 +4,7 @@ The n-tuples speak first: where they do not vanish they give the axis, and the a
 the mirrors. The directional spectrum proposes what they cannot see. Everything is in normalised units (RMS radius 1).
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,13 +25,15 @@ LOOK = 500
 # Excess at the start beyond which a candidate is not worth refining, and after a coarse fit, beyond which it is dropped.
 HOPELESS = 15.0
 PROMISING = 2.0
+# Excesses between these are close calls.
+CLOSE = (0.5, 1.4)
 # A fold that no moment reaches: only the coefficients with m = 0 are invariant.
 ROUND_FOLD = 10**6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Evidence:
-    """What a search may use: moments, the class of the n-tuples, points, and a judge with its cloud."""
+    """What a search may use: moments, the class of the n-tuples, points, a judge with its cloud, and a closer judge."""
 
     moments: Moments
     harmonics: dict[int, Array]
@@ -39,6 +41,12 @@ class Evidence:
     points: Array
     weights: Array
     judge: Judge
+    closer: Callable[[], Judge]
+
+    def verdict(self, motions: Sequence[Isometry], *, stride: int = 1) -> Verdict:
+        """Verdict on operations together; a close call is judged again on a denser cloud."""
+        first = self.judge(motions, stride=stride)
+        return self.closer()(motions, stride=stride) if CLOSE[0] < first.excess < CLOSE[1] else first
 
     def stride(self, sources: int) -> int:
         """Stride that leaves about `sources` local planes."""
@@ -158,7 +166,7 @@ def mirrors(
 
 
 def _judged(evidence: Evidence, plane: Plane, *, stride: int = 1) -> Mirror:
-    return Mirror(plane=plane, verdict=evidence.judge([Isometry.reflection(plane)], stride=stride))
+    return Mirror(plane=plane, verdict=evidence.verdict([Isometry.reflection(plane)], stride=stride))
 
 
 def _polished(evidence: Evidence, normal: Array) -> Plane:
@@ -200,7 +208,7 @@ def turns_about(evidence: Evidence, direction: Array, center: Array) -> Turn | N
         if _look(evidence, start.motions) > PROMISING:
             continue
         state = refined(evidence, start, sources=2000, outer=6)[-1].state
-        verdict = evidence.judge(state.motions)
+        verdict = evidence.verdict(state.motions)
         if verdict.excess <= 1.0 and (best is None or fold > best.order):
             best = Turn(point=state.center, direction=state.frame[2], order=float(fold), verdict=verdict)
     return best
