@@ -46,7 +46,7 @@ ROUND_LIMIT = 0.5
 NEAR = 5
 NOTHING = np.zeros((0, 3))
 # Distances evaluated in all for the final judgement of a group's elements, and at least for each.
-JUDGED = 24000
+JUDGED = 12000
 JUDGED_EACH = 1200
 
 
@@ -80,7 +80,7 @@ def assemble(evidence: Evidence) -> Assembly:
     if math.isinf(bundle.fold):
         return _round(evidence, bundle)
     group = PointGroup(name=f"C{int(bundle.fold)}v", frame=bundle.state.frame)
-    near = [_mirror_element(m) for m in mirrors(evidence, NOTHING, count=NEAR, known=_mirror_of(group))]
+    near = [_mirror_element(m) for m in mirrors(evidence, NOTHING, count=NEAR, known=_mirror_of(group), thorough=False)]
     return _finish(evidence, group, bundle.state.center, bundle.history, near)
 
 
@@ -191,10 +191,13 @@ def _mirror_group(evidence: Evidence) -> tuple[list[Mirror], list[Element], Poin
 
     lone = evidence.tuples.kind in ("plane", "none")
     for mirror in mirrors(evidence, evidence.tuples.directions[2:], known=known):
-        (held if mirror.verdict.excess <= 1.0 else near).append(mirror)
-        limit = _limit(m.verdict for m in held)
-        near += [m for m in held if not _holds(m.verdict, limit)]
-        group, held, _ = _closed([m for m in held if _holds(m.verdict, limit)], [])
+        if mirror.verdict.excess > 1.0:
+            near.append(mirror)
+        else:
+            held.append(mirror)
+            limit = _limit(m.verdict for m in held)
+            near += [m for m in held if not _holds(m.verdict, limit)]
+            group, held, _ = _closed([m for m in held if _holds(m.verdict, limit)], [])
         if lone and held and len(near) >= NEAR:
             break
     return held, [_mirror_element(m) for m in near], group
@@ -213,12 +216,13 @@ def _mirror_of(group: PointGroup) -> Callable[[Array], bool]:
 def _turns(evidence: Evidence, held: list[Mirror], group: PointGroup) -> list[Turn]:
     """Rotation axes worth having beside the mirrors: those the n-tuples leave open, or a higher order of the main axis.
 
-    Two mirrors or more imply their axes; then only the main one can be of a higher order than the mirrors show.
+    Two mirrors or more imply their axes; then only the main one can be of a higher order than the mirrors show. Beside
+    one mirror alone an axis can only stand across it, where all n-tuples vanish.
     """
     center = _common_point(held, [])
     if len(held) > 1:
         directions = np.array([u for u, _ in group.rotation_axes()[:1]]).reshape(-1, 3)
-    elif held and evidence.tuples.kind in ("plane", "none"):
+    elif held and evidence.tuples.kind != "vanish":
         return []
     else:
         normals = [m.plane.normal for m in held]

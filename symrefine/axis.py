@@ -16,6 +16,10 @@ SIGNIFICANT = 2.0
 # ... and, for exact moments, this fraction of the bound |v| <= 1: below it the miss is a matter of the tolerance.
 FLOOR = 2e-3
 MAX_FOLD = 36
+# Points that are enough for the azimuthal spectrum.
+AZIMUTHS = 10000
+# A step shorter than this (radians) ends the polish: the points take over from there.
+POLISHED = 1e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -76,17 +80,17 @@ def azimuthal_spectrum(points: Array, weights: Array, axis: Array, max_fold: int
 
     Returns: c [max_fold + 1, 4] complex, and the standard deviation [4] of each if the azimuths were random.
     """
-    frame = frame_with_z(axis)
-    x, y, h = frame @ points.T
+    thin = -(-len(points) // AZIMUTHS)
+    points, weights = points[::thin], weights[::thin]
+    x, y, h = frame_with_z(axis) @ points.T
     rho = np.hypot(x, y)
     phase = np.divide(x + 1j * y, rho, out=np.zeros(len(rho), complex), where=rho > 0)
     radial = weights[:, None] * rho[:, None] * np.stack([np.ones_like(h), h, h * h, rho], axis=1)
-    c = np.empty((max_fold + 1, 4), complex)
-    power = np.ones_like(phase)
-    for k in range(max_fold + 1):
-        c[k] = power @ radial
-        power = power * phase
-    return c, np.sqrt((radial**2).sum(axis=0))
+    powers = np.empty((max_fold + 1, len(rho)), complex)
+    powers[0] = 1.0
+    for k in range(max_fold):
+        np.multiply(powers[k], phase, out=powers[k + 1])
+    return powers.real @ radial + 1j * (powers.imag @ radial), np.sqrt((radial**2).sum(axis=0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -138,25 +142,23 @@ def polish_frame(harmonics: dict[int, Array], frame: Array, fold: int, *, steps:
 
     Returns: the polished frame, rows (p0, p1, u).
     """
-    turned = {l: _in_frame(c, l, frame) for l, c in harmonics.items()}
-    weights = {l: _weights(c) for l, c in turned.items()}
+    turned = {l: _in_frame(c[0], l, frame) for l, c in harmonics.items()}
+    weights = {l: _weights(c) for l, c in harmonics.items()}
     for _ in range(steps):
         hessian, gradient = np.zeros((3, 3)), np.zeros(3)
         for l, c in turned.items():
             m = np.arange(-l, l + 1)
             breaking = (m < 0) | (m % fold != 0)
-            jacobian = np.einsum("aij,pj->api", generators(l), c[0])[:, :, breaking]
-            weighted = jacobian * weights[l][:, breaking]
-            hessian += np.einsum("apm,bpm->ab", weighted, jacobian)
-            gradient += np.einsum("apm,pm->a", weighted, c[0][:, breaking])
+            jacobian = (c @ generators(l).transpose(0, 2, 1))[:, :, breaking]
+            weighted = (jacobian * weights[l]).reshape(3, -1)
+            hessian += weighted @ jacobian.reshape(3, -1).T
+            gradient += weighted @ c[:, breaking].ravel()
         hessian += 1e-9 * np.trace(hessian) * np.eye(3)
         step = -np.linalg.solve(hessian, gradient)
         step *= min(1.0, 0.15 / max(float(np.linalg.norm(step)), 1e-12))
-        if fold == 1:
-            step[2] += 0.0
-        turned = {l: np.einsum("ij,bpj->bpi", _small_turn(l, step), c) for l, c in turned.items()}
+        turned = {l: c @ _small_turn(l, step).T for l, c in turned.items()}
         frame = _small_rotation(step) @ frame
-        if np.linalg.norm(step) < 1e-7:
+        if np.linalg.norm(step) < POLISHED:
             break
     return frame
 
@@ -165,7 +167,7 @@ def _in_frame(c: Array, l: int, frame: Array) -> Array:
     to_pole = to_polar_axis(l, frame[2])
     spin = frame @ to_polar_axis_rotation(frame[2]).T
     angle = np.arctan2(spin[1, 0], spin[0, 0])
-    return np.einsum("ij,bpj->bpi", turn(l, 2, np.array(angle)) @ to_pole, c)
+    return c @ (turn(l, 2, np.array(angle)) @ to_pole).T
 
 
 def to_polar_axis_rotation(direction: Array) -> Array:
@@ -176,12 +178,14 @@ def to_polar_axis_rotation(direction: Array) -> Array:
 
 
 def _weights(c: Array) -> Array:
-    """Inverse variance of each (p, l), from the replicates, floored; ones where the moments are exact."""
+    """Inverse variance [n_p, 1] of the coefficients of each order, from the replicates; ones where they are exact.
+
+    The mean over m does not change when the frame turns.
+    """
     parts = len(c) - 1
     if parts == 0:
-        return np.ones(c.shape[1:])
-    variance = (parts - 1) * c[1:].var(axis=0).mean(axis=1, keepdims=True)
-    return np.broadcast_to(1.0 / (variance + 1e-8), c.shape[1:])
+        return np.ones((c.shape[1], 1))
+    return 1.0 / ((parts - 1) * c[1:].var(axis=0).mean(axis=1, keepdims=True) + 1e-8)
 
 
 def _small_rotation(step: Array) -> Array:

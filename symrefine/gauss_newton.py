@@ -33,7 +33,7 @@ class Solution:
 
 
 def minimise(
-    linearise: Callable[[Array], Linearisation], start: Array, *, max_steps: int = 8, tolerance: float = 1e-6
+    linearise: Callable[[Array], Linearisation], start: Array, *, max_steps: int = 6, tolerance: float = 1e-6
 ) -> Solution:
     """Minimise `r(x)'r(x)` from `start` by Gauss-Newton steps, damped (Levenberg) only when a step fails to descend.
 

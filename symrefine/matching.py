@@ -61,7 +61,7 @@ def _fit(points: Array, neighbours: Index) -> tuple[Array, Array, Array]:
     near = points[neighbours]
     mean = near.mean(axis=1)
     spread = near - mean[:, None]
-    values, normals = smallest_eigenvectors(np.einsum("nki,nkj->nij", spread, spread) / near.shape[1])
+    values, normals = smallest_eigenvectors(spread.transpose(0, 2, 1) @ spread / near.shape[1])
     return mean, normals, values
 
 
@@ -91,7 +91,7 @@ def _flatness(values: Array) -> Array:
 def _blob_flatness(k: int) -> float:
     """Median flatness of k points of an isotropic Gaussian."""
     blob = np.random.default_rng(0).standard_normal((200, k, 3))
-    values, _ = smallest_eigenvectors(np.einsum("nki,nkj->nij", blob, blob) / k)
+    values, _ = smallest_eigenvectors(blob.transpose(0, 2, 1) @ blob / k)
     return float(np.median(_flatness(values)))
 
 
@@ -112,7 +112,7 @@ def local_planes(
         tree = cKDTree(points, balanced_tree=False, compact_nodes=False) if tree is None else tree
         k = choose_neighbours(points, tree, rng)
         redundancy = max(1.0, k * len(pick) / len(points))
-        _, near = tree.query(points[pick], k=k)
+        _, near = tree.query(points[pick], k=k, workers=-1)
         mean, n, values = _fit(points, near)
         chosen = points[pick] - n * np.einsum("ij,ij->i", n, points[pick] - mean)[:, None]
         thickness = np.sqrt(values[:, 0])

@@ -8,7 +8,8 @@ one frame) is a matter of how phi depends on its unknowns; casadi differentiates
 the form shrinks to 3x3 in (1, cos 2 theta, sin 2 theta) (method.md, section 4). The only module that imports casadi.
 """
 
-from functools import lru_cache
+from collections.abc import Callable
+from threading import local
 from typing import Any
 
 import numpy as np
@@ -49,16 +50,49 @@ def residual_function() -> Any:
     return ca.Function("residual", [x_u, x_l, n_l, m, d], [ca.dot(mirrored - x_l, n_l)])
 
 
+class _Compiled:
+    """A casadi function called through its buffers: microseconds instead of the 150 that converting arguments takes.
+
+    The buffer interface takes contiguous float64 of the exact size in column-major order and checks none of it, so the
+    arguments are copied into arrays that have just that (shared/tools.md; casadi issue tracker says the same).
+    """
+
+    def __init__(self, function: Any) -> None:
+        self._buffer, self._evaluate = function.buffer()
+        self._inputs = [np.zeros(function.size_in(i), order="F") for i in range(function.n_in())]
+        self._outputs = [np.zeros(function.size_out(i), order="F") for i in range(function.n_out())]
+        for i, array in enumerate(self._inputs):
+            self._buffer.set_arg(i, memoryview(array.ravel(order="K")))
+        for i, array in enumerate(self._outputs):
+            self._buffer.set_res(i, memoryview(array.ravel(order="K")))
+
+    def __call__(self, *arguments: float | Array) -> list[Array]:
+        for slot, value in zip(self._inputs, arguments, strict=True):
+            slot[...] = np.reshape(value, slot.shape)
+        self._evaluate()
+        return self._outputs
+
+
+_threads = local()
+
+
+def _compiled(build: Callable[[], Any]) -> _Compiled:
+    """The compiled form of a function, one for each thread: its buffers are not to be shared."""
+    known = _threads.__dict__.setdefault("functions", {})
+    if build not in known:
+        known[build] = _Compiled(build())
+    return known[build]
+
+
 def _quadratic(ca: Any, name: str, unknown: Any, phi: Any, parameters: list[Any]) -> Any:
     """casadi function (unknown, parameters, G) -> cost, gradient and Gauss-Newton matrix of phi' G phi."""
     g = ca.SX.sym("G", phi.numel(), phi.numel())
-    jacobian = ca.jacobian(phi, unknown)
+    jacobian = ca.densify(ca.jacobian(phi, unknown))
     weighted = ca.mtimes(g, phi)
     outputs = [ca.dot(phi, weighted), ca.mtimes(jacobian.T, weighted), ca.mtimes([jacobian.T, g, jacobian])]
-    return ca.Function(name, [unknown, *parameters, g], outputs)
+    return ca.Function(name, [unknown, *parameters, g], [ca.densify(o) for o in outputs])
 
 
-@lru_cache(maxsize=1)
 def _theta_function() -> Any:
     import casadi as ca
 
@@ -66,19 +100,29 @@ def _theta_function() -> Any:
     return _quadratic(ca, "theta", theta, ca.vertcat(1, ca.cos(2 * theta), ca.sin(2 * theta)), [])
 
 
-@lru_cache(maxsize=1)
-def _frame_functions() -> tuple[Any, Any]:
-    """The model of one operation in a movable frame, and the Jacobian of its phi."""
-    import casadi as ca
-
+def _frame_symbols(ca: Any) -> tuple[Any, Any, list[Any]]:
+    """Unknowns, phi and parameters of one operation in a movable frame."""
     x, frame, center = ca.SX.sym("x", 6), ca.SX.sym("frame", 3, 3), ca.SX.sym("center", 3)
     standard = ca.SX.sym("standard", 3, 3)
     moved = ca.mtimes(_turn(ca, x[:3]), frame)
     matrix = ca.mtimes([moved.T, standard, moved])
     shifted = center + ca.mtimes(frame.T, x[3:])
     phi = ca.vertcat(ca.reshape(matrix.T, 9, 1), shifted - ca.mtimes(matrix, shifted), 1)
-    jacobian = ca.Function("jacobian", [x, frame, center, standard], [ca.jacobian(phi, x)])
-    return _quadratic(ca, "frame", x, phi, [frame, center, standard]), jacobian
+    return x, phi, [frame, center, standard]
+
+
+def _frame_function() -> Any:
+    import casadi as ca
+
+    x, phi, parameters = _frame_symbols(ca)
+    return _quadratic(ca, "frame", x, phi, parameters)
+
+
+def _jacobian_function() -> Any:
+    import casadi as ca
+
+    x, phi, parameters = _frame_symbols(ca)
+    return ca.Function("jacobian", [x, *parameters], [ca.densify(ca.jacobian(phi, x))])
 
 
 def _turn(ca: Any, w: Any) -> Any:
@@ -98,8 +142,12 @@ def turn_frame(frame: Array, w: Array) -> Array:
 
 def theta_model(gram3: Array, theta_rad: Array) -> Linearisation:
     """Cost and derivatives in theta [1] of one plane through a fixed axis, from its 3x3 Gram matrix."""
-    cost, gradient, hessian = _theta_function()(float(theta_rad[0]), gram3)
-    return Linearisation(cost=float(cost), gradient=np.array([float(gradient)]), hessian=np.array([[float(hessian)]]))
+    return _linearisation(_compiled(_theta_function)(theta_rad, gram3))
+
+
+def _linearisation(outputs: list[Array]) -> Linearisation:
+    cost, gradient, hessian = outputs
+    return Linearisation(cost=float(cost[0, 0]), gradient=gradient[:, 0].copy(), hessian=hessian.copy())
 
 
 def frame_model(grams: Array, standard: Array, frame: Array, center: Array, x: Array) -> Linearisation:
@@ -112,12 +160,12 @@ def frame_model(grams: Array, standard: Array, frame: Array, center: Array, x: A
         center: [3].
         x: small rotation about, and shift along, the frame's axes.
     """
-    function, _ = _frame_functions()
-    parts = [function(x, frame, center, s, g) for s, g in zip(standard, grams, strict=True)]
+    function = _compiled(_frame_function)
+    parts = [_linearisation(function(x, frame, center, s, g)) for s, g in zip(standard, grams, strict=True)]
     return Linearisation(
-        cost=sum(float(p[0]) for p in parts),
-        gradient=np.sum([p[1].full()[:, 0] for p in parts], axis=0),
-        hessian=np.sum([p[2].full() for p in parts], axis=0),
+        cost=sum(p.cost for p in parts),
+        gradient=np.sum([p.gradient for p in parts], axis=0),
+        hessian=np.sum([p.hessian for p in parts], axis=0),
     )
 
 
@@ -127,8 +175,8 @@ def observable_motions(standard: Array, frame: Array, center: Array) -> Array:
     q = 3 for one plane, 5 for the planes through an axis, 6 for the mirrors of a cube: what is left out (gliding
     along the plane or the axis, turning about a lone normal) no residual can see.
     """
-    _, jacobian = _frame_functions()
-    stacked = np.concatenate([jacobian(np.zeros(6), frame, center, s).full() for s in standard])
+    jacobian = _compiled(_jacobian_function)
+    stacked = np.concatenate([jacobian(np.zeros(6), frame, center, s)[0] for s in standard])
     _, values, rows = np.linalg.svd(stacked, full_matrices=False)
     return rows[values > 1e-6 * values[0]].T
 

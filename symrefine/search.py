@@ -13,7 +13,7 @@ from symrefine.axis import FoldCandidate, TupleClass, fold_candidates, polish_fr
 from symrefine.geometry import Array, Isometry, Plane, frame_with_z, rotation, rotoreflection
 from symrefine.moments import Moments
 from symrefine.refine import Framed, Iterate, mirror_bundle, refine, single_plane
-from symrefine.spectrum import axis_misses, local_minima, mirror_candidates, whitened
+from symrefine.spectrum import axis_misses, half_sphere, local_minima, mirror_candidates, whitened
 from symrefine.verify import Judge, Verdict
 
 # Turns that no finite fold below 36 shares; a surface of revolution survives them all.
@@ -25,6 +25,8 @@ LOOK = 500
 # Excess at the start beyond which a candidate is not worth refining, and after a coarse fit, beyond which it is dropped.
 HOPELESS = 15.0
 PROMISING = 2.0
+# Fraction of the energy that no true axis moves.
+AXIS_HOPELESS = 0.15
 # Excesses between these are close calls.
 CLOSE = (0.5, 1.4)
 # A fold that no moment reaches: only the coefficients with m = 0 are invariant.
@@ -112,9 +114,9 @@ def _mirrors_through(evidence: Evidence, candidate: FoldCandidate) -> Bundle | N
     start = mirror_bundle(candidate.fold, frame, np.zeros(3))
     if _look(evidence, start.motions[:4]) > 4.0:
         return None
-    history = refined(evidence, start, sources=max(LOOK, 16000 // candidate.fold))
+    history = refined(evidence, start, sources=max(LOOK, 12000 // candidate.fold))
     state = history[-1].state
-    verdict = evidence.judge(state.motions, stride=evidence.stride(20000 // candidate.fold))
+    verdict = evidence.judge(state.motions, stride=evidence.stride(max(LOOK, 6000 // candidate.fold)))
     return Bundle(state=state, fold=candidate.fold, history=history, verdict=verdict)
 
 
@@ -138,11 +140,17 @@ def _free_turns(state: Framed) -> tuple[Isometry, ...]:
 
 
 def mirrors(
-    evidence: Evidence, extra: Array, *, count: int = 16, known: Callable[[Array], bool] = lambda _: False
+    evidence: Evidence,
+    extra: Array,
+    *,
+    count: int = 16,
+    known: Callable[[Array], bool] = lambda _: False,
+    thorough: bool = True,
 ) -> Iterator[Mirror]:
     """Candidate mirrors, the `extra` normals [E, 3] first, then those of the spectrum by falling promise.
 
-    Each is refined as far as it deserves and judged. Candidates that end up where `known` says so are passed over.
+    Each is refined as far as it deserves (coarsely only, unless `thorough`) and judged. Candidates that end up where
+    `known` says so are passed over.
     """
     found: list[Plane] = []
     directions = np.concatenate([extra.reshape(-1, 3), mirror_candidates(evidence.moments, count=count).directions])
@@ -150,11 +158,11 @@ def mirrors(
         start = Plane(normal=normal, offset=0.0)
         if known(normal) or _look(evidence, (Isometry.reflection(start),)) > HOPELESS:
             continue
-        plane = _settle(evidence, start, sources=LOOK, outer=3)
+        plane = _settle(evidence, start, sources=LOOK, outer=3 if thorough else 2)
         if known(plane.normal) or any(_same_plane(plane, p) for p in found):
             continue
         mirror = _judged(evidence, plane, stride=evidence.stride(LOOK))
-        if mirror.verdict.excess <= PROMISING:
+        if thorough and mirror.verdict.excess <= PROMISING:
             plane = _settle(evidence, plane, sources=3000, outer=6)
             if known(plane.normal) or any(_same_plane(plane, p) for p in found):
                 continue
@@ -186,11 +194,16 @@ def _same_plane(a: Plane, b: Plane) -> bool:
 
 
 def axis_directions(evidence: Evidence) -> Array:
-    """Directions [D, 3] worth trying as rotation axes: minima of the whitened spectrum, and the principal axes."""
+    """Directions [D, 3] worth trying as rotation axes: principal axes and minima of the whitened spectrum that the
+    moments do not rule out; an axis of any order is one of a prime order too."""
     white = whitened(evidence.moments)
-    minima = [local_minima(axis_misses(white, k), count=n).directions for k, n in ((2, 4), (3, 5), (5, 3))]
+    misses = {k: axis_misses(white, k) for k in (2, 3, 5, 7)}
     principal = np.linalg.eigh(evidence.moments.covariance)[1].T
-    return np.concatenate([principal, *minima])
+    nearest = np.abs(half_sphere() @ principal.T).argmax(axis=0)
+    lowest = np.min([m[nearest] for m in misses.values()], axis=0)
+    minima = [local_minima(misses[k], count=n) for k, n in ((2, 4), (3, 5), (5, 3))]
+    likely = [c.directions[c.misses < AXIS_HOPELESS] for c in minima]
+    return np.concatenate([principal[lowest < AXIS_HOPELESS], *likely])
 
 
 def turns_about(evidence: Evidence, direction: Array, center: Array) -> Turn | None:

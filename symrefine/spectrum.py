@@ -6,6 +6,7 @@ m not 0 mod k for a k-fold axis, l odd for the inversion. Candidates are the loc
 judges them.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -19,6 +20,10 @@ from symrefine.moments import Moments, transformed
 DIRECTIONS = 1500
 # Eigenvalues of the covariance are bounded from below by this fraction of the largest before whitening.
 THIN = 1e-3
+# A candidate that would flip more than this fraction of the energy is kept only among the first few: true mirrors of the
+# catalogued objects stay below 0.05.
+HOPELESS = 0.12
+LEAST = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,31 +61,38 @@ def _neighbours() -> Array:
     return np.argpartition(-closeness, 8, axis=1)[:, :8]
 
 
-def energies(moments: Moments) -> tuple[dict[int, Array], float]:
-    """Energy by degree and order about every direction: {l: [DIRECTIONS, 2l+1]}, and the total over l >= 1."""
-    whole = {l: c[0] for l, c in harmonic_moments(moments).items()}
-    by_degree = {l: ((_table(l) @ c.T) ** 2).sum(axis=-1) for l, c in whole.items()}
-    return by_degree, sum(float((c**2).sum()) for c in whole.values())
+def _energy(moments: Moments, kept: Callable[[int, Array], Array]) -> tuple[Array, float]:
+    """Energy about every direction [DIRECTIONS] of the orders m that `kept(l, m)` selects, and the total over l >= 1."""
+    energy, total = np.zeros(DIRECTIONS), 0.0
+    for l, c in harmonic_moments(moments).items():
+        rows = _rows(l, tuple(np.flatnonzero(kept(l, np.arange(-l, l + 1))).tolist()))
+        energy += ((rows.reshape(-1, 2 * l + 1) @ c[0].T) ** 2).reshape(DIRECTIONS, -1).sum(axis=1)
+        total += float((c[0] ** 2).sum())
+    return energy, max(total, 1e-300)
+
+
+@lru_cache(maxsize=128)
+def _rows(l: int, chosen: tuple[int, ...]) -> Array:
+    return read_only(_table(l)[:, list(chosen)])
 
 
 def mirror_misses(moments: Moments) -> Array:
     """Fraction of the energy that the mirror normal to each direction flips, [DIRECTIONS]."""
-    by_degree, total = energies(moments)
-    flipped = sum(e[:, (l + np.arange(-l, l + 1)) % 2 == 1].sum(axis=1) for l, e in by_degree.items())
-    return np.asarray(flipped) / max(total, 1e-300)
+    flipped, total = _energy(moments, lambda l, m: (l + m) % 2 == 1)
+    return flipped / total
 
 
 def axis_misses(moments: Moments, order: int) -> Array:
     """Fraction of the energy that a rotation by 2 pi / order about each direction does not keep, [DIRECTIONS]."""
-    by_degree, total = energies(moments)
-    moved = sum(e[:, np.arange(-l, l + 1) % order != 0].sum(axis=1) for l, e in by_degree.items())
-    return np.asarray(moved) / max(total, 1e-300)
+    moved, total = _energy(moments, lambda _, m: m % order != 0)
+    return moved / total
 
 
 def local_minima(misses: Array, *, count: int) -> Candidates:
     """The deepest local minima over the sphere, `count` at most, each moved to the vertex of a fitted paraboloid."""
     lowest = np.flatnonzero(misses <= misses[_neighbours()].min(axis=1))
     lowest = lowest[np.argsort(misses[lowest], kind="stable")][:count]
+    lowest = np.array([i for rank, i in enumerate(lowest) if rank < LEAST or misses[i] < HOPELESS])
     directions = np.array([_vertex(misses, i) for i in lowest]).reshape(-1, 3)
     return Candidates(directions=directions, misses=misses[lowest])
 

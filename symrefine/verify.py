@@ -17,7 +17,7 @@ from symrefine.matching import LocalPlanes
 # the first two, a mailbox's flag the last) and every true one stays below; the closest are a posed ant and a camera.
 LIMITS = (0.28, 1.0, 1.4, 1.75)
 TOLERANCE = 0.02
-DISCS = 6
+DISCS = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
