@@ -1,0 +1,77 @@
+"""The command line: parse, call, print, exit. Only it prints and exits; `--help` imports nothing heavy."""
+
+import io
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from typing import NoReturn
+
+from symrefine.errors import SymrefineError
+
+BAD_INPUT, BUG, INTERRUPTED, BROKEN_PIPE = 2, 70, 130, 141
+
+
+def main(argv: Sequence[str] | None = None) -> NoReturn:
+    """The command `symrefine`: end the process with the status of `invoke`."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a file name may hold what the terminal cannot show
+    sys.exit(invoke(sys.argv[1:] if argv is None else argv))
+
+
+def invoke(argv: Sequence[str]) -> int:
+    """Run one command line and return its exit status; whatever goes wrong becomes one line on stderr."""
+    try:
+        status = _command(argv)
+        sys.stdout.flush()
+        return status
+    except SymrefineError as error:
+        return _refuse(str(error), BAD_INPUT)
+    except KeyboardInterrupt:
+        return _refuse("interrupted", INTERRUPTED)
+    except BrokenPipeError:
+        _discard_stdout()
+        return BROKEN_PIPE
+    except OSError as error:
+        _discard_stdout()
+        return _refuse(": ".join(str(part) for part in (error.filename, error.strerror or error) if part), BAD_INPUT)
+    except MemoryError:
+        return _refuse("out of memory: use a smaller cloud or mesh", BAD_INPUT)
+    except Exception as error:  # noqa: BLE001 - a bug, told in one line unless asked for more
+        return _bug(error)
+
+
+def _command(argv: Sequence[str]) -> int:
+    from symrefine.cli.parser import parse
+
+    try:
+        args = parse(argv)
+    except SystemExit as done:  # argparse after --help and --version
+        return int(done.code or 0)
+    status: int = args.run(args)
+    return status
+
+
+def _refuse(message: str, status: int) -> int:
+    print("symrefine:", " ".join(message.split()), file=sys.stderr)
+    return status
+
+
+def _bug(error: Exception) -> int:
+    if os.environ.get("SYMREFINE_DEBUG", "0") not in ("", "0"):
+        traceback.print_exception(error)
+    kind = type(error).__name__
+    return _refuse(
+        f"internal error, please report it: {kind}: {error} (SYMREFINE_DEBUG=1 shows where it happened)", BUG
+    )
+
+
+def _discard_stdout() -> None:
+    """Send what is still to be flushed nowhere: nobody reads it, or it cannot be written."""
+    try:
+        target = sys.stdout.fileno()
+    except OSError:
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, target)
+    os.close(nowhere)

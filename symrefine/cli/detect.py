@@ -1,0 +1,123 @@
+"""`symrefine detect`: one file in, its symmetries out."""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from symrefine.cli.outputs import STDOUT, Writer, check_outputs, note, say, text_writer, waiting, write_all
+from symrefine.cli.values import add_detection_options, natural, positive
+
+if TYPE_CHECKING:
+    from symrefine.detect import Detection
+    from symrefine.shape import Shape
+
+NAME = "detect"
+HELP = "find the planes, axes and point group of a mesh or cloud"
+DESCRIPTION = (
+    "Find the mirror planes, rotation axes and point group of the mesh or point cloud in PATH (.ply .stl .obj .off "
+    ".glb .gltf .pcd .xyz .csv .txt .npy .npz). Prints a table; lengths are in the units of the file, misses in "
+    "percent of the bounding-box diagonal."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", metavar="PATH", help="mesh or point cloud")
+    parser.add_argument("--json", metavar="FILE|-", help="write the whole report as JSON; - is stdout, with no table")
+    parser.add_argument("--bop", metavar="FILE", help="put the symmetries into this models_info.json of BOP")
+    parser.add_argument(
+        "--bop-id", type=natural, default=1, metavar="N", help="number of the object there (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--bop-scale",
+        type=positive,
+        default=1.0,
+        metavar="X",
+        help="millimetres in one unit of PATH: 1000 if it is in metres (default: 1)",
+    )
+    add_detection_options(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Detect, write the files that were asked for, print."""
+    check_outputs({"--json": args.json, "--bop": args.bop}, [Path(args.path)])
+    if args.bop is not None:
+        _check_bop(Path(args.bop))
+    with waiting("detecting"):
+        shape, detection, record = examine(args.path, args.measure, args.tolerance, args.seed)
+        writers = _writers(args, shape, detection, record)
+        write_all(writers)
+    if args.bop is not None:
+        _note_limits(detection)
+    if args.json == STDOUT:
+        from symrefine.export.files import json_text
+
+        say(json_text(record))
+    else:
+        _print(record, list(writers))
+    return 0
+
+
+def examine(
+    path: str, measure: Literal["surface", "solid"] | None, tolerance: float, seed: int
+) -> tuple["Shape", "Detection", dict[str, Any]]:
+    """Shape, detection and JSON record of a file."""
+    from symrefine.detect import detect
+    from symrefine.export.records import detection_record
+    from symrefine.load import load
+
+    start = time.perf_counter()
+    shape = load(path, measure=measure)
+    load_s = time.perf_counter() - start
+    detection = detect(shape, tolerance=tolerance, seed=seed)
+    options = {"tolerance": tolerance, "measure": measure, "seed": seed}
+    record = detection_record(detection, shape, options=options, load_s=load_s)
+    return shape, detection, record
+
+
+def _check_bop(path: Path) -> None:
+    from symrefine.export.bop import read_models_info
+
+    read_models_info(path)
+
+
+def _writers(
+    args: argparse.Namespace, shape: "Shape", detection: "Detection", record: dict[str, Any]
+) -> dict[str, Writer]:
+    writers: dict[str, Writer] = {}
+    if args.json not in (None, STDOUT):
+        from symrefine.export.files import json_text
+
+        writers[args.json] = text_writer(json_text(record))
+    if args.bop is not None:
+        writers[args.bop] = _bop_writer(args, shape, detection)
+    return writers
+
+
+def _bop_writer(args: argparse.Namespace, shape: "Shape", detection: "Detection") -> Writer:
+    from symrefine.export.bop import bop_entry, bop_text
+
+    entry = bop_entry(detection, shape, scale=args.bop_scale)
+    return text_writer(bop_text(Path(args.bop), args.bop_id, entry))
+
+
+def _note_limits(detection: "Detection") -> None:
+    from symrefine.export.bop import bop_limits
+
+    limits = bop_limits(detection)
+    if limits:
+        note(limits)
+
+
+def _print(record: dict[str, Any], written: list[str]) -> None:
+    from symrefine.cli.outputs import console
+    from symrefine.cli.tables import detection_lines
+
+    out = console()
+    for line in detection_lines(record):
+        out.print(line, soft_wrap=isinstance(line, str))
+    for name in written:
+        out.print(f"wrote {name}", soft_wrap=True)
+    sys.stdout.flush()

@@ -1,0 +1,107 @@
+"""Where results go: files checked before the work and written all or none, stdout, tables, a sign of life."""
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from symrefine.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+STDOUT = "-"
+
+# A writer fills the file it is given.
+Writer = Callable[[Path], None]
+
+
+def check_outputs(outputs: dict[str, str | None], inputs: list[Path]) -> None:
+    """Refuse, before any work, outputs that cannot be written, that are inputs, or that are one file twice.
+
+    Args:
+        outputs: option to path, None where the option is not given; only `--json` may be "-", for stdout.
+    """
+    from symrefine.export.files import check_target
+
+    taken = {path.resolve(): "the input" for path in inputs}
+    for option, name in outputs.items():
+        if name is None or (option == "--json" and name == STDOUT):
+            continue
+        if name == STDOUT:
+            raise InputError(f"{option}: expected a file; only --json writes to stdout")
+        path = Path(name)
+        check_target(path)
+        if path.is_file() or not path.exists():
+            if path.resolve() in taken:
+                raise InputError(f"{option} {name}: is the same file as {taken[path.resolve()]}; name another one")
+            taken[path.resolve()] = f"that of {option}"
+
+
+def write_all(writers: dict[str, Writer]) -> None:
+    """Write every file under another name first; only when all are complete does each take its place."""
+    from symrefine.export.files import replacing
+
+    with ExitStack() as stack:
+        for name, write in writers.items():
+            write(stack.enter_context(replacing(Path(name))))
+
+
+def text_writer(text: str) -> Writer:
+    """A writer of text in UTF-8, lines ending as they are."""
+    return lambda path: _write_text(path, text)
+
+
+def _write_text(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="")
+
+
+def say(text: str) -> None:
+    """Write to stdout as it stands."""
+    sys.stdout.write(text)
+
+
+def note(text: str) -> None:
+    """Tell something on stderr, where it is in nobody's way."""
+    print("symrefine: note:", text, file=sys.stderr)
+
+
+def console(*, stderr: bool = False) -> "Console":
+    """A console that colours nothing for files, pipes and NO_COLOR, and takes every text literally."""
+    from rich.console import Console
+
+    stream = sys.stderr if stderr else sys.stdout
+    plain = "NO_COLOR" in os.environ
+    return Console(
+        file=stream,
+        color_system=None if plain else "auto",
+        width=None if stream.isatty() else 160,
+        highlight=False,
+        markup=False,
+        emoji=False,
+    )
+
+
+@contextmanager
+def waiting(text: str) -> Iterator[None]:
+    """A sign of life on stderr while something takes long, if somebody looks on."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    with console(stderr=True).status(text):
+        yield
+
+
+@contextmanager
+def progress(text: str, total: int, done: int) -> Iterator[Callable[[], None]]:
+    """A bar on stderr, if somebody looks on; the function it gives is called after each step."""
+    if not sys.stderr.isatty():
+        yield lambda: None
+        return
+    from rich.progress import Progress
+
+    with Progress(console=console(stderr=True)) as bar:
+        task = bar.add_task(text, total=total, completed=done)
+        yield lambda: bar.advance(task)

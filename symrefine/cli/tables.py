@@ -1,0 +1,155 @@
+"""What a person reads: the JSON record of a detection, or the rows of a batch, as tables."""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from rich.table import Table
+
+Record = dict[str, Any]
+
+_RESIDUALS = ("mean", "p95", "max")
+_WORDS = ("kind", "group")
+_NAMED = {
+    "Cs": "one mirror plane",
+    "Ci": "an inversion centre",
+    "Cinfv": "surface of revolution",
+    "Dinfh": "surface of revolution, mirror-symmetric along its axis",
+    "Kh": "sphere",
+}
+_TUPLES = {
+    "none": "span space: no mirror plane and no axis is possible",
+    "plane": "lie in one plane: a mirror plane at most",
+    "axis": "lie on one line: an axis, with or without mirror planes through it",
+    "vanish": "all vanish: several axes, an inversion, or a mirror across an axis",
+}
+_KINDS = {"axis": "rotation", "improper": "rotoreflection"}
+
+
+def detection_lines(record: Record) -> Iterator[Table | str]:
+    """Everything a table can say about one detection."""
+    yield f"{record['source']}: {headline(record)}"
+    yield f"n-tuples {_TUPLES[record['ntuples']['kind']]}"
+    centre = ", ".join(_length(x, record) for x in record["center"])
+    yield f"centre ({centre}), diagonal {_length(record['diagonal'], record)} in units of the file"
+    if record["planes"]:
+        yield ""
+        yield _planes(record)
+    if record["axes"]:
+        yield ""
+        yield _axes(record)
+    if record["near_misses"]:
+        yield ""
+        yield _near_misses(record)
+    yield ""
+    if record["planes"] or record["axes"] or record["near_misses"]:
+        yield "Offsets in units of the file, misses in % of the diagonal; axes go through the centre."
+    if record["near_misses"]:
+        yield "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows."
+    yield f"{_count(record['iterations'], 'iteration')}, {sum(record['timings'].values()):.2f} s"
+
+
+def headline(record: Record) -> str:
+    """The group and what it means, or why there is none."""
+    name = record["point_group"]
+    if record["undetermined"]:
+        return f"undetermined: {record['undetermined']}"
+    if name == "C1":
+        return f"C1, no symmetry at tolerance {100 * record['tolerance']:g} %"
+    return f"{name}, {_NAMED.get(name) or _elements(record)}; tolerance {100 * record['tolerance']:g} %"
+
+
+def _elements(record: Record) -> str:
+    turns = [a for a in record["axes"] if not a["improper"]]
+    parts = [
+        _count(len(record["planes"]), "mirror plane"),
+        _count(len(turns), "rotation axis", "rotation axes"),
+        _count(len(record["axes"]) - len(turns), "rotoreflection axis", "rotoreflection axes"),
+        "inversion centre" if record["inversion"] else "",
+    ]
+    return ", ".join(p for p in parts if p and not p.startswith("0 "))
+
+
+def batch_table(rows: Sequence[Record]) -> Table:
+    """A line for each file of a batch."""
+    table = _table("file", "group", "planes", "axes", "worst p95", "confidence", "seconds")
+    for row in rows:
+        if row["error"] is not None:
+            table.add_row(row["file"], f"failed: {row['error']}")
+            continue
+        elements = row["planes"] + row["axes"]
+        table.add_row(
+            row["file"],
+            "undetermined" if row["undetermined"] else row["point_group"],
+            str(len(row["planes"])),
+            str(len(row["axes"])),
+            _percent(max(e["residual"]["p95"] for e in elements)) if elements else "",
+            f"{min(e['confidence'] for e in elements):.2f}" if elements else "",
+            f"{sum(row['timings'].values()):.2f}",
+        )
+    return table
+
+
+def _planes(record: Record) -> Table:
+    table = _table("mirror planes: normal", "offset", *_RESIDUALS, "confidence")
+    for p in record["planes"]:
+        offset = _length(p["offset"], record)
+        table.add_row(_direction(p["normal"]), offset, *_misses(p), f"{p['confidence']:.2f}")
+    return table
+
+
+def _axes(record: Record) -> Table:
+    table = _table("axes: direction", "kind", *_RESIDUALS, "confidence")
+    for a in record["axes"]:
+        kind = _turn("improper" if a["improper"] else "axis", a["order"])
+        table.add_row(_direction(a["direction"]), kind, *_misses(a), f"{a['confidence']:.2f}")
+    return table
+
+
+def _near_misses(record: Record) -> Table:
+    table = _table("near misses: direction", "offset", "kind", *_RESIDUALS, "x limit")
+    for m in record["near_misses"]:
+        mirror = m["kind"] == "plane"
+        offset = sum(n * x for n, x in zip(m["direction"], m["point"], strict=True))
+        where = _length(offset, record) if mirror else ""
+        kind = "mirror" if mirror else _turn(m["kind"], m["order"])
+        table.add_row(_direction(m["direction"]), where, kind, *_misses(m), f"{m['excess']:.2f}")
+    return table
+
+
+def _table(first: str, *others: str) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
+    table.add_column(first, overflow="fold")
+    for name in others:
+        title = f"{name} %" if name in (*_RESIDUALS, "worst p95") else name
+        table.add_column(title, overflow="fold", justify="left" if name in _WORDS else "right")
+    return table
+
+
+def _misses(element: Record) -> list[str]:
+    return [_percent(element["residual"][name]) for name in _RESIDUALS]
+
+
+def _percent(fraction: float) -> str:
+    return f"{100 * fraction:.3f}"
+
+
+def _direction(values: list[float]) -> str:
+    return " ".join(f"{round(v, 4) + 0.0:7.4f}" for v in values)
+
+
+def _length(value: float, record: Record) -> str:
+    """A length to about a hundred-thousandth of the diagonal."""
+    diagonal = record["diagonal"]
+    if not 1e-4 < diagonal < 1e6:
+        return f"{value:.4e}"
+    places = max(0, 4 - math.floor(math.log10(diagonal)))
+    return f"{round(value, places) + 0.0:.{places}f}"
+
+
+def _turn(kind: str, order: int | str) -> str:
+    return "revolution" if order == "inf" else f"{_KINDS[kind]} {order}"
+
+
+def _count(number: int, noun: str, plural: str = "") -> str:
+    return f"{number} {noun if number == 1 else plural or noun + 's'}"

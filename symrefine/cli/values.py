@@ -1,0 +1,76 @@
+"""Values of options: text to numbers, with errors that say what is right; options that several commands share."""
+
+import argparse
+import math
+
+# The same as `verify.TOLERANCE` and the range that `detect` takes, which are too heavy to import for `--help`.
+TOLERANCE, LARGEST_TOLERANCE = 0.02, 0.2
+
+
+def add_detection_options(parser: argparse.ArgumentParser) -> None:
+    """The options that decide the result of a detection."""
+    parser.add_argument(
+        "--tolerance",
+        type=tolerance,
+        default=TOLERANCE,
+        metavar="REL",
+        help="largest miss that counts as symmetric, as a fraction of the bounding-box diagonal (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--measure",
+        choices=("surface", "solid"),
+        help="what carries the mass of a mesh: its surface (the default) or the solid inside; not for clouds",
+    )
+    parser.add_argument(
+        "--seed", type=natural, default=0, metavar="N", help="of the random samples (default: %(default)s)"
+    )
+
+
+def tolerance(text: str) -> float:
+    """A fraction of the diagonal."""
+    value = _float(text)
+    if not 0.0 < value <= LARGEST_TOLERANCE:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a fraction of the bounding-box diagonal in (0, {LARGEST_TOLERANCE}], such as 0.02"
+        )
+    return value
+
+
+def positive(text: str) -> float:
+    """A finite number above 0."""
+    value = _float(text)
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
+    return value
+
+
+def natural(text: str) -> int:
+    """An integer from 0."""
+    if not (text.isascii() and text.isdigit()):
+        raise argparse.ArgumentTypeError(f"{text!r} is not an integer from 0")
+    return int(text)
+
+
+def count(text: str) -> int:
+    """An integer from 1."""
+    if not (text.isascii() and text.isdigit() and int(text)):
+        raise argparse.ArgumentTypeError(f"{text!r} is not an integer from 1")
+    return int(text)
+
+
+def orders(text: str) -> tuple[int, ...]:
+    """Orders of moments, separated by commas."""
+    try:
+        return tuple(count(part.strip()) for part in text.split(","))
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a list of moment orders from 1, separated by commas, such as 2,3"
+        ) from None
+
+
+def _float(text: str) -> float:
+    """NaN for what is not a number, which no range contains."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan

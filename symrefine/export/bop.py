@@ -1,0 +1,191 @@
+"""`models_info.json` of the BOP benchmark of 6-D pose: size of a model and the rotations that leave it unchanged.
+
+Lengths are millimetres in the frame of the model file. A discrete symmetry is a rigid motion, 16 numbers row by row; a
+continuous one is an axis and a point on it. `bop_toolkit` multiplies every discrete one with every turn about every
+continuous axis; it adds the identity itself. Only proper rotations belong here: nobody can turn a thing into its mirror
+image. Some readers know less than the format: MegaPose takes axes along +x, +y or +z through the origin, FoundationPose
+the first axis only. So an axis points to its positive side, its offset is the point nearest to the origin, and what is
+within a thousandth (of the diameter, or in radians) of the axes of the file is put on them: a tenth of the step at
+which `bop_toolkit` samples a continuous symmetry.
+"""
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial import ConvexHull
+from scipy.spatial.distance import cdist
+
+from symrefine.detect import Detection
+from symrefine.errors import InputError
+from symrefine.export.files import check_target, json_text, replacing
+from symrefine.export.records import toward_positive
+from symrefine.geometry import Array, Isometry, frame_with_z, rotation, unit
+from symrefine.groups import PointGroup
+from symrefine.shape import Shape
+
+Entry = dict[str, Any]
+
+# Points whose distances are formed at once.
+_BLOCK = 512
+_SNAP = 1e-3
+# Below this fraction of the diameter, or of a unit vector, components are rounding.
+_ROUNDING = 1e-10
+
+
+def bop_entry(detection: Detection, shape: Shape, *, scale: float = 1.0) -> Entry:
+    """The entry of one object: diameter, bounding box and symmetries.
+
+    Args:
+        scale: millimetres in one unit of the shape: 1 if the file is in millimetres, 1000 if in metres.
+
+    Raises:
+        InputError: the scale is not positive, or the detection was undecided.
+    """
+    if not (math.isfinite(scale) and scale > 0.0):
+        raise InputError(f"scale is {scale}; expected millimetres in one unit of the file, such as 1 or 1000")
+    if detection.undetermined:
+        raise InputError(f"{shape.source}: no symmetries to export: {detection.undetermined}")
+    low, high = shape.points.min(axis=0) * scale, shape.points.max(axis=0) * scale
+    size = diameter(shape.points) * scale
+    entry: Entry = {"diameter": size}
+    entry |= {f"min_{k}": float(v) for k, v in zip("xyz", low, strict=True)}
+    entry |= {f"size_{k}": float(v) for k, v in zip("xyz", high - low, strict=True)}
+    placed = _Placed(group=_snapped(detection.group.proper_subgroup()), center=detection.center * scale, size=size)
+    discrete, continuous = placed.discrete(), placed.continuous()
+    entry |= {"symmetries_discrete": discrete} if discrete else {}
+    entry |= {"symmetries_continuous": continuous} if continuous else {}
+    return entry
+
+
+def bop_limits(detection: Detection) -> str:
+    """What of the symmetry the format cannot hold, as a sentence; empty where it holds all.
+
+    No reader multiplies turns about one continuous axis with those about another, so the three axes that stand for a
+    sphere, as its users write it (DOPE #249), give only a part of its rotations.
+    """
+    if detection.group.proper_subgroup().name != "K":
+        return ""
+    return "BOP cannot express a sphere: three continuous axes through its centre stand for all the others"
+
+
+def bop_text(path: Path, number: int, entry: Entry) -> str:
+    """Content of `path` with the entry of object `number` put in or replaced, all others as they are.
+
+    Raises:
+        InputError: the number is negative, or the file is not a `models_info.json`.
+    """
+    if number < 0:
+        raise InputError(f"object id is {number}; expected an integer from 0")
+    return json_text(read_models_info(path) | {str(number): entry})
+
+
+def write_bop(path: Path, number: int, entry: Entry) -> None:
+    """Put the entry of object `number` into the file `path`, which need not exist yet.
+
+    Raises:
+        InputError: the number is negative, or the file is not a `models_info.json` or cannot be written.
+    """
+    check_target(path)
+    text = bop_text(path, number, entry)
+    with replacing(path) as draft:
+        draft.write_text(text, encoding="utf-8")
+
+
+def read_models_info(path: Path) -> dict[str, Entry]:
+    """The entries of an existing file; none if there is no file.
+
+    Raises:
+        InputError: not JSON, or not an object for each object.
+    """
+    if not path.is_file():
+        return {}
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_constant)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: is there already and is no models_info.json: {error}") from None
+    if not isinstance(data, dict) or not all(isinstance(entry, dict) for entry in data.values()):
+        raise InputError(f"{path}: is there already and is no models_info.json: expected an object for each object id")
+    return data
+
+
+def diameter(points: Array) -> float:
+    """Largest distance between two of the points [N, n], exactly; only corners of the convex hull can have it."""
+    corners = _corners(points)
+    radius = np.linalg.norm(corners - corners.mean(axis=0), axis=1)
+    order = np.argsort(-radius)
+    corners, radius = corners[order], radius[order]
+    best = 0.0
+    for start in range(0, len(corners), _BLOCK):
+        if 2.0 * radius[start] <= best:
+            break
+        best = max(best, float(cdist(corners[start : start + _BLOCK], corners[start:]).max()))
+    return best
+
+
+def _corners(points: Array) -> Array:
+    """Corners of the convex hull, in the space that the points span: planar and straight sets have no volume."""
+    centred = points - points.mean(axis=0)
+    _, sizes, rows = np.linalg.svd(centred, full_matrices=False)
+    spanned = centred @ rows[sizes > 1e-9 * sizes[0]].T
+    if spanned.shape[1] == 1:
+        return points[[int(spanned.argmin()), int(spanned.argmax())]]
+    return np.asarray(points[ConvexHull(spanned).vertices])
+
+
+def _no_constant(name: str) -> float:
+    raise ValueError(f"{name} is not JSON")
+
+
+def _snapped(group: PointGroup) -> PointGroup:
+    """The group turned onto the coordinate axes if it is that close: its z first, then x and y."""
+    z = group.frame[2]
+    if np.abs(np.round(z) - z).max() > _SNAP:
+        return group
+    z = np.round(z)
+    x = unit(group.frame[0] - (group.frame[0] @ z) * z)
+    frame = np.stack([x, np.cross(z, x), z])
+    nearest = np.round(frame)
+    return PointGroup(name=group.name, frame=nearest if np.abs(nearest - frame).max() <= _SNAP else frame)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Placed:
+    """Proper rotations about a centre, lengths in millimetres, with the diameter of what they turn."""
+
+    group: PointGroup
+    center: Array
+    size: float
+
+    def discrete(self) -> list[list[float]]:
+        """Rotations other than the identity, to be multiplied with the continuous ones."""
+        if self.group.is_finite:
+            return [self._motion(r) for r in self.group.operations()[1:]]
+        if self.group.symbol.family != "D":
+            return []
+        across = frame_with_z(self.group.continuous_axes()[0])[1]
+        return [self._motion(rotation(across, math.pi))]
+
+    def continuous(self) -> list[Entry]:
+        """Axes about which every angle is a symmetry; three for a sphere, see `bop_limits`."""
+        axes = np.eye(3) if self.group.name == "K" else self.group.continuous_axes()
+        return [self._turning(toward_positive(u) * u) for u in axes]
+
+    def _turning(self, axis: Array) -> Entry:
+        foot = self.center - (self.center @ axis) * axis
+        return {"axis": _clean(axis, _ROUNDING), "offset": _clean(foot, _SNAP * self.size)}
+
+    def _motion(self, matrix: Array) -> list[float]:
+        """The rotation about the centre as a 4 x 4 matrix, row by row."""
+        center = np.array(_clean(self.center, _SNAP * self.size))
+        shift = _clean(Isometry.about(center, matrix).shift, _ROUNDING * self.size)
+        rows = [[*_clean(row, _ROUNDING), t] for row, t in zip(matrix, shift, strict=True)]
+        return [x for row in [*rows, [0.0, 0.0, 0.0, 1.0]] for x in row]
+
+
+def _clean(values: Array, negligible: float) -> list[float]:
+    """The values, 0 where they are negligible."""
+    return [0.0 if abs(v) <= negligible else float(v) for v in values]

@@ -1,0 +1,127 @@
+"""A detection as plain data: numbers, strings, lists and dictionaries, in one order and with one sign."""
+
+import math
+from collections.abc import Iterable, Mapping
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from symrefine.detect import Detection, FoundAxis, FoundPlane, NearMiss
+from symrefine.geometry import Array
+from symrefine.shape import Shape
+from symrefine.verify import Deviation
+
+SCHEMA = "symrefine.detection/1"
+
+Record = dict[str, Any]
+
+# Digits that are kept: what lies beyond differs between processors.
+_DIGITS = 12
+
+
+def detection_record(
+    detection: Detection, shape: Shape, *, options: Mapping[str, Any], load_s: float | None = None
+) -> Record:
+    """What `symrefine detect --json` writes; equal input, options and version give equal records but for `timings`.
+
+    Args:
+        shape: what it was detected on.
+        options: what the caller chose, for the record.
+        load_s: seconds that reading took, for `timings`.
+
+    Returns:
+        Lengths in input units, misses as fractions of `diagonal`; a direction and a normal point to the side where
+        their first large component is positive. An infinite number is "inf".
+    """
+    d, scale = detection, detection.diagonal
+    timings = ({} if load_s is None else {"load": load_s}) | dict(d.timings)
+    return {
+        "schema": SCHEMA,
+        "source": shape.source,
+        "version": version("symrefine"),
+        "options": dict(options),
+        "measure": shape.measure,
+        "point_group": d.point_group,
+        "center": _numbers(d.center, scale),
+        "diagonal": number(d.diagonal),
+        "tolerance": number(d.tolerance),
+        "planes": [_plane(p, scale) for p in d.planes],
+        "axes": [_axis(a, scale) for a in d.axes],
+        "inversion": bool(d.inversion),
+        "near_misses": [_near_miss(m, scale) for m in d.near_misses],
+        "iterations": int(d.iterations),
+        "undetermined": d.undetermined or None,
+        "ntuples": {
+            "kind": d.tuples.kind,
+            "singular_values": _numbers(d.tuples.singular_values, 1.0),
+            "significance": _numbers(d.tuples.significance, 1.0),
+        },
+        "timings": {stage: round(seconds, 6) for stage, seconds in timings.items()},
+    }
+
+
+def toward_positive(direction: Array) -> float:
+    """The sign, +1.0 or -1.0, that makes the first component of at least a tenth of the largest positive."""
+    size = np.abs(direction)
+    return math.copysign(1.0, direction[int(np.argmax(size >= 0.1 * size.max()))])
+
+
+def number(value: float, scale: float = 0.0) -> float | str | None:
+    """A finite number to 12 significant digits, 0 if it is nothing beside `scale`; "inf", "-inf", or None for NaN."""
+    value = float(value)
+    if math.isnan(value):
+        return None
+    if math.isinf(value):
+        return str(value)
+    return 0.0 if abs(value) <= 10.0**-_DIGITS * scale else float(f"{value:.{_DIGITS}g}")
+
+
+def _numbers(values: Iterable[float], scale: float) -> list[float | str | None]:
+    return [number(v, scale) for v in values]
+
+
+def _direction(direction: Array) -> list[float | str | None]:
+    return _numbers(toward_positive(direction) * direction, 1.0)
+
+
+def _plane(found: FoundPlane, scale: float) -> Record:
+    sign = toward_positive(found.plane.normal)
+    return {
+        "normal": _direction(found.plane.normal),
+        "offset": number(sign * found.plane.offset, scale),
+        "residual": _residual(found.residual),
+        "confidence": number(found.confidence),
+    }
+
+
+def _axis(found: FoundAxis, scale: float) -> Record:
+    return {
+        "direction": _direction(found.axis.direction),
+        "point": _numbers(found.axis.point, scale),
+        "order": _order(found.order),
+        "improper": bool(found.improper),
+        "residual": _residual(found.residual),
+        "confidence": number(found.confidence),
+    }
+
+
+def _near_miss(miss: NearMiss, scale: float) -> Record:
+    """`excess` is the miss over what the tolerance allows, the worst of its statistics."""
+    return {
+        "kind": miss.kind,
+        "direction": _direction(miss.direction),
+        "point": _numbers(miss.point, scale),
+        "order": _order(miss.order),
+        "residual": _residual(miss.residual),
+        "excess": number(miss.excess),
+    }
+
+
+def _order(order: float) -> int | str:
+    return "inf" if math.isinf(order) else round(order)
+
+
+def _residual(deviation: Deviation) -> Record:
+    names = ("mean", "p95", "p99", "max")
+    return {name: number(getattr(deviation, name), 1.0) for name in names}

@@ -1,0 +1,473 @@
+"""The command line: what it prints, writes, refuses, and the status it ends with."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import symrefine
+from symrefine.cli import batch, invoke, values
+from symrefine.cli.tables import batch_table, detection_lines, headline
+from symrefine.detect import detect
+from symrefine.errors import InputError
+from symrefine.ntuples import notation
+from symrefine.ntuples.affine import derive_affine
+from symrefine.ntuples.derive import derive
+from symrefine.shape import Shape
+from symrefine.verify import TOLERANCE
+
+CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+SIDES = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]]
+SIDES += [[2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+Run = Callable[..., tuple[int, str, str]]
+
+
+def ply(points: Any, faces: Any) -> str:
+    head = f"ply\nformat ascii 1.0\nelement vertex {len(points)}\nproperty double x\nproperty double y\n"
+    head += f"property double z\nelement face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    rows = [" ".join(map(repr, map(float, p))) for p in points] + [f"3 {a} {b} {c}" for a, b, c in faces]
+    return head + "\n".join(rows) + "\n"
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("data")
+    (folder / "box.ply").write_text(ply(CUBE * [3.0, 2.0, 1.0], SIDES))
+    (folder / "scalene.ply").write_text(
+        ply([[0, 0, 0], [7, 0, 0], [1.5, 3, 0], [4, -1, 2]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    )
+    cloud = np.random.default_rng(0).standard_normal((2000, 3)) ** 3
+    (folder / "cloud.xyz").write_text("\n".join(" ".join(map(repr, map(float, p))) for p in cloud))
+    (folder / "cut.ply").write_text(ply(CUBE, SIDES)[:-20])
+    return folder
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
+    """Status, stdout and stderr of a command line in this process."""
+
+    def call(*argv: object) -> tuple[int, str, str]:
+        status = invoke([str(a) for a in argv])
+        return status, *capsys.readouterr()
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def record(data: Path) -> dict[str, Any]:
+    """The report of the box, made once."""
+    path = data / "box.json"
+    assert invoke(["detect", str(data / "box.ply"), "--json", str(path)]) == 0
+    content: dict[str, Any] = json.loads(path.read_text(), parse_constant=not_json)
+    return content
+
+
+def not_json(name: str) -> float:
+    raise AssertionError(f"{name} is not JSON")
+
+
+def command(*argv: object, **settings: Any) -> "subprocess.CompletedProcess[str]":
+    """A process of its own, as a shell starts it."""
+    environment = os.environ | settings.pop("env", {})
+    line = [sys.executable, "-m", "symrefine", *map(str, argv)]
+    return subprocess.run(line, capture_output=True, text=True, env=environment, timeout=100, check=False, **settings)
+
+
+def assert_refused(result: tuple[int, str, str], *parts: str) -> None:
+    status, out, err = result
+    assert (status, out) == (2, "")
+    assert err.startswith("symrefine: ")
+    assert err.count("\n") == 1, "one line"
+    for part in parts:
+        assert part in err
+
+
+# --- detect -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_report_holds_what_was_agreed(record: dict[str, Any], data: Path) -> None:
+    assert record["schema"] == "symrefine.detection/1"
+    assert record["source"] == str(data / "box.ply")
+    assert record["version"] == symrefine.__version__
+    assert record["options"] == {"tolerance": 0.02, "measure": None, "seed": 0}
+    assert (record["point_group"], record["inversion"], record["undetermined"]) == ("D2h", True, None)
+    assert len(record["center"]) == 3
+    assert len(record["planes"]) == len(record["axes"]) == 3
+    keys = "center diagonal tolerance planes axes near_misses iterations ntuples timings"
+    assert set(keys.split()) <= set(record)
+    assert set(record["planes"][0]) == {"normal", "offset", "residual", "confidence"}
+    assert set(record["axes"][0]) == {"direction", "point", "order", "improper", "residual", "confidence"}
+    assert set(record["ntuples"]) == {"kind", "singular_values", "significance"}
+
+
+def test_stdout_holds_the_json_alone_and_equal_runs_give_equal_bytes(data: Path, record: dict[str, Any]) -> None:
+    done = command("detect", data / "box.ply", "--json", "-")
+    assert (done.returncode, done.stderr) == (0, "")
+    again = json.loads(done.stdout, parse_constant=not_json)
+    assert list(again) == list(record)
+
+    def without_timings(text: str) -> list[str]:
+        return [line for line in text.splitlines() if not line.startswith('  "timings": ')]
+
+    assert without_timings(done.stdout) == without_timings((data / "box.json").read_text())
+
+
+def test_the_table_says_it_in_words_and_without_colour(run: Run, data: Path) -> None:
+    status, out, err = run("detect", data / "box.ply")
+    assert (status, err) == (0, "")
+    assert "D2h, 3 mirror planes, 3 rotation axes, inversion centre; tolerance 2 %" in out
+    assert "mirror planes: normal" in out
+    assert "% of the diagonal" in out
+    assert "\x1b" not in out
+
+
+def test_no_symmetry_is_an_answer(run: Run, data: Path) -> None:
+    status, out, _ = run("detect", data / "scalene.ply")
+    assert status == 0
+    assert "C1, no symmetry at tolerance 2 %" in out
+
+
+def test_files_are_written_together(run: Run, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    report, bop = tmp_path / "a.json", tmp_path / "b.json"
+    line = ("detect", data / "box.ply", "--json", report, "--bop", bop, "--bop-id", 7)
+    status, out, err = run(*line, "--bop-scale", 10)
+    assert (status, err) == (0, "")
+    assert f"wrote {report}" in out
+    assert f"wrote {bop}" in out
+    entry = json.loads(bop.read_text())["7"]
+    assert (entry["size_x"], len(entry["symmetries_discrete"])) == (60.0, 3)
+
+    def fail(path: Path) -> None:
+        path.write_text("half")
+        raise OSError(28, "No space left on device", str(path))
+
+    before = {path: path.read_text() for path in tmp_path.iterdir()}
+    monkeypatch.setattr("symrefine.cli.detect._bop_writer", lambda *_: fail)
+    assert_refused(run(*line, "--seed", 1), "No space left on device")
+    assert {path: path.read_text() for path in tmp_path.iterdir()} == before
+
+
+def test_the_tolerance_of_the_command_line_is_that_of_detect() -> None:
+    assert values.TOLERANCE == TOLERANCE
+    with pytest.raises(InputError, match=f"0, {values.LARGEST_TOLERANCE}]"):
+        detect(Shape(points=CUBE), tolerance=values.LARGEST_TOLERANCE + 1e-9)
+
+
+# --- what is refused --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("line", "part"),
+    [
+        ("", "COMMAND"),
+        ("detec box.ply", "detect"),
+        ("--frobnicate", "COMMAND"),
+        ("detect", "PATH"),
+        ("detect box.ply --frobnicate", "--frobnicate"),
+        ("detect box.ply --tol 0.1", "--tol"),
+        ("detect box.ply scalene.ply", "scalene.ply"),
+        ("detect nothing.ply", "nothing.ply: no such file"),
+        ("detect .", "is a directory"),
+        ("detect box.json", "unknown suffix"),
+        ("detect cut.ply", "cut.ply"),
+        ("detect box.ply --tolerance x", "--tolerance: 'x' is not a fraction of the bounding-box diagonal in (0, 0.2]"),
+        ("detect box.ply --tolerance 2%", "such as 0.02"),
+        ("detect box.ply --tolerance 0", "--tolerance"),
+        ("detect box.ply --tolerance -1", "--tolerance"),
+        ("detect box.ply --tolerance 0.5", "(0, 0.2]"),
+        ("detect box.ply --tolerance nan", "--tolerance"),
+        ("detect box.ply --measure volume", "surface"),
+        ("detect cloud.xyz --measure solid", "clouds"),
+        ("detect box.ply --seed -1", "--seed: '-1' is not an integer from 0"),
+        ("detect box.ply --bop m.json --bop-scale 0", "--bop-scale"),
+        ("detect box.ply --bop m.json --bop-scale inf", "--bop-scale"),
+        ("detect box.ply --bop m.json --bop-id x", "--bop-id"),
+        ("detect box.ply --bop -", "only --json writes to stdout"),
+        ("detect box.ply --bop scalene.ply", "no models_info.json"),
+        ("detect box.ply --json nowhere/a.json", "there is no directory nowhere"),
+        ("detect box.ply --json .", "is a directory"),
+        ("detect box.ply --json box.ply", "same file as the input"),
+        ("detect box.ply --json ./x.json --bop x.json", "same file as that of --json"),
+        ("detect ''", "is a directory"),
+        ("derive --orders 2,3", "--dim"),
+        ("derive --dim 3", "--orders"),
+        ("derive --dim 3 --orders 2;3", "--orders: '2;3' is not a list of moment orders"),
+        ("derive --dim 3 --orders 2,0", "such as 2,3"),
+        ("derive --dim 1 --orders 2,3", "dim 1"),
+        ("derive --dim 3 --orders 2,3 --latex --python", "choose one"),
+        ("derive --dim 3 --orders 2,3 --latex --json -", "choose one"),
+        ("derive --dim 3 --orders 2,3 --json nowhere/a.json", "there is no directory nowhere"),
+        ("derive --dim 9 --orders 9,9", "monomials"),
+        ("batch nowhere", "no such directory"),
+        ("batch box.ply", "is a file, not a directory"),
+        ("batch empty", "no mesh and no cloud"),
+        ("batch . --workers 0", "--workers"),
+        ("batch . --tolerance 3", "--tolerance"),
+        ("batch . --out box.ply", "same file as the input"),
+        ("batch . --out box.json", "holds no rows"),
+        ("batch . --out -", "expected a file"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(
+    run: Run, data: Path, record: dict[str, Any], monkeypatch: pytest.MonkeyPatch, line: str, part: str
+) -> None:
+    assert record
+    (data / "empty").mkdir(exist_ok=True)
+    monkeypatch.chdir(data)
+    before = {path.name: path.stat().st_mtime_ns for path in data.iterdir()}
+    assert_refused(run(*(word.strip("'") for word in line.split())), part)
+    assert {path.name: path.stat().st_mtime_ns for path in data.iterdir()} == before
+
+
+def test_names_that_break_lines_do_not_break_the_line(run: Run) -> None:
+    assert_refused(run("detect", "a\nb.ply"), "a b.ply: no such file")
+    assert_refused(run("detect", "x" * 5000 + ".ply"), "name too long")
+
+
+@pytest.mark.parametrize("debug", ["", "1"])
+def test_a_bug_is_one_line_unless_asked_for_more(run: Run, monkeypatch: pytest.MonkeyPatch, debug: str) -> None:
+    monkeypatch.setenv("SYMREFINE_DEBUG", debug)
+    monkeypatch.setattr("symrefine.cli.derive._basis", lambda _: 1 // 0)
+    status, out, err = run("derive", "--dim", 3, "--orders", 3)
+    assert (status, out) == (70, "")
+    assert "symrefine: internal error, please report it: ZeroDivisionError" in err
+    assert ("Traceback" in err) is bool(debug)
+    assert debug or err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "text"),
+    [(KeyboardInterrupt(), 130, "interrupted"), (MemoryError(), 2, "out of memory"), (BrokenPipeError(), 141, "")],
+)
+def test_endings_from_outside(
+    run: Run, monkeypatch: pytest.MonkeyPatch, error: BaseException, status: int, text: str
+) -> None:
+    def end(_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("symrefine.cli.derive._basis", end)
+    monkeypatch.setattr("symrefine.cli._discard_stdout", lambda: None)
+    got, out, err = run("derive", "--dim", 3, "--orders", 3)
+    assert (got, out) == (status, "")
+    assert text in err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes and devices of POSIX")
+def test_a_reader_that_leaves_is_no_error() -> None:
+    read, write = os.pipe()
+    os.close(read)
+    line = [sys.executable, "-m", "symrefine", "derive", "--dim", "3", "--orders", "4,5"]
+    done = subprocess.run(line, stdout=write, stderr=subprocess.PIPE, timeout=60, check=False)
+    os.close(write)
+    assert (done.returncode, done.stderr) == (141, b"")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_a_full_disk_is_told() -> None:
+    line = [sys.executable, "-m", "symrefine", "derive", "--dim", "3", "--orders", "3"]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(line, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (2, "symrefine: No space left on device\n")
+
+
+# --- help, version, package -------------------------------------------------------------------------------------------
+
+
+def test_help_names_the_commands() -> None:
+    done = command("--help")
+    assert (done.returncode, done.stderr) == (0, "")
+    for name in ("detect", "derive", "batch"):
+        assert f"    {name} " in done.stdout
+        assert invoke([name, "--help"]) == 0
+    assert command("--version").stdout == f"symrefine {symrefine.__version__}\n"
+
+
+def test_the_package_is_imported_without_its_parts() -> None:
+    source = """
+import sys, symrefine
+assert not {"numpy", "rich", "importlib.metadata"} & set(sys.modules), "heavy"
+import symrefine.detect, symrefine.load.ply
+assert callable(symrefine.detect) and callable(symrefine.load), "hidden by the modules of the same name"
+from symrefine.detect import Detection
+assert symrefine.Detection is Detection
+assert all(getattr(symrefine, name) is not None for name in symrefine.__all__)
+assert set(symrefine.__all__) <= set(dir(symrefine))
+try:
+    symrefine.nothing
+except AttributeError as error:
+    assert "no attribute 'nothing'" in str(error)
+"""
+    done = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+# --- tables -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changes", "part"),
+    [
+        ({"point_group": "Kh"}, "Kh, sphere"),
+        ({"point_group": "Cinfv"}, "Cinfv, surface of revolution"),
+        ({"point_group": "Cs", "planes": [{}], "axes": []}, "Cs, one mirror plane"),
+        ({"point_group": "C1", "tolerance": 0.005}, "C1, no symmetry at tolerance 0.5 %"),
+        ({"point_group": "C1", "undetermined": "40 points are too few"}, "undetermined: 40 points are too few"),
+        ({"point_group": "S4", "planes": [], "inversion": False, "axes": [{"improper": False}, {"improper": True}]},
+         "S4, 1 rotation axis, 1 rotoreflection axis; tolerance 2 %"),
+    ],
+)  # fmt: skip
+def test_headlines(record: dict[str, Any], changes: dict[str, Any], part: str) -> None:
+    assert headline(record | changes).startswith(part)
+
+
+def test_every_kind_of_element_has_its_line(record: dict[str, Any]) -> None:
+    from symrefine.cli.outputs import console
+
+    axis = record["axes"][0]
+    miss = {k: axis[k] for k in ("direction", "point", "residual")} | {"excess": 1.25}
+    changes = {
+        "axes": [axis | {"order": "inf"}, axis | {"order": 8, "improper": True}],
+        "near_misses": [miss | {"kind": k, "order": 3} for k in ("plane", "axis", "improper")],
+    }
+    out = console()
+    with out.capture() as capture:
+        for line in detection_lines(record | changes):
+            out.print(line)
+        out.print(batch_table([record | {"file": "[b].ply", "error": None}, {"file": "c.ply", "error": "no [/b]"}]))
+    text = capture.get()
+    for part in ("revolution", "rotoreflection 8", " mirror ", "rotation 3", "1.25", "[b].ply", "failed: no [/b]"):
+        assert part in text
+
+
+def test_no_color_means_no_escape_codes(monkeypatch: pytest.MonkeyPatch) -> None:
+    from symrefine.cli.outputs import console
+
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.setenv("NO_COLOR", "1")
+    out = console()
+    with out.capture() as capture:
+        out.print(batch_table([]))
+    assert "\x1b" not in capture.get()
+
+
+# --- derive -----------------------------------------------------------------------------------------------------------
+
+
+def test_derive_writes_every_form(run: Run, tmp_path: Path) -> None:
+    basis = derive(3, (2, 3))
+    line = ("derive", "--dim", 3, "--orders", "3,2")
+    assert run(*line) == (0, notation.to_text(basis), "")
+    assert run(*line, "--json", "-") == (0, notation.to_json(basis), "")
+    assert run(*line, "--latex", "--json", tmp_path / "a.json") == (0, notation.to_latex(basis), "")
+    assert (tmp_path / "a.json").read_text() == notation.to_json(basis)
+    assert run(*line, "--python") == (0, notation.to_python(basis), "")
+    assert run("derive", "--dim", 2, "--orders", "2,3", "--affine")[1] == notation.to_text(derive_affine(2, (2, 3)))
+    assert "no n-tuples" in run("derive", "--dim", 3, "--orders", 2)[1]
+
+
+# --- batch ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def shelf(data: Path, tmp_path: Path) -> Path:
+    """Two good files, a bad one, one in a directory, and things that are not for us."""
+    folder = tmp_path / "shelf"
+    (folder / "deep").mkdir(parents=True)
+    for source, name in (
+        ("box.ply", "b.ply"),
+        ("scalene.ply", "A.PLY"),
+        ("cut.ply", "c.ply"),
+        ("box.ply", "deep/d.ply"),
+    ):
+        (folder / name).write_bytes((data / source).read_bytes())
+    for name in ("notes.md", ".hidden.ply"):
+        (folder / name).write_text("not for us")
+    return folder
+
+
+def rows(path: Path) -> list[dict[str, Any]]:
+    return [json.loads(line, parse_constant=not_json) for line in path.read_text().splitlines()]
+
+
+def test_batch_goes_on_and_resumes(run: Run, shelf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = tmp_path / "rows.jsonl"
+    status, table, err = run("batch", shelf, "--out", out)
+    assert (status, err) == (1, "")
+    assert "3 files, 1 failed" in table
+    first = rows(out)
+    assert [(r["file"], r["error"] is None, r.get("point_group")) for r in first] == [
+        ("A.PLY", True, "C1"),
+        ("b.ply", True, "D2h"),
+        ("c.ply", False, None),
+    ]
+    assert "c.ply" in first[2]["error"]
+
+    done: list[str] = []
+    monkeypatch.setattr(batch, "examine_file", counting(batch.examine_file, done))
+    assert "3 files, 3 done before, 1 failed" in run("batch", shelf, "--out", out)[1]
+    assert done == []
+    out.write_bytes(out.read_bytes()[:-30])
+    status, _, err = run("batch", shelf, "--out", out)
+    assert "the last row is incomplete" in err
+    assert done == ["c.ply"]
+    assert rows(out) == first
+    (shelf / "A.PLY").write_bytes((shelf / "b.ply").read_bytes())
+    assert run("batch", shelf, "--out", out)[0] == 1
+    assert done == ["c.ply", "A.PLY"]
+    assert rows(out)[-1]["point_group"] == "D2h"
+    (shelf / "c.ply").unlink()
+    assert run("batch", shelf, "--out", out, "--seed", 1)[0] == 0
+    assert done == ["c.ply", "A.PLY", "A.PLY", "b.ply"]
+
+
+def counting(function: Callable[[batch.Job], batch.Row], done: list[str]) -> Callable[[batch.Job], batch.Row]:
+    def counted(job: batch.Job) -> batch.Row:
+        done.append(job[1])
+        return function(job)
+
+    return counted
+
+
+def test_batch_without_out_writes_nothing(
+    run: Run, shelf: Path, record: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(shelf)
+    monkeypatch.setattr("symrefine.cli.detect.examine", lambda *_, **__: (None, None, record))
+    before = sorted(shelf.rglob("*"))
+    status, table, _ = run("batch", ".", "--recursive")
+    assert status == 0
+    assert "deep/d.ply" in table
+    assert "4 files" in table
+    assert sorted(shelf.rglob("*")) == before
+
+
+def test_a_bug_in_one_file_does_not_end_the_others(
+    run: Run, shelf: Path, tmp_path: Path, record: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def examine(path: str, **_: object) -> tuple[None, None, dict[str, Any]]:
+        if path.endswith("b.ply"):
+            raise ZeroDivisionError("oh")
+        return None, None, record
+
+    monkeypatch.setattr("symrefine.cli.detect.examine", examine)
+    assert run("batch", shelf, "--out", tmp_path / "r.jsonl")[0] == 1
+    errors = {r["file"]: r["error"] for r in rows(tmp_path / "r.jsonl")}
+    assert errors["A.PLY"] is errors["c.ply"] is None
+    assert errors["b.ply"].endswith("internal error: ZeroDivisionError: oh")
+
+
+def test_workers_give_the_same_rows(shelf: Path, tmp_path: Path) -> None:
+    done = command("batch", shelf, "--workers", 2, "--out", tmp_path / "r.jsonl")
+    assert (done.returncode, done.stderr) == (1, "")
+    assert {(r["file"], r.get("point_group")) for r in rows(tmp_path / "r.jsonl")} == {
+        ("A.PLY", "C1"),
+        ("b.ply", "D2h"),
+        ("c.ply", None),
+    }
