@@ -50,7 +50,9 @@ def tube(path: Array, radius: float, segments: int = 24) -> Mesh:
 def _grid_faces(rings: int, segments: int) -> Index:
     i, j = np.meshgrid(np.arange(rings - 1), np.arange(segments), indexing="ij")
     a, b = i * segments + j, i * segments + (j + 1) % segments
-    return np.concatenate([np.stack([a, b, b + segments], -1), np.stack([a, b + segments, a + segments], -1)]).reshape(-1, 3)
+    return np.concatenate([np.stack([a, b, b + segments], -1), np.stack([a, b + segments, a + segments], -1)]).reshape(
+        -1, 3
+    )
 
 
 def join(parts: Sequence[Mesh]) -> Shape:
@@ -90,18 +92,32 @@ def mug() -> Shape:
 
 def bottle() -> Shape:
     """Bottle, a surface of revolution: Cinfv."""
-    profile = [(0, 0), (0.3, 0), (0.32, 0.03), (0.32, 0.7), (0.27, 0.85), (0.12, 1.0), (0.1, 1.05), (0.1, 1.3), (0.12, 1.3), (0.12, 1.36), (0, 1.36)]
+    profile = [
+        (0, 0),
+        (0.3, 0),
+        (0.32, 0.03),
+        (0.32, 0.7),
+        (0.27, 0.85),
+        (0.12, 1.0),
+        (0.1, 1.05),
+        (0.1, 1.3),
+        (0.12, 1.3),
+        (0.12, 1.36),
+        (0, 1.36),
+    ]
     return join([revolve(profile, 180)])
 
 
 def asymmetric() -> Shape:
     """Four boxes with nothing in common: C1."""
-    return join([
-        box((0, 0, 0), (1.0, 0.6, 0.2)),
-        box((0.35, 0.2, 0.25), (0.15, 0.12, 0.4), 0.3),
-        box((-0.3, -0.1, 0.2), (0.2, 0.3, 0.3), 0.7),
-        box((0.1, -0.4, 0.05), (0.4, 0.3, 0.1), 0.2),
-    ])
+    return join(
+        [
+            box((0, 0, 0), (1.0, 0.6, 0.2)),
+            box((0.35, 0.2, 0.25), (0.15, 0.12, 0.4), 0.3),
+            box((-0.3, -0.1, 0.2), (0.2, 0.3, 0.3), 0.7),
+            box((0.1, -0.4, 0.05), (0.4, 0.3, 0.1), 0.2),
+        ]
+    )
 
 
 def sample(shape: Shape, count: int, noise_rel: float, rng: np.random.Generator) -> Array:

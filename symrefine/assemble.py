@@ -111,9 +111,8 @@ def _best_bundle(evidence: Evidence) -> Bundle | None:
     directions = np.linalg.eigh(evidence.moments.covariance)[1].T if vanish else _axis_open(evidence)
     found: list[Bundle] = []
     for direction in _apart(directions, APART_RAD):
-        for bundle in axis_bundle(evidence, direction, mirrored=not vanish):
-            if bundle.verdict.excess <= (ROUND_LIMIT if math.isinf(bundle.fold) else 1.0):
-                found.append(bundle)
+        bundles = axis_bundle(evidence, direction, mirrored=not vanish)
+        found += [b for b in bundles if b.verdict.excess <= (ROUND_LIMIT if math.isinf(b.fold) else 1.0)]
         if any(b.verdict.bulk <= EXACT for b in found):
             break
     limit = _limit(b.verdict for b in found)
@@ -146,7 +145,7 @@ def _from_parts(evidence: Evidence) -> Assembly:
     while True:
         group, held, turns = _closed(held, turns)
         done = _group_of(evidence, group, held, turns, near)
-        if all(e.verdict.excess <= 1.0 for e in done.elements) or not held and not turns:
+        if all(e.verdict.excess <= 1.0 for e in done.elements) or not (held or turns):
             return done
         near.extend(_mirror_element(m) for m in _without_worst(held, turns))
 
@@ -172,13 +171,13 @@ def _group_of(
 
 def _without_worst(held: list[Mirror], turns: list[Turn]) -> list[Mirror]:
     """Take the least convincing element out of the lists; a mirror so taken is returned."""
-    worst_turn = max(turns, key=lambda t: t.verdict.bulk, default=None)
-    worst_mirror = max(held, key=lambda m: m.verdict.bulk, default=None)
-    if worst_mirror is None or (worst_turn is not None and worst_turn.verdict.bulk >= worst_mirror.verdict.bulk):
-        turns.remove(worst_turn)
+    everything: list[Mirror | Turn] = [*held, *turns]
+    worst = max(everything, key=lambda e: e.verdict.bulk)
+    if isinstance(worst, Turn):
+        turns.remove(worst)
         return []
-    held.remove(worst_mirror)
-    return [worst_mirror]
+    held.remove(worst)
+    return [worst]
 
 
 def _mirror_group(evidence: Evidence) -> tuple[list[Mirror], list[Element], PointGroup]:
@@ -261,10 +260,12 @@ def _with_improper(evidence: Evidence, group: PointGroup, verdicts: list[Verdict
     """The group with the inversion, or the rotoreflection of its main axis, where they hold as well as the rest."""
     limit = _limit(verdicts)
     axes = [(u, int(2 * k)) for u, k in group.rotation_axes()[:1] if k <= 12]
-    improper = [(u, k) for u, k in axes if _holds(improper_about(evidence, u, center, k), limit)] if not _has_all(group) else []
-    inversion = group.has_inversion or _holds(
-        improper_about(evidence, np.array([0.0, 0.0, 1.0]), center, 2), limit
+    improper = (
+        [(u, k) for u, k in axes if _holds(improper_about(evidence, u, center, k), limit)]
+        if not _has_all(group)
+        else []
     )
+    inversion = group.has_inversion or _holds(improper_about(evidence, np.array([0.0, 0.0, 1.0]), center, 2), limit)
     if inversion == group.has_inversion and not improper:
         return group
     try:

@@ -1,4 +1,4 @@
-"""From moments to an axis, its fold b, and the b start angles, in closed form; then to a frame polished on the moments."""
+"""From moments to an axis, its fold b and the start angles in closed form, then to a frame polished on the moments."""
 
 from dataclasses import dataclass
 from typing import Literal

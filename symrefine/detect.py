@@ -1,4 +1,4 @@
-"""Detection, the story on one page: shape -> moments -> n-tuples and spectrum -> candidates -> refine -> judge -> group."""
+"""Detection on one page: shape -> moments -> n-tuples and spectrum -> candidates -> refine -> judge -> group."""
 
 import time
 from collections.abc import Iterator
@@ -135,7 +135,7 @@ def detect(
         DegenerateShapeError: the points do not spread.
     """
     if not isinstance(shape, Shape):
-        shape = Shape(points=shape, weights=weights, normals=normals)
+        shape = Shape.of(shape, weights=weights, normals=normals)
     elif weights is not None or normals is not None:
         raise InputError("weights and normals belong to the Shape; give them there, or give an array of points")
     if shape.dim != 3:
@@ -167,26 +167,20 @@ class Clock:
         self.seconds[stage] = time.perf_counter() - start
 
 
-def gather(
-    shape: Shape, moments: Moments, vectors: NTuples, tolerance: float, rng: np.random.Generator
-) -> Evidence:
+def gather(shape: Shape, moments: Moments, vectors: NTuples, tolerance: float, rng: np.random.Generator) -> Evidence:
     """Moments, n-tuples and a judged cloud of local planes, in normalised units."""
     from scipy.spatial import cKDTree
 
-    if shape.faces is not None:
-        points, normals, _ = sample_surface(shape, SAMPLES, rng)
-        weights = np.full(len(points), 1.0 / len(points))
-    else:
-        points, normals = shape.points, shape.normals
-        weights = np.ones(len(points)) if shape.weights is None else shape.weights
+    points, normals, weights = _cloud(shape, rng)
     local = (points - moments.center) / moments.scale
-    tree = None if normals is not None else cKDTree(local, balanced_tree=False, compact_nodes=False)
-    cloud = local_planes(local, LOCAL_PLANES, rng, normals=normals, tree=tree)
+    exact = shape.faces is not None
+    tree = None if exact else cKDTree(local, balanced_tree=False, compact_nodes=False)
+    cloud = local_planes(local, LOCAL_PLANES, rng, normals=normals, exact=exact, tree=tree)
     diagonal = tight_diagonal(cloud.points)
 
     @cache
     def closer() -> Judge:
-        dense = local_planes(local, CLOSER_PLANES, rng, normals=normals, tree=tree)
+        dense = local_planes(local, CLOSER_PLANES, rng, normals=normals, exact=exact, tree=tree)
         return make_judge(dense, diagonal, tolerance)
 
     return Evidence(
@@ -198,6 +192,14 @@ def gather(
         judge=make_judge(cloud, diagonal, tolerance),
         closer=closer,
     )
+
+
+def _cloud(shape: Shape, rng: np.random.Generator) -> tuple[Array, Array | None, Array]:
+    """Points, normals and weights: samples with exact normals for a mesh, the points themselves otherwise."""
+    if shape.faces is not None:
+        points, normals, _ = sample_surface(shape, SAMPLES, rng)
+        return points, normals, np.ones(len(points))
+    return shape.points, shape.normals, np.ones(len(shape.points)) if shape.weights is None else shape.weights
 
 
 def _report(

@@ -6,11 +6,12 @@ direction u ~ -u; `T_a_b` maps b to a.
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 
 
 def read_only(values: ArrayLike) -> Array:
@@ -139,7 +140,7 @@ class Isometry:
 
 @lru_cache(maxsize=1)
 def _box_trials() -> tuple[Array, Array, Array]:
-    """Probe directions [P, 3], frames [F, 3, 3] and small turns [4, T, 3, 3] for `tight_diagonal`; fixed once and for all."""
+    """Probe directions [P, 3], frames [F, 3, 3] and small turns [4, T, 3, 3] for `tight_diagonal`; fixed for good."""
     rng = np.random.default_rng(0)
     probes = unit(rng.standard_normal((120, 3)))
     frames = np.stack([np.eye(3), *(random_orthogonal(rng) for _ in range(200))])

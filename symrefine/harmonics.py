@@ -41,7 +41,8 @@ def _power(a: Polynomial, n: int) -> Polynomial:
 
 def _azimuthal(m: int) -> Polynomial:
     """Re or Im of (x + i y)^|m|, the sine part for negative m."""
-    real, imaginary = {(0, 0, 0): 1.0}, {}
+    real: Polynomial = {(0, 0, 0): 1.0}
+    imaginary: Polynomial = {}
     for _ in range(abs(m)):
         real, imaginary = (
             _add((1.0, _times(real, X)), (-1.0, _times(imaginary, Y))),
@@ -132,7 +133,7 @@ def turn(l: int, axis: int, angle_rad: Array) -> Array:
 
 
 def to_polar_axis(l: int, directions: Array) -> Array:
-    """D_l of the rotations R_y(-theta) R_z(-phi) [N, 2l+1, 2l+1] that turn each unit direction [N, 3] into the z axis."""
+    """D_l of the rotations R_y(-theta) R_z(-phi) [N, 2l+1, 2l+1] that turn unit directions [N, 3] into the z axis."""
     theta = np.arctan2(np.hypot(directions[..., 0], directions[..., 1]), directions[..., 2])
     phi = np.arctan2(directions[..., 1], directions[..., 0])
     return turn(l, 1, -theta) @ turn(l, 2, -phi)

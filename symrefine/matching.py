@@ -57,12 +57,17 @@ def smallest_eigenvectors(covariance: Array) -> tuple[Array, Array]:
     return np.clip(values, 0.0, None), vectors[:, :, 0]
 
 
-def _fit(points: Array, neighbours: Index) -> tuple[Array, Array, Array]:
+def _fit(points: Array, neighbours: Index, normals: Array | None = None) -> tuple[Array, Array, Array]:
+    """Means [M, 3], normals [M, 3] and variances [M, 3] (across first) of neighbourhoods [M, k]."""
     near = points[neighbours]
     mean = near.mean(axis=1)
     spread = near - mean[:, None]
-    values, normals = smallest_eigenvectors(spread.transpose(0, 2, 1) @ spread / near.shape[1])
-    return mean, normals, values
+    covariance = spread.transpose(0, 2, 1) @ spread / near.shape[1]
+    values, fitted = smallest_eigenvectors(covariance)
+    if normals is None:
+        return mean, fitted, values
+    across = np.einsum("ni,nij,nj->n", normals, covariance, normals)
+    return mean, normals, np.column_stack([across, values[:, 1:]])
 
 
 def choose_neighbours(points: Array, tree: Any, rng: np.random.Generator, *, probes: int = 200) -> int:
@@ -73,7 +78,9 @@ def choose_neighbours(points: Array, tree: Any, rng: np.random.Generator, *, pro
     pick = rng.choice(len(points), min(probes, len(points)), replace=False)
     distance, near = tree.query(points[pick], k=min(NEIGHBOURS[-1], len(points) // 8 + 4))
     widths = np.median(distance, axis=0)
-    sizes = [k for k in NEIGHBOURS if k <= near.shape[1] and widths[k - 1] < WIDEST] or [min(NEIGHBOURS[0], near.shape[1])]
+    sizes = [k for k in NEIGHBOURS if k <= near.shape[1] and widths[k - 1] < WIDEST] or [
+        min(NEIGHBOURS[0], near.shape[1])
+    ]
     ratios = []
     for k in sizes:
         _, _, values = _fit(points, near[:, :k])
@@ -96,27 +103,37 @@ def _blob_flatness(k: int) -> float:
 
 
 def local_planes(
-    points: Array, count: int, rng: np.random.Generator, *, normals: Array | None = None, tree: Any = None
+    points: Array,
+    count: int,
+    rng: np.random.Generator,
+    *,
+    normals: Array | None = None,
+    exact: bool = False,
+    tree: Any = None,
 ) -> LocalPlanes:
     """Local planes at `count` of the points [N, 3], from neighbourhoods among all of them.
 
-    Where exact `normals` are given (samples of a mesh), points and normals are taken as they are.
+    Args:
+        normals: [N, 3] unit normals to use instead of fitted ones, any sign.
+        exact: points and normals are free of noise (samples of a mesh) and are taken as they are.
+        tree: kd-tree over `points`, if there is one already.
     """
     from scipy.spatial import cKDTree
 
     pick = np.sort(rng.choice(len(points), min(count, len(points)), replace=False))
-    if normals is not None:
-        chosen, n, redundancy = points[pick], normals[pick], 1.0
-        thickness = flatness = np.zeros(len(pick))
+    chosen, redundancy = points[pick], 1.0
+    thickness: Array = np.zeros(len(pick))
+    flatness: Array = np.zeros(len(pick))
+    if normals is not None and exact:
+        n = normals[pick]
     else:
         tree = cKDTree(points, balanced_tree=False, compact_nodes=False) if tree is None else tree
         k = choose_neighbours(points, tree, rng)
         redundancy = max(1.0, k * len(pick) / len(points))
-        _, near = tree.query(points[pick], k=k, workers=-1)
-        mean, n, values = _fit(points, near)
-        chosen = points[pick] - n * np.einsum("ij,ij->i", n, points[pick] - mean)[:, None]
-        thickness = np.sqrt(values[:, 0])
-        flatness = _flatness(values)
+        _, near = tree.query(chosen, k=k, workers=-1)
+        mean, n, values = _fit(points, near, None if normals is None else normals[pick])
+        chosen = chosen - n * np.einsum("ij,ij->i", n, chosen - mean)[:, None]
+        thickness, flatness = np.sqrt(values[:, 0]), _flatness(values)
     own = cKDTree(chosen)
     distance, _ = own.query(chosen, k=min(6, len(chosen)))
     return LocalPlanes(

@@ -139,10 +139,12 @@ def central_moments(points: Array, weights: Array, order: int, *, parts: int = 0
     local -= mean
     scale = float(np.sqrt(weights @ np.einsum("ij,ij->i", local, local) / mass))
     if not scale > 0:
-        raise DegenerateShapeError("the points do not spread about their mean; a shape needs at least two distinct points")
+        raise DegenerateShapeError(
+            "the points do not spread about their mean; a shape needs at least two distinct points"
+        )
     local /= scale
     w = weights / mass
-    replicates = np.empty((0, len(exponents(points.shape[1], order))))
+    replicates: Array = np.empty((0, len(exponents(points.shape[1], order))))
     if parts:
         values, replicates = _jackknife(local, w, order, parts)
     else:
@@ -176,7 +178,9 @@ def _solid_moments(nodes: Array, weights: Array, shape: Shape, order: int) -> Mo
     values = recentred(raw / raw[0], 3, order)
     spread = values[tensor_index(3, 2, order)].trace()
     if not spread > 0:
-        raise DegenerateShapeError(f"{shape.source}: the mesh is not a closed, consistently oriented surface; use the surface measure")
+        raise DegenerateShapeError(
+            f"{shape.source}: the mesh is not a closed, consistently oriented surface; use the surface measure"
+        )
     scale = float(np.sqrt(spread))
     return Moments(
         dim=3,
@@ -222,12 +226,13 @@ def recentred(values: Array, dim: int, order: int) -> Array:
     """Moments [K] of unit mass about their own mean instead of the origin."""
     rows, kept, shifts, coefficients = _binomials(dim, order)
     powers = monomials(values[None, 1 : dim + 1], order)[:, 0]
-    return np.bincount(rows, coefficients * values[kept] * powers[shifts], minlength=len(values))
+    terms = coefficients * values[kept] * powers[shifts]
+    return np.bincount(rows, terms, minlength=len(values)).astype(np.float64)
 
 
 def transformed(moments: Moments, matrix: Array) -> Moments:
     """Moments of the points after x -> matrix x about the centre, in the same units; replicates are left behind."""
-    values = np.empty_like(moments.values)
+    values: Array = np.empty_like(moments.values)
     for degree in range(moments.order + 1):
         tensor = moments.tensor(degree)
         for _ in range(degree):

@@ -61,7 +61,8 @@ def mesh_nodes(shape: Shape, degree: int) -> tuple[Array, Array]:
 def sample_surface(shape: Shape, count: int, rng: np.random.Generator) -> tuple[Array, Array, Index]:
     """`count` stratified samples of the surface with their face normals.
 
-    One uniform draw in each of `count` equal strips of the cumulated area: unbiased like independent samples, with less noise.
+    One uniform draw in each of `count` equal strips of the cumulated area: unbiased like independent samples, but with
+    less noise.
 
     Returns: points [count, 3], unit normals [count, 3], face index [count].
     """

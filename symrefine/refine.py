@@ -6,6 +6,7 @@ unknowns, a lone plane three, a full group up to six. Everything is in normalise
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -18,7 +19,7 @@ MAX_OUTER = 10
 # An outer iteration that moves nothing by more than this (radians, RMS radii) ends the refinement ...
 SETTLED = 2e-4
 # ... and so does one that moves everything by less than this share of what the noise leaves uncertain.
-WITHIN_NOISE = 0.15
+WITHIN_NOISE = 0.22
 # Largest ratio of successive steps that is extrapolated.
 LONGEST = 0.7
 
@@ -124,7 +125,8 @@ def refine(
 
     Yields: the start as iterate 0, then one iterate for each outer iteration, the last one when the change settles.
     """
-    state, step, last = start, np.inf, np.zeros(6)
+    state, step = start, np.inf
+    last: Array = np.zeros(6)
     yield Iterate(
         index=0, state=state, theta_rad=np.zeros(0), step=np.inf, covariance=np.zeros((6, 6)), cost=np.nan, inliers=0,
         pairs=(), inner_steps=0, converged=False,
@@ -136,7 +138,9 @@ def refine(
         theta = _thetas(grams, state) if state.bundle else np.zeros(0)
         solution = _solve(grams, state, float(np.median(theta)) if theta.size else 0.0)
         weight = max(sum(float(p.weights.sum()) for p in pairs), 1e-300)
-        covariance = cloud.redundancy * solution.cost / weight * np.linalg.pinv(solution.hessian, rcond=1e-9, hermitian=True)
+        covariance = (
+            cloud.redundancy * solution.cost / weight * np.linalg.pinv(solution.hessian, rcond=1e-9, hermitian=True)
+        )
         noise = WITHIN_NOISE * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
         settled = bool(np.abs(solution.x).max() < SETTLED or np.all(np.abs(solution.x) <= noise))
         last = solution.x * _remaining(solution.x, last)
@@ -179,7 +183,7 @@ def _thetas(grams: Array, state: Framed) -> Array:
     """Gauss-Newton over theta for every plane through the axis, each on its 3x3 Gram matrix."""
     angles = np.pi * np.arange(len(grams)) / len(grams)
     small = [axis_gram(g, state.frame, state.center) for g in grams]
-    found = [minimise(lambda t, g=g: theta_model(g, t), np.array([a])).x[0] for g, a in zip(small, angles, strict=True)]
+    found = [minimise(partial(theta_model, g), np.array([a])).x[0] for g, a in zip(small, angles, strict=True)]
     return np.array(found) - angles
 
 

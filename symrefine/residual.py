@@ -1,11 +1,12 @@
 """The symmetry residual in casadi, and the Gram matrices that make its cost independent of the number of points.
 
-`e = (T x_u - x_l).n_l` (paper, section "Boosting b-plane symmetry by axial symmetry"), with T any isometry x -> g x + t:
-the reflection across a plane there, a rotation or a rotoreflection just as well. With correspondences held fixed, e is
-linear in the thirteen numbers phi = (g, t, 1), so the weighted cost of any number of pairs is phi' G phi with one Gram
-matrix G [13, 13], and every constraint on T (a plane through an axis, a free plane, all operations of a group sharing
-one frame) is a matter of how phi depends on its unknowns; casadi differentiates that. For the planes through an axis
-the form shrinks to 3x3 in (1, cos 2 theta, sin 2 theta) (method.md, section 4). The only module that imports casadi.
+`e = (T x_u - x_l).n_l` (paper, section "Boosting b-plane symmetry by axial symmetry"), with T any isometry
+x -> g x + t: the reflection across a plane there, a rotation or a rotoreflection just as well. With correspondences
+held fixed, e is linear in the thirteen numbers phi = (g, t, 1), so the weighted cost of any number of pairs is
+phi' G phi with one Gram matrix G [13, 13], and every constraint on T (a plane through an axis, a free plane, all
+operations of a group sharing one frame) is a matter of how phi depends on its unknowns; casadi differentiates that. For
+the planes through an axis the form shrinks to 3x3 in (1, cos 2 theta, sin 2 theta) (method.md, section 4). This is the
+only module that imports casadi.
 """
 
 from collections.abc import Callable
@@ -54,7 +55,7 @@ class _Compiled:
     """A casadi function called through its buffers: microseconds instead of the 150 that converting arguments takes.
 
     The buffer interface takes contiguous float64 of the exact size in column-major order and checks none of it, so the
-    arguments are copied into arrays that have just that (shared/tools.md; casadi issue tracker says the same).
+    arguments are copied into arrays that have just that.
     """
 
     def __init__(self, function: Any) -> None:
@@ -62,15 +63,20 @@ class _Compiled:
         self._inputs = [np.zeros(function.size_in(i), order="F") for i in range(function.n_in())]
         self._outputs = [np.zeros(function.size_out(i), order="F") for i in range(function.n_out())]
         for i, array in enumerate(self._inputs):
-            self._buffer.set_arg(i, memoryview(array.ravel(order="K")))
+            self._buffer.set_arg(i, _flat(array))
         for i, array in enumerate(self._outputs):
-            self._buffer.set_res(i, memoryview(array.ravel(order="K")))
+            self._buffer.set_res(i, _flat(array))
 
     def __call__(self, *arguments: float | Array) -> list[Array]:
         for slot, value in zip(self._inputs, arguments, strict=True):
             slot[...] = np.reshape(value, slot.shape)
         self._evaluate()
-        return self._outputs
+        return [output.copy() for output in self._outputs]
+
+
+def _flat(array: Array) -> Any:
+    """The memory of a column-major array as one row, shared with it."""
+    return memoryview(array.ravel(order="K"))  # type: ignore[arg-type]
 
 
 _threads = local()
@@ -147,7 +153,7 @@ def theta_model(gram3: Array, theta_rad: Array) -> Linearisation:
 
 def _linearisation(outputs: list[Array]) -> Linearisation:
     cost, gradient, hessian = outputs
-    return Linearisation(cost=float(cost[0, 0]), gradient=gradient[:, 0].copy(), hessian=hessian.copy())
+    return Linearisation(cost=float(cost[0, 0]), gradient=gradient[:, 0], hessian=hessian)
 
 
 def frame_model(grams: Array, standard: Array, frame: Array, center: Array, x: Array) -> Linearisation:

@@ -4,6 +4,7 @@ The n-tuples speak first: where they do not vanish they give the axis, and the a
 the mirrors. The directional spectrum proposes what they cannot see. Everything is in normalised units (RMS radius 1).
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -22,7 +23,7 @@ IRRATIONAL_TURNS = 2.0 * np.pi * np.array([0.0823, 0.1381966, 0.2360680, 0.42705
 ROUND = 0.3
 # Sources of a first look: enough to tell hopeless from possible.
 LOOK = 500
-# Excess at the start beyond which a candidate is not worth refining, and after a coarse fit, beyond which it is dropped.
+# Excess at the start beyond which a candidate is not worth refining, and after a coarse fit, beyond which it is let go.
 HOPELESS = 15.0
 PROMISING = 2.0
 # Fraction of the energy that no true axis moves.
@@ -83,7 +84,9 @@ class Bundle:
     verdict: Verdict
 
 
-def refined(evidence: Evidence, start: Framed, *, sources: int = 10**9, outer: int = 10, error_rad: float = 0.05) -> tuple[Iterate, ...]:
+def refined(
+    evidence: Evidence, start: Framed, *, sources: int = 10**9, outer: int = 10, error_rad: float = 0.05
+) -> tuple[Iterate, ...]:
     """All iterates of a refinement from `start`."""
     cloud, stride = evidence.judge.cloud, evidence.stride(sources)
     return tuple(refine(cloud, start, start_error_rad=error_rad, max_outer=outer, stride=stride))
@@ -190,7 +193,7 @@ def _settle(evidence: Evidence, plane: Plane, *, sources: int, outer: int) -> Pl
 
 
 def _same_plane(a: Plane, b: Plane) -> bool:
-    return abs(float(a.normal @ b.normal)) > np.cos(np.radians(2.0))
+    return abs(float(a.normal @ b.normal)) > math.cos(math.radians(2.0))
 
 
 def axis_directions(evidence: Evidence) -> Array:

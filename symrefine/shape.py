@@ -1,7 +1,7 @@
 """Shape: what every source of data becomes before any mathematics sees it."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,7 +10,7 @@ from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, read_only
 
 Measure = Literal["points", "surface", "solid"]
-Index = NDArray[np.int64]
+Index = NDArray[np.integer[Any]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,6 +55,12 @@ class Shape:
             raise DegenerateShapeError(
                 f"{self.source}: all {len(points)} points coincide; a shape needs at least two distinct points"
             )
+
+    @classmethod
+    def of(cls, points: ArrayLike, *, weights: ArrayLike | None = None, normals: ArrayLike | None = None) -> "Shape":
+        """A cloud from anything numpy can read as an array [N, n]."""
+        given = {"weights": weights, "normals": normals}
+        return cls(points=points, **{k: v for k, v in given.items() if v is not None})  # type: ignore[arg-type]
 
     @property
     def dim(self) -> int:
@@ -101,7 +107,9 @@ def _normals(values: ArrayLike, points: Array, source: str) -> Array:
     length = np.linalg.norm(array, axis=1)
     bad = np.flatnonzero(~(np.isfinite(length) & (length > 0)))
     if bad.size:
-        raise InputError(f"{source}: normal of row {bad[0]} is {array[bad[0]].tolist()}; expected a finite, non-zero vector")
+        raise InputError(
+            f"{source}: normal of row {bad[0]} is {array[bad[0]].tolist()}; expected a finite, non-zero vector"
+        )
     return read_only(array / length[:, None])
 
 

@@ -11,17 +11,19 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symrefine.geometry import Array, read_only, unit
 from symrefine.harmonics import harmonic_moments, to_polar_axis
 from symrefine.moments import Moments, transformed
+from symrefine.shape import Index
 
 # Directions on the half sphere: 3.7 degrees apart, against 11 degrees that order 8 can resolve.
 DIRECTIONS = 1500
 # Eigenvalues of the covariance are bounded from below by this fraction of the largest before whitening.
 THIN = 1e-3
-# A candidate that would flip more than this fraction of the energy is kept only among the first few: true mirrors of the
-# catalogued objects stay below 0.05.
+# A candidate that would flip more than this fraction of the energy is kept only among the first few: true mirrors of
+# the catalogued objects stay below 0.05.
 HOPELESS = 0.12
 LEAST = 5
 
@@ -54,15 +56,15 @@ def _table(l: int) -> Array:
 
 
 @lru_cache(maxsize=1)
-def _neighbours() -> Array:
+def _neighbours() -> Index:
     """The eight nearest directions of each, n ~ -n; [DIRECTIONS, 8]."""
     closeness = np.abs(half_sphere() @ half_sphere().T)
     np.fill_diagonal(closeness, -1.0)
     return np.argpartition(-closeness, 8, axis=1)[:, :8]
 
 
-def _energy(moments: Moments, kept: Callable[[int, Array], Array]) -> tuple[Array, float]:
-    """Energy about every direction [DIRECTIONS] of the orders m that `kept(l, m)` selects, and the total over l >= 1."""
+def _energy(moments: Moments, kept: Callable[[int, Index], NDArray[np.bool_]]) -> tuple[Array, float]:
+    """Energy about every direction [DIRECTIONS] of the orders m that `kept(l, m)` selects, and all of it."""
     energy, total = np.zeros(DIRECTIONS), 0.0
     for l, c in harmonic_moments(moments).items():
         rows = _rows(l, tuple(np.flatnonzero(kept(l, np.arange(-l, l + 1))).tolist()))
@@ -93,7 +95,7 @@ def local_minima(misses: Array, *, count: int) -> Candidates:
     lowest = np.flatnonzero(misses <= misses[_neighbours()].min(axis=1))
     lowest = lowest[np.argsort(misses[lowest], kind="stable")][:count]
     lowest = np.array([i for rank, i in enumerate(lowest) if rank < LEAST or misses[i] < HOPELESS])
-    directions = np.array([_vertex(misses, i) for i in lowest]).reshape(-1, 3)
+    directions = np.array([_vertex(misses, int(i)) for i in lowest]).reshape(-1, 3)
     return Candidates(directions=directions, misses=misses[lowest])
 
 

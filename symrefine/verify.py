@@ -30,7 +30,7 @@ class Deviation:
     p995: float
     max: float
 
-    def over_limits(self, tolerance: float, floor: "Deviation") -> tuple[float, float, float, float]:
+    def over_limits(self, tolerance: float, floor: "Deviation") -> tuple[float, ...]:
         """Each statistic over its limit, which is raised by `floor`: what the cloud shows against itself."""
         own = (self.mean, self.p95, self.p99, self.p995)
         base = (floor.mean, floor.p95, floor.p99, floor.p995)

@@ -46,7 +46,7 @@ def _axial(family: str, fold: int) -> Array:
     rotations = [rotation(_Z, 2.0 * np.pi * k / fold) for k in range(fold)]
     flip, alternate = rotation(_X, np.pi), rotoreflection(_Z, np.pi / fold)
     one, across, through = np.eye(3), householder(_Z), householder(_Y)
-    cosets = {
+    representatives: dict[str, list[Array]] = {
         "C": [one],
         "Cv": [one, through],
         "Ch": [one, across],
@@ -54,8 +54,8 @@ def _axial(family: str, fold: int) -> Array:
         "D": [one, flip],
         "Dh": [one, flip, across, through],
         "Dd": [one, flip, alternate, alternate @ flip],
-    }[family]
-    return _products(rotations, cosets)
+    }
+    return _products(rotations, representatives[family])
 
 
 def _polyhedral(family: str) -> Array:
