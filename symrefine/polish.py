@@ -1,30 +1,34 @@
 """Polish on the points: two surfaces without correspondences, point to plane, and a judgement of how well they meet.
 
-`e = (s R x + t - y).n` for a local plane x of the source and the local plane (y, n) of the target it meets: linear in
-phi = (s R, t, 1), so the Gram matrix of `residual` serves, as it does for symmetries; here the unknowns are a small
+`e = (s R x + t - y).n` for a local plane x of the source and the local plane (y, n) of the target that it meets: linear
+in phi = (s R, t, 1), so the Gram matrix of `residual` serves, as it does for symmetries; here the unknowns are a small
 rotation, a shift and, if asked for, the scale. Everything is in units of the target: RMS radius 1 about its centre.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from symrefine.geometry import Array, cross_matrix, read_only, rotation
+from symrefine.geometry import Array, cross_matrix, read_only, rotation, tight_diagonal
 from symrefine.matching import ROBUST, SCALE_FLOOR, WORTH, LocalPlanes
-from symrefine.residual import design_rows, gram
+from symrefine.residual import SIZE, design_rows, gram
 from symrefine.verify import LIMITS, disc_distances
 
 MAX_OUTER = 12
 # A step below this (radians, RMS radii) ends the polish, and so does one within this share of its standard deviation.
 SETTLED = 2e-5
 WITHIN_NOISE = 0.1
-# A motion uncertain by more than this (radians, RMS radii) is not observable; gliding along a cylinder is the example.
+# Motions uncertain by more than this (radians, RMS radii) are left alone: gliding along a cylinder is an example.
 UNOBSERVABLE = 0.1
+# Variance of a residual that no sample takes away, RMS radii squared: with exact data the estimate collapses.
+LEAST_VARIANCE = 1e-18
 # Cosine of the largest angle between the normals of a pair.
 AGREE = np.sqrt(0.5)
-# Queries of a first look.
-LOOK = 400
+# Pairs below which there is nothing to polish.
+FEWEST_PAIRS = 12
+# Queries that settle what a surface shows against itself.
+FLOOR_QUERIES = 400
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,11 +47,12 @@ class Similarity:
         """Images [N, n] of points [N, n]."""
         return self.scale * (points @ self.matrix.T) + self.shift
 
-    def moved(self, turn: Array, shift: Array, stretch: float) -> "Similarity":
-        """This map followed by a small rotation vector about the origin and a shift; the scale grows by exp(stretch)."""
-        angle = float(np.linalg.norm(turn))
-        matrix = rotation(turn, angle) @ self.matrix if angle > 0.0 else self.matrix
-        return Similarity(matrix=matrix, shift=self.shift + shift, scale=self.scale * float(np.exp(stretch)))
+    def moved(self, step: Array) -> "Similarity":
+        """This map, turned about the origin and shifted by step [6], its scale times exp(step[6]) if there is one."""
+        angle = float(np.linalg.norm(step[:3]))
+        matrix = rotation(step[:3], angle) @ self.matrix if angle > 0.0 else self.matrix
+        stretch = float(np.exp(step[6])) if len(step) > 6 else 1.0
+        return Similarity(matrix=matrix, shift=self.shift + step[3:6], scale=self.scale * stretch)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,13 +61,18 @@ class Surfaces:
 
     source: LocalPlanes
     target: LocalPlanes
-    diagonal: float
     tolerance: float
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Diagonal of the smallest box around the target."""
+        return tight_diagonal(self.target.points)
 
     @cached_property
     def floor(self) -> Array:
         """Miss [4] that sampling alone explains: each surface against itself, both together."""
-        own = [disc_distances(s, s.points[:: _stride(s, LOOK)], skip_self=True) for s in (self.source, self.target)]
+        both = (self.source, self.target)
+        own = [disc_distances(s, s.points[:: _stride(s, FLOOR_QUERIES)], skip_self=True) for s in both]
         return np.sum([_statistics(d) for d in own], axis=0) / self.diagonal
 
     def misses(self, motion: Similarity, *, queries: int = 10**9) -> Array:
@@ -71,7 +81,7 @@ class Surfaces:
         return disc_distances(self.target, motion.apply(points)) / self.diagonal
 
     def excess(self, motion: Similarity, *, queries: int = 10**9) -> float:
-        """Largest of mean, 95th, 99th and 99.5th percentile of the miss over its limit; <= 1 if the two surfaces agree."""
+        """Largest of mean, 95th, 99th and 99.5th percentile of the miss over its limit; <= 1 if the surfaces agree."""
         own = _statistics(self.misses(motion, queries=queries))
         return float(np.max(own / (np.asarray(LIMITS) * self.tolerance + self.floor)))
 
@@ -90,49 +100,60 @@ class Polished:
 
     Attributes:
         motion: the map.
-        covariance: [6, 6] of the rotation vector (target axes) and the shift; infinite directions are left out.
-        rms: weighted root mean square of the residuals, RMS radii.
+        covariance: [6, 6] of the rotation vector (target axes, radians) and the shift (RMS radii).
         steps: outer iterations.
         converged: whether the last step was negligible.
     """
 
     motion: Similarity
     covariance: Array
-    rms: float
     steps: int
     converged: bool
 
 
 def polish(
-    surfaces: Surfaces, start: Similarity, *, error: float, scale: bool = False, queries: int = 10**9, outer: int = MAX_OUTER
+    surfaces: Surfaces,
+    start: Similarity,
+    *,
+    error: float,
+    known: Array,
+    scale: bool = False,
+    queries: int = 10**9,
+    outer: int = MAX_OUTER,
 ) -> Polished:
     """Alternate matching and one Gauss-Newton step on the Gram matrix until the step is negligible.
 
     Args:
         error: how far the start may be off, radians and RMS radii; sets the first gate and the first robust scale.
+        known: [6, 6] information (inverse covariance) that the start carries; zeros if none. Under noise the moments
+            know some motions better than the points do; without noise the points know all of them better.
         scale: whether the scale is an unknown too.
         queries: source planes used.
         outer: iterations at most.
     """
-    motion, reach, index = start, error, 0
-    state = Polished(motion=start, covariance=np.zeros((6, 6)), rms=np.inf, steps=0, converged=False)
+    stride, size = _stride(surfaces.source, queries), 7 if scale else 6
+    prior: Array = np.zeros((size, size))
+    prior[:6, :6] = known
+    motion, offset, reach = start, np.zeros(size), error
+    covariance: Array = np.linalg.pinv(known, rcond=1e-12, hermitian=True)
     for index in range(1, outer + 1):
-        rows, weights = _matched(surfaces, motion, reach, _stride(surfaces.source, queries))
-        if len(rows) < 12:
-            return replace(state, steps=index - 1)
-        step, covariance, rms = _gauss_newton_step(rows, weights, motion, surfaces.source.redundancy, scale=scale)
-        motion = motion.moved(step[:3], step[3:6], float(step[6]) if scale else 0.0)
-        size, noise = np.abs(step[:6]), np.sqrt(np.diag(covariance))
-        settled = bool(size.max() < SETTLED or np.all(size <= WITHIN_NOISE * noise))
-        state = Polished(motion=motion, covariance=covariance, rms=rms, steps=index, converged=settled)
-        reach = min(reach, 4.0 * float(size.max()))
-        if settled:
-            break
-    return state
+        rows, weights = _matched(surfaces, motion, reach, stride)
+        if len(rows) < FEWEST_PAIRS:
+            return Polished(motion=motion, covariance=covariance, steps=index - 1, converged=False)
+        information, gradient = _normal_equations(rows, weights, motion, surfaces.source.redundancy, size)
+        inverse = _inverse(information + prior)
+        step = -inverse @ (gradient + prior @ offset)
+        motion, offset, covariance = motion.moved(step), offset + step, inverse[:6, :6]
+        largest = float(np.abs(step).max())
+        within = np.all(np.abs(step) <= WITHIN_NOISE * np.sqrt(np.diag(inverse)))
+        if largest < SETTLED or within:
+            return Polished(motion=motion, covariance=covariance, steps=index, converged=True)
+        reach = min(reach, 4.0 * largest)
+    return Polished(motion=motion, covariance=covariance, steps=outer, converged=False)
 
 
 def _matched(surfaces: Surfaces, motion: Similarity, reach: float, stride: int) -> tuple[Array, Array]:
-    """Design rows [P, 13] and weights [P] of the pairs that the motion brings together (see `matching.match`)."""
+    """Design rows [P, 13] and weights [P] of the pairs that the motion brings together (compare `matching.match`)."""
     source, target = surfaces.source, surfaces.target
     points, normals = source.points[::stride], source.normals[::stride]
     moved = motion.apply(points)
@@ -142,7 +163,7 @@ def _matched(surfaces: Surfaces, motion: Similarity, reach: float, stride: int) 
     facing = np.abs(np.einsum("ij,ij->i", normals[found] @ motion.matrix.T, target.normals[met])) > AGREE
     found, met = found[facing], met[facing]
     if len(found) == 0:
-        return np.empty((0, 13)), np.empty(0)
+        return np.empty((0, SIZE)), np.empty(0)
     error = np.einsum("ij,ij->i", moved[found] - target.points[met], target.normals[met])
     flat = np.exp(-((source.flatness[::stride][found] / WORTH) ** 2) - (target.flatness[met] / WORTH) ** 2)
     scale2 = max(ROBUST * float(np.median(np.abs(error))), SCALE_FLOOR * target.spacing, reach) ** 2
@@ -150,22 +171,25 @@ def _matched(surfaces: Surfaces, motion: Similarity, reach: float, stride: int) 
     return design_rows(points[found], target.points[met], target.normals[met]), weights
 
 
-def _gauss_newton_step(
-    rows: Array, weights: Array, motion: Similarity, redundancy: float, *, scale: bool
-) -> tuple[Array, Array, float]:
-    """One step over (rotation, shift[, log scale]) with its covariance [6, 6], from the Gram matrix of the pairs."""
+def _normal_equations(
+    rows: Array, weights: Array, motion: Similarity, redundancy: float, size: int
+) -> tuple[Array, Array]:
+    """Information matrix [size, size] and gradient over (rotation, shift[, log scale]), in units of the variance."""
     g = gram(rows, weights)
     matrix = motion.scale * motion.matrix
     phi = np.concatenate([matrix.ravel(), motion.shift, [1.0]])
-    jacobian = np.zeros((13, 6 + scale))
+    jacobian: Array = np.zeros((SIZE, 7))
     for k, axis in enumerate(np.eye(3)):
         jacobian[:9, k] = (cross_matrix(axis) @ matrix).ravel()
         jacobian[9 + k, 3 + k] = 1.0
-    if scale:
-        jacobian[:9, 6] = matrix.ravel()
-    hessian, gradient, cost = jacobian.T @ g @ jacobian, jacobian.T @ g @ phi, float(phi @ g @ phi)
-    variance = redundancy * max(cost, 0.0) / float(weights.sum())
-    values, vectors = np.linalg.eigh(hessian)
-    known = (values > 1e-9 * values[-1]) & (variance < UNOBSERVABLE**2 * values)
-    inverse = (vectors[:, known] / values[known]) @ vectors[:, known].T
-    return -inverse @ gradient, variance * inverse[:6, :6], float(np.sqrt(max(cost, 0.0) / weights.sum()))
+    jacobian[:9, 6] = matrix.ravel()
+    jacobian = jacobian[:, :size]
+    variance = max(redundancy * float(phi @ g @ phi) / float(weights.sum()), LEAST_VARIANCE)
+    return jacobian.T @ g @ jacobian / variance, jacobian.T @ g @ phi / variance
+
+
+def _inverse(information: Array) -> Array:
+    """Inverse on the span of what is observable, zero elsewhere."""
+    values, vectors = np.linalg.eigh(information)
+    seen = values > max(1e-9 * values[-1], UNOBSERVABLE**-2)
+    return (vectors[:, seen] / values[seen]) @ vectors[:, seen].T

@@ -1,0 +1,156 @@
+"""What else explains a pair of objects: the coset G R of a symmetric target, and what no data can determine.
+
+If the target has the symmetry group G, then R and g R, g in G, map the source onto it equally well, and no method can
+tell them apart. A continuous group leaves a whole subspace free: every orthogonal map within it does as well.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from symrefine.geometry import Array, read_only, unit
+from symrefine.groups import PointGroup
+
+# One operation for each connected part of the continuous groups that a set of points can have (rows: diagonals).
+_PARTS = {
+    "Cv": [(1, 1, 1), (1, -1, 1)],
+    "Dh": [(1, 1, 1), (1, -1, -1), (1, -1, 1), (1, 1, -1)],
+    "Kh": [(1, 1, 1), (-1, -1, -1)],
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Coset:
+    """All maps that explain a pair as well as one another.
+
+    Attributes:
+        matrices: [k, n, n] orthogonal, the representative first; with a free subspace, one for each connected part.
+        translations: [k, n] that go with them.
+        free: [j, n] orthonormal directions of the target within whose span any orthogonal map (about the same point) is
+            as good: j = 0, or j >= 2. In 3-space two directions mean any turn about the axis normal to both.
+        symmetry: Schoenflies symbol of the target in 3-space, "" elsewhere.
+        observable: what is determined, in words; "full" if everything is.
+    """
+
+    matrices: Array
+    translations: Array
+    free: Array
+    symmetry: str
+    observable: str
+
+    def __post_init__(self) -> None:
+        for name in ("matrices", "translations", "free"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+def coset_of_group(
+    matrix: Array, translation: Array, group: PointGroup, center: Array, *, reflections: bool = True
+) -> Coset:
+    """The coset of a target whose symmetry group, about `center`, is known.
+
+    Args:
+        matrix: [3, 3] the representative.
+        translation: [3].
+        group: of the target, placed in its coordinates.
+        center: [3] point of the target that the group leaves in place.
+        reflections: whether improper operations count.
+    """
+    group = group.for_point_set()
+    if group.is_finite:
+        operations, free = group.operations(), np.zeros((0, 3))
+    else:
+        family = group.symbol.family
+        operations = np.stack([group.frame.T @ np.diag(d) @ group.frame for d in np.array(_PARTS[family], float)])
+        free = group.frame if family == "Kh" else group.frame[:2]
+    if not reflections:
+        operations = operations[np.linalg.det(operations) > 0.0]
+    return Coset(
+        matrices=operations @ matrix,
+        translations=center + (translation - center) @ operations.transpose(0, 2, 1),
+        free=free,
+        symmetry=group.name,
+        observable=_in_words(group, len(operations)),
+    )
+
+
+def _in_words(group: PointGroup, count: int) -> str:
+    if group.name == "Kh":
+        return "the position only: the target is a sphere"
+    if not group.is_finite:
+        return f"up to any turn about {spelled(group.frame[2])}: the target is a body of revolution ({group.name})"
+    if count == 1:
+        return "full"
+    either = "" if group.is_chiral else ", and the determinant is free"
+    return f"up to the {count} operations of {group.name}{either}"
+
+
+def coset_of_list(matrices: Array, source_center: Array, target_center: Array, scale: float, free: Array) -> Coset:
+    """The coset where the moments themselves give all the maps that do equally well, about the two centres."""
+    signs = np.linalg.det(matrices)
+    dim = matrices.shape[1]
+    if len(free):
+        observable = f"up to any orthogonal map within {len(free)} of the {dim} dimensions"
+    elif len(matrices) == 1:
+        observable = "full"
+    else:
+        either = ", the determinant among them" if signs.min() < 0 < signs.max() else ""
+        observable = f"up to {len(matrices)} maps that do equally well{either}"
+    return Coset(
+        matrices=matrices,
+        translations=target_center - scale * (matrices @ source_center),
+        free=free,
+        symmetry="",
+        observable=observable,
+    )
+
+
+def lifted(
+    inner: Coset,
+    source_basis: Array,
+    target_basis: Array,
+    centers: tuple[Array, Array],
+    scale: float,
+    *,
+    reflections: bool = True,
+) -> Coset:
+    """The coset in n-space of two sets that span r < n dimensions only, from the one within their spans.
+
+    What happens across the span no point can see: a reflection is free there, for n - r >= 2 every orthogonal map.
+
+    Args:
+        inner: coset in r-space.
+        source_basis: [n, n] orthonormal rows, the first r spanning the source.
+        target_basis: [n, n] the same for the target.
+        centers: centres of source and target.
+        scale: of the source.
+        reflections: whether determinant -1 is an answer.
+    """
+    rank, dim = inner.matrices.shape[1], len(source_basis)
+    within = []
+    for m in inner.matrices:
+        for sign in (1.0, -1.0):
+            full = np.eye(dim)
+            full[:rank, :rank] = m
+            full[-1, -1] = sign
+            within.append(target_basis.T @ full @ source_basis)
+    within = [m for m in within if reflections or np.linalg.det(m) > 0.0]
+    matrices = np.array(sorted(within, key=lambda m: -np.sign(np.linalg.det(m))))
+    across = target_basis[rank:]
+    parts = [inner.free @ target_basis[:rank]] if len(inner.free) else []
+    if len(across) > 1:
+        parts.append(across)
+    missing = f"the points span {rank} of {dim} dimensions: "
+    missing += f"the reflection across {spelled(across[0])}" if len(across) == 1 else "every map across them"
+    within_words = "" if inner.observable == "full" else f"; within them {inner.observable}"
+    return Coset(
+        matrices=matrices,
+        translations=centers[1] - scale * (matrices @ centers[0]),
+        free=np.concatenate(parts) if parts else np.zeros((0, dim)),
+        symmetry="",
+        observable=f"{missing} is free{within_words}",
+    )
+
+
+def spelled(direction: Array) -> str:
+    """A direction for a message."""
+    return "(" + ", ".join(f"{x:.3f}" for x in unit(direction) + 0.0) + ")"
