@@ -9,6 +9,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from symrefine.align import Alignment, align
     from symrefine.detect import Detection, detect
     from symrefine.errors import DegenerateShapeError, InputError, SymrefineError
     from symrefine.geometry import Axis, Plane
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = [
     "load",
     "detect",
+    "align",
     "derive",
     "Shape",
     "Plane",
@@ -29,6 +31,7 @@ __all__ = [
     "PointGroup",
     "point_group",
     "Detection",
+    "Alignment",
     "SymrefineError",
     "InputError",
     "DegenerateShapeError",
@@ -36,6 +39,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "symrefine.align": ("Alignment", "align"),
     "symrefine.detect": ("Detection", "detect"),
     "symrefine.errors": ("DegenerateShapeError", "InputError", "SymrefineError"),
     "symrefine.geometry": ("Axis", "Plane"),

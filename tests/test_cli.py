@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from symrefine.cli import batch, invoke, values
 from symrefine.cli.tables import batch_table, detection_lines, headline
 from symrefine.detect import detect
 from symrefine.errors import InputError
+from symrefine.geometry import random_orthogonal
 from symrefine.ntuples import notation
 from symrefine.ntuples.affine import derive_affine
 from symrefine.ntuples.derive import derive
@@ -25,6 +27,8 @@ from symrefine.verify import TOLERANCE
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 SIDES = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]]
 SIDES += [[2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+SCALENE = [[0, 0, 0], [7, 0, 0], [1.5, 3, 0], [4, -1, 2]]
+SCALENE_SIDES = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
 Run = Callable[..., tuple[int, str, str]]
 
 
@@ -39,9 +43,7 @@ def ply(points: Any, faces: Any) -> str:
 def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("data")
     (folder / "box.ply").write_text(ply(CUBE * [3.0, 2.0, 1.0], SIDES))
-    (folder / "scalene.ply").write_text(
-        ply([[0, 0, 0], [7, 0, 0], [1.5, 3, 0], [4, -1, 2]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    )
+    (folder / "scalene.ply").write_text(ply(SCALENE, SCALENE_SIDES))
     cloud = np.random.default_rng(0).standard_normal((2000, 3)) ** 3
     (folder / "cloud.xyz").write_text("\n".join(" ".join(map(repr, map(float, p))) for p in cloud))
     (folder / "cut.ply").write_text(ply(CUBE, SIDES)[:-20])
@@ -134,23 +136,28 @@ def test_no_symmetry_is_an_answer(run: Run, data: Path) -> None:
 
 
 def test_files_are_written_together(run: Run, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    report, bop = tmp_path / "a.json", tmp_path / "b.json"
-    line = ("detect", data / "box.ply", "--json", report, "--bop", bop, "--bop-id", 7)
-    status, out, err = run(*line, "--bop-scale", 10)
+    monkeypatch.setitem(sys.modules, "symrefine.viewer", viewer := ModuleType("symrefine.viewer"))
+    monkeypatch.setitem(sys.modules, "symrefine.report", report := ModuleType("symrefine.report"))
+    viewer.record = lambda detection, _, path: path.write_text(detection.point_group)  # type: ignore[attr-defined]
+    report.write_html = lambda _, shape, path: path.write_text(shape.source)  # type: ignore[attr-defined]
+    names = {"--json": "a.json", "--bop": "b.json", "--recording": "c.rrd", "--report": "d.html"}
+    options = [str(x) for option, name in names.items() for x in (option, tmp_path / name)]
+    status, out, err = run("detect", data / "box.ply", *options, "--bop-id", 7, "--bop-scale", 10)
     assert (status, err) == (0, "")
-    assert f"wrote {report}" in out
-    assert f"wrote {bop}" in out
-    entry = json.loads(bop.read_text())["7"]
+    assert [f"wrote {tmp_path / name}" in out for name in names.values()] == [True] * 4
+    assert {path.name for path in tmp_path.iterdir()} == set(names.values())
+    entry = json.loads((tmp_path / "b.json").read_text())["7"]
     assert (entry["size_x"], len(entry["symmetries_discrete"])) == (60.0, 3)
+    assert (tmp_path / "c.rrd").read_text() == "D2h"
 
-    def fail(path: Path) -> None:
+    def fail(_detection: object, _shape: object, path: Path) -> None:
         path.write_text("half")
         raise OSError(28, "No space left on device", str(path))
 
-    before = {path: path.read_text() for path in tmp_path.iterdir()}
-    monkeypatch.setattr("symrefine.cli.detect._bop_writer", lambda *_: fail)
-    assert_refused(run(*line, "--seed", 1), "No space left on device")
-    assert {path: path.read_text() for path in tmp_path.iterdir()} == before
+    before = {name: (tmp_path / name).read_text() for name in names.values()}
+    report.write_html = fail  # type: ignore[attr-defined]
+    assert_refused(run("detect", data / "scalene.ply", *options), "No space left on device")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == before
 
 
 def test_the_tolerance_of_the_command_line_is_that_of_detect() -> None:
@@ -195,6 +202,11 @@ def test_the_tolerance_of_the_command_line_is_that_of_detect() -> None:
         ("detect box.ply --json box.ply", "same file as the input"),
         ("detect box.ply --json ./x.json --bop x.json", "same file as that of --json"),
         ("detect ''", "is a directory"),
+        ("detect box.ply --report /dev/null", "expected a file"),
+        ("align box.ply", "B"),
+        ("align box.ply nothing.ply", "nothing.ply: no such file"),
+        ("align box.ply scalene.ply --json scalene.ply", "same file as the input"),
+        ("align box.ply scalene.ply --tolerance 1", "(0, 0.2]"),
         ("derive --orders 2,3", "--dim"),
         ("derive --dim 3", "--orders"),
         ("derive --dim 3 --orders 2;3", "--orders: '2;3' is not a list of moment orders"),
@@ -212,6 +224,9 @@ def test_the_tolerance_of_the_command_line_is_that_of_detect() -> None:
         ("batch . --out box.ply", "same file as the input"),
         ("batch . --out box.json", "holds no rows"),
         ("batch . --out -", "expected a file"),
+        ("view nothing.rrd", "no such file"),
+        ("view box.ply", "not a recording"),
+        ("view", "FILE.rrd"),
     ],
 )
 def test_bad_input_is_refused_in_one_line(
@@ -282,7 +297,7 @@ def test_a_full_disk_is_told() -> None:
 def test_help_names_the_commands() -> None:
     done = command("--help")
     assert (done.returncode, done.stderr) == (0, "")
-    for name in ("detect", "derive", "batch"):
+    for name in ("detect", "align", "derive", "batch", "view"):
         assert f"    {name} " in done.stdout
         assert invoke([name, "--help"]) == 0
     assert command("--version").stdout == f"symrefine {symrefine.__version__}\n"
@@ -355,6 +370,34 @@ def test_no_color_means_no_escape_codes(monkeypatch: pytest.MonkeyPatch) -> None
     with out.capture() as capture:
         out.print(batch_table([]))
     assert "\x1b" not in capture.get()
+
+
+# --- align ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("det", [1, -1])
+def test_align_finds_the_map(run: Run, data: Path, tmp_path: Path, det: int) -> None:
+    matrix = random_orthogonal(np.random.default_rng(4), det=det)
+    corners = np.array(SCALENE) @ matrix.T + [3.0, 4.0, 5.0]
+    (tmp_path / "turned.ply").write_text(ply(corners, SCALENE_SIDES))
+    status, out, err = run("align", data / "scalene.ply", tmp_path / "turned.ply", "--json", "-")
+    assert (status, err) == (0, "")
+    found = json.loads(out, parse_constant=not_json)
+    assert found["schema"] == "symrefine.alignment/1"
+    assert (found["status"], found["determinant"], found["observable"]) == ("ok", det, "full")
+    moved = np.array(SCALENE) @ np.transpose(found["matrix"]) + found["translation"]
+    np.testing.assert_allclose(moved, corners, atol=1e-6)
+    assert found["equivalents"] == [{k: found[k] for k in ("matrix", "translation")}]
+
+
+def test_align_says_it_in_words(run: Run, data: Path, tmp_path: Path) -> None:
+    line = ("align", data / "scalene.ply", data / "scalene.ply", "--json", tmp_path / "a.json")
+    status, out, err = run(*line)
+    assert (status, err) == (0, "")
+    assert "scalene.ply: ok" in out
+    assert "determinant +1 (rotation)" in out
+    assert "determined: everything" in out
+    assert json.loads((tmp_path / "a.json").read_text())["determinant"] == 1
 
 
 # --- derive -----------------------------------------------------------------------------------------------------------

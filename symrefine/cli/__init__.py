@@ -4,6 +4,7 @@ import io
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Sequence
 from typing import NoReturn
 
@@ -14,6 +15,8 @@ BAD_INPUT, BUG, INTERRUPTED, BROKEN_PIPE = 2, 70, 130, 141
 
 def main(argv: Sequence[str] | None = None) -> NoReturn:
     """The command `symrefine`: end the process with the status of `invoke`."""
+    if not sys.warnoptions and not _debugging():
+        warnings.simplefilter("ignore")  # of numpy and others: nothing that who runs a command could act upon
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a file name may hold what the terminal cannot show
     sys.exit(invoke(sys.argv[1:] if argv is None else argv))
@@ -58,12 +61,16 @@ def _refuse(message: str, status: int) -> int:
 
 
 def _bug(error: Exception) -> int:
-    if os.environ.get("SYMREFINE_DEBUG", "0") not in ("", "0"):
+    if _debugging():
         traceback.print_exception(error)
     kind = type(error).__name__
     return _refuse(
         f"internal error, please report it: {kind}: {error} (SYMREFINE_DEBUG=1 shows where it happened)", BUG
     )
+
+
+def _debugging() -> bool:
+    return os.environ.get("SYMREFINE_DEBUG", "0") not in ("", "0")
 
 
 def _discard_stdout() -> None:

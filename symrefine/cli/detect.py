@@ -3,6 +3,7 @@
 import argparse
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -37,12 +38,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="X",
         help="millimetres in one unit of PATH: 1000 if it is in metres (default: 1)",
     )
+    parser.add_argument("--recording", metavar="FILE.rrd", help="write the iterations, for `symrefine view`")
+    parser.add_argument("--report", metavar="FILE.html", help="write a page with pictures and tables")
     add_detection_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Detect, write the files that were asked for, print."""
-    check_outputs({"--json": args.json, "--bop": args.bop}, [Path(args.path)])
+    outputs = {"--json": args.json, "--bop": args.bop, "--recording": args.recording, "--report": args.report}
+    check_outputs(outputs, [Path(args.path)])
     if args.bop is not None:
         _check_bop(Path(args.bop))
     with waiting("detecting"):
@@ -93,6 +97,14 @@ def _writers(
         writers[args.json] = text_writer(json_text(record))
     if args.bop is not None:
         writers[args.bop] = _bop_writer(args, shape, detection)
+    if args.recording is not None:
+        from symrefine.viewer import record as write_recording
+
+        writers[args.recording] = partial(write_recording, detection, shape)
+    if args.report is not None:
+        from symrefine.report import write_html
+
+        writers[args.report] = partial(write_html, detection, shape)
     return writers
 
 

@@ -30,10 +30,11 @@ def check_outputs(outputs: dict[str, str | None], inputs: list[Path]) -> None:
     for option, name in outputs.items():
         if name is None or (option == "--json" and name == STDOUT):
             continue
-        if name == STDOUT:
-            raise InputError(f"{option}: expected a file; only --json writes to stdout")
         path = Path(name)
-        check_target(path)
+        if name != STDOUT:
+            check_target(path)
+        if name == STDOUT or (option != "--json" and path.exists() and not path.is_file()):
+            raise InputError(f"{option} {name}: expected a file; only --json writes to stdout and devices")
         if path.is_file() or not path.exists():
             if path.resolve() in taken:
                 raise InputError(f"{option} {name}: is the same file as {taken[path.resolve()]}; name another one")

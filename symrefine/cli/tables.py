@@ -70,6 +70,24 @@ def _elements(record: Record) -> str:
     return ", ".join(p for p in parts if p and not p.startswith("0 "))
 
 
+def alignment_lines(record: Record) -> Iterator[str]:
+    """Everything a person wants to know about one alignment."""
+    yield f"{record['source']} onto {record['target']}: {record['status']}"
+    yield ""
+    rows = list(zip(record["matrix"], record["translation"], strict=True))
+    yield from (f"  {' '.join(f'{x + 0.0:11.8f}' for x in row)}  |  {t:.8g}" for row, t in rows)
+    yield ""
+    kind = "rotation" if record["determinant"] > 0 else "reflection or rotoreflection"
+    scale = "" if record["scale"] == 1.0 else f", scale {record['scale']:.8g}"
+    yield f"matrix | translation in units of the target; determinant {record['determinant']:+d} ({kind}){scale}"
+    known = f"rotation known to {math.degrees(record['sigma_rad']):.2g} degrees"
+    known = "moments equal to rounding" if record["exact"] else known
+    yield f"rms distance {_percent(record['rms'])} % of the diagonal, {known}"
+    observable = record["observable"]
+    yield f"determined: {'everything' if observable == 'full' else observable}"
+    yield f"{sum(record['timings'].values()):.2f} s"
+
+
 def batch_table(rows: Sequence[Record]) -> Table:
     """A line for each file of a batch."""
     table = _table("file", "group", "planes", "axes", "worst p95", "confidence", "seconds")

@@ -7,14 +7,15 @@ import math
 TOLERANCE, LARGEST_TOLERANCE = 0.02, 0.2
 
 
-def add_detection_options(parser: argparse.ArgumentParser) -> None:
-    """The options that decide the result of a detection."""
+def add_detection_options(parser: argparse.ArgumentParser, counts_as: str = "symmetric") -> None:
+    """The options that decide the result of a detection or an alignment."""
     parser.add_argument(
         "--tolerance",
         type=tolerance,
         default=TOLERANCE,
         metavar="REL",
-        help="largest miss that counts as symmetric, as a fraction of the bounding-box diagonal (default: %(default)s)",
+        help=f"largest miss that counts as {counts_as}, as a fraction of the bounding-box diagonal "
+        "(default: %(default)s)",
     )
     parser.add_argument(
         "--measure",

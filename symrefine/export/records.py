@@ -1,18 +1,21 @@
-"""A detection as plain data: numbers, strings, lists and dictionaries, in one order and with one sign."""
+"""Results as plain data: numbers, strings, lists and dictionaries, in one order and with one sign."""
 
 import math
+import time
 from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
+from symrefine.align import Alignment
 from symrefine.detect import Detection, FoundAxis, FoundPlane, NearMiss
 from symrefine.geometry import Array
 from symrefine.shape import Shape
 from symrefine.verify import Deviation
 
 SCHEMA = "symrefine.detection/1"
+ALIGNMENT_SCHEMA = "symrefine.alignment/1"
 
 Record = dict[str, Any]
 
@@ -57,8 +60,46 @@ def detection_record(
             "singular_values": _numbers(d.tuples.singular_values, 1.0),
             "significance": _numbers(d.tuples.significance, 1.0),
         },
-        "timings": {stage: round(seconds, 6) for stage, seconds in timings.items()},
+        "timings": _seconds(timings),
     }
+
+
+def alignment_record(
+    alignment: Alignment, source: Shape, target: Shape, *, options: Mapping[str, Any], load_s: float | None = None
+) -> Record:
+    """What `symrefine align --json` writes: `target ~ scale * matrix @ source + translation`, and its equivalents.
+
+    `rms` is a fraction of the target's diagonal; `free` spans the directions of the target within which any orthogonal
+    map does as well.
+    """
+    a = alignment
+    size = float(np.abs(target.points).max())
+    timings = ({} if load_s is None else {"load": load_s}) | dict(a.timings)
+    start = time.perf_counter()
+    record = {
+        "schema": ALIGNMENT_SCHEMA,
+        "source": source.source,
+        "target": target.source,
+        "version": version("symrefine"),
+        "options": dict(options),
+        "status": a.status,
+        "determinant": a.determinant,
+        "matrix": _matrix(a.matrix),
+        "translation": _numbers(a.translation, size),
+        "scale": number(a.scale),
+        "rms": number(a.rms, 1.0),
+        "sigma_rad": number(a.sigma_rad),
+        "exact": bool(a.exact),
+        "observable": a.observable,
+        "symmetry": a.coset.symmetry or None,
+        "free": _matrix(a.coset.free),
+        "equivalents": [
+            {"matrix": _matrix(m), "translation": _numbers(t, size)}
+            for m, t in zip(a.coset.matrices, a.coset.translations, strict=True)
+        ],
+    }
+    timings["equivalents"] = time.perf_counter() - start
+    return record | {"timings": _seconds(timings)}
 
 
 def toward_positive(direction: Array) -> float:
@@ -79,6 +120,14 @@ def number(value: float, scale: float = 0.0) -> float | str | None:
 
 def _numbers(values: Iterable[float], scale: float) -> list[float | str | None]:
     return [number(v, scale) for v in values]
+
+
+def _matrix(rows: Array) -> list[list[float | str | None]]:
+    return [_numbers(row, 1.0) for row in rows]
+
+
+def _seconds(timings: Mapping[str, float]) -> dict[str, float]:
+    return {stage: round(seconds, 6) for stage, seconds in timings.items()}
 
 
 def _direction(direction: Array) -> list[float | str | None]:

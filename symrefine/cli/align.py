@@ -1,0 +1,66 @@
+"""`symrefine align`: the map that takes one object onto another."""
+
+import argparse
+import time
+from pathlib import Path
+from typing import Any
+
+from symrefine.cli.outputs import STDOUT, check_outputs, console, say, text_writer, waiting, write_all
+from symrefine.cli.values import add_detection_options
+
+NAME = "align"
+HELP = "find the map that takes one object onto another, reflections included"
+DESCRIPTION = (
+    "Find the orthogonal matrix M and the translation t that take the mesh or cloud A onto B, b = M a + t, without "
+    "correspondences; det M = -1 means a mirror image. Also tells which other maps do as well, because B is symmetric."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("source", metavar="A", help="mesh or point cloud to be moved")
+    parser.add_argument("target", metavar="B", help="mesh or point cloud to move it onto")
+    parser.add_argument("--json", metavar="FILE|-", help="write the whole result as JSON; - is stdout, with no table")
+    parser.add_argument("--scale", action="store_true", help="let the size differ too: b = s M a + t")
+    parser.add_argument("--rotations-only", action="store_true", help="admit det M = +1 only")
+    add_detection_options(parser, counts_as="agreement")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Align, write the file that was asked for, print."""
+    check_outputs({"--json": args.json}, [Path(args.source), Path(args.target)])
+    with waiting("aligning"):
+        record = _record(args)
+    from symrefine.export.files import json_text
+
+    if args.json == STDOUT:
+        say(json_text(record))
+        return 0
+    if args.json is not None:
+        write_all({args.json: text_writer(json_text(record))})
+    _print(record, args.json)
+    return 0
+
+
+def _record(args: argparse.Namespace) -> dict[str, Any]:
+    from symrefine.align import align
+    from symrefine.export.records import alignment_record
+    from symrefine.load import load
+
+    start = time.perf_counter()
+    source, target = (load(path, measure=args.measure) for path in (args.source, args.target))
+    load_s = time.perf_counter() - start
+    options = {"tolerance": args.tolerance, "scale": args.scale, "seed": args.seed}
+    alignment = align(source, target, allow_reflection=not args.rotations_only, **options)
+    chosen = options | {"measure": args.measure, "rotations_only": args.rotations_only}
+    return alignment_record(alignment, source, target, options=chosen, load_s=load_s)
+
+
+def _print(record: dict[str, Any], written: str | None) -> None:
+    from symrefine.cli.tables import alignment_lines
+
+    out = console()
+    for line in alignment_lines(record):
+        out.print(line, soft_wrap=True)
+    if written is not None:
+        out.print(f"wrote {written}", soft_wrap=True)
