@@ -1,7 +1,7 @@
-"""Accuracy on shapes of the project's own making: `python -m experiments.accuracy [--seeds N] [--points N ...]`.
+"""Accuracy on shapes of our own making: `python -m experiments.accuracy [--seeds N] [--points N ...]`.
 
-Points only, no normals, random poses, units and scales; noise in fractions of the bounding-box diagonal. The targets are
-those of the first issue; the C++ baseline finds 2-3 of the table's 4 planes up to 0.5 % noise and none beyond.
+Points only, no normals, random poses, units and scales; noise in fractions of the bounding-box diagonal. The targets
+are those of the first issue; the C++ baseline finds 2-3 of the table's 4 planes up to 0.5 % noise and none beyond.
 """
 
 import argparse
