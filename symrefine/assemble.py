@@ -47,7 +47,7 @@ NEAR = 5
 NOTHING = np.zeros((0, 3))
 # Distances evaluated in all for the final judgement of a group's elements, and at least for each.
 JUDGED = 12000
-JUDGED_EACH = 1200
+JUDGED_EACH = 600
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

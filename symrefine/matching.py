@@ -70,7 +70,7 @@ def _fit(points: Array, neighbours: Index, normals: Array | None = None) -> tupl
     return mean, normals, np.column_stack([across, values[:, 1:]])
 
 
-def choose_neighbours(points: Array, tree: Any, rng: np.random.Generator, *, probes: int = 200) -> int:
+def choose_neighbours(points: Array, tree: Any, rng: np.random.Generator, *, probes: int = 120) -> int:
     """Smallest neighbourhood that looks like a plane, or the one that looks most like it: noise decides, no parameter.
 
     Flatness is compared with what a blob without any structure shows in a sample of the same size.
@@ -122,10 +122,8 @@ def local_planes(
 
     pick = np.sort(rng.choice(len(points), min(count, len(points)), replace=False))
     chosen, redundancy = points[pick], 1.0
-    thickness: Array = np.zeros(len(pick))
-    flatness: Array = np.zeros(len(pick))
     if normals is not None and exact:
-        n = normals[pick]
+        n, thickness, flatness = normals[pick], np.zeros(len(pick)), np.zeros(len(pick))
     else:
         tree = cKDTree(points, balanced_tree=False, compact_nodes=False) if tree is None else tree
         k = choose_neighbours(points, tree, rng)

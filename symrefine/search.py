@@ -21,10 +21,13 @@ from symrefine.verify import Judge, Verdict
 IRRATIONAL_TURNS = 2.0 * np.pi * np.array([0.0823, 0.1381966, 0.2360680, 0.4270510])
 # A revolution that misses by less than this fraction of the limits is round, whatever folds its facets suggest.
 ROUND = 0.3
+# Excess of a free turn, at the start, beyond which an object is not round.
+BARELY_ROUND = 1.5
 # Sources of a first look: enough to tell hopeless from possible.
-LOOK = 500
-# Excess at the start beyond which a candidate is not worth refining, and after a coarse fit, beyond which it is let go.
+LOOK = 400
+# Excess beyond which a candidate is not worth refining: at the start, after a first coarse fit, after a second.
 HOPELESS = 15.0
+UNPROMISING = 5.0
 PROMISING = 2.0
 # Fraction of the energy that no true axis moves.
 AXIS_HOPELESS = 0.15
@@ -119,7 +122,7 @@ def _mirrors_through(evidence: Evidence, candidate: FoldCandidate) -> Bundle | N
         return None
     history = refined(evidence, start, sources=max(LOOK, 12000 // candidate.fold))
     state = history[-1].state
-    verdict = evidence.judge(state.motions, stride=evidence.stride(max(LOOK, 6000 // candidate.fold)))
+    verdict = evidence.judge(state.motions, stride=evidence.stride(max(LOOK, 4000 // candidate.fold)))
     return Bundle(state=state, fold=candidate.fold, history=history, verdict=verdict)
 
 
@@ -130,7 +133,7 @@ def _look(evidence: Evidence, motions: tuple[Isometry, ...]) -> float:
 def _revolution(evidence: Evidence, frame: Array) -> Bundle | None:
     """The axis as if the object were round: refine with five planes, judge by free turns; None if hopeless."""
     start = mirror_bundle(5, frame, np.zeros(3))
-    if _look(evidence, _free_turns(start)[:1]) > 4.0:
+    if _look(evidence, _free_turns(start)[:1]) > BARELY_ROUND:
         return None
     history = refined(evidence, start, sources=1500)
     state = history[-1].state
@@ -161,7 +164,9 @@ def mirrors(
         start = Plane(normal=normal, offset=0.0)
         if known(normal) or _look(evidence, (Isometry.reflection(start),)) > HOPELESS:
             continue
-        plane = _settle(evidence, start, sources=LOOK, outer=3 if thorough else 2)
+        plane = _settle(evidence, start, sources=LOOK, outer=2)
+        if thorough and _look(evidence, (Isometry.reflection(plane),)) < UNPROMISING:
+            plane = _settle(evidence, plane, sources=LOOK, outer=2)
         if known(plane.normal) or any(_same_plane(plane, p) for p in found):
             continue
         mirror = _judged(evidence, plane, stride=evidence.stride(LOOK))
