@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.errors import DegenerateShapeError
-from symrefine.geometry import Array, Isometry, frame_with_z, householder, rotation, rotoreflection
+from symrefine.geometry import Array, Isometry, frame_with_z, householder, rotation, rotoreflection, unit
 from symrefine.groups import PointGroup, from_elements
 from symrefine.refine import Framed, Iterate
 from symrefine.search import (
@@ -221,6 +221,9 @@ def _turns(evidence: Evidence, held: list[Mirror], group: PointGroup) -> list[Tu
     center = _common_point(held, [])
     if len(held) > 1:
         directions = np.array([u for u, _ in group.rotation_axes()[:1]]).reshape(-1, 3)
+        if group.name == "D2h":
+            # The one group whose mirrors do not imply all its axes: Th has the same three.
+            directions = np.concatenate([directions, unit(group.frame.sum(axis=0))[None]])
     elif held and evidence.tuples.kind != "vanish":
         return []
     else:

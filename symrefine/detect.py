@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
@@ -15,7 +15,7 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array, Axis, Plane, read_only, tight_diagonal
 from symrefine.groups import PointGroup
 from symrefine.harmonics import harmonic_moments
-from symrefine.matching import local_planes
+from symrefine.matching import isolated_points, local_planes
 from symrefine.moments import Moments, shape_moments
 from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.quadrature import sample_surface
@@ -29,8 +29,8 @@ PARTS = 16
 SAMPLES = 20000
 LOCAL_PLANES = 4000
 CLOSER_PLANES = 12000
-FEWEST = 300
-"""Points below which local planes say too little for a decision."""
+# Up to so many distinct points stand for themselves (atoms); more are samples of a surface.
+FEW = 250
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -143,11 +143,12 @@ def detect(
     if not 0.0 < tolerance <= 0.2:
         raise InputError(f"tolerance is {tolerance}; expected a fraction of the diagonal in (0, 0.2]")
     clock = Clock()
+    few = shape.faces is None and len(shape.points) <= FEW
     with clock("moments"):
-        moments = shape_moments(shape, ORDER, parts=0 if shape.faces is not None else PARTS)
+        moments = shape_moments(shape, ORDER, parts=0 if few or shape.faces is not None else PARTS)
         vectors = ntuples(moments)
     with clock("local_planes"):
-        evidence = gather(shape, moments, vectors, tolerance, np.random.default_rng(seed))
+        evidence = (few_points if few else gather)(shape, moments, vectors, tolerance, np.random.default_rng(seed))
     with clock("search"):
         found = assemble(evidence)
     return _report(found, evidence, vectors, tolerance, clock.seconds)
@@ -191,6 +192,22 @@ def gather(shape: Shape, moments: Moments, vectors: NTuples, tolerance: float, r
         weights=weights / weights.sum(),
         judge=make_judge(cloud, diagonal, tolerance),
         closer=closer,
+    )
+
+
+def few_points(shape: Shape, moments: Moments, vectors: NTuples, tolerance: float, _: np.random.Generator) -> Evidence:
+    """Evidence from points that stand for themselves: every direction is searched, whatever the n-tuples say."""
+    local = (shape.points - moments.center) / moments.scale
+    judge = make_judge(isolated_points(local), tight_diagonal(local), tolerance)
+    weights = np.ones(len(local)) if shape.weights is None else shape.weights
+    return Evidence(
+        moments=moments,
+        harmonics=harmonic_moments(moments),
+        tuples=replace(classify(vectors), kind="vanish"),
+        points=local,
+        weights=weights / weights.sum(),
+        judge=judge,
+        closer=lambda: judge,
     )
 
 

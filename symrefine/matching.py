@@ -35,6 +35,7 @@ class LocalPlanes:
         spacing: median distance from a point to the nearest other one of these M.
         redundancy: how many of the local planes each point of the cloud takes part in; >= 1.
         tree: kd-tree over `points`.
+        isolated: the points stand for themselves (atoms), not for a surface: there are no normals and no discs.
     """
 
     points: Array
@@ -45,6 +46,7 @@ class LocalPlanes:
     spacing: float
     redundancy: float
     tree: Any
+    isolated: bool = False
 
     def __post_init__(self) -> None:
         for name in ("points", "normals", "thickness", "flatness", "reach"):
@@ -146,6 +148,26 @@ def local_planes(
     )
 
 
+def isolated_points(points: Array) -> LocalPlanes:
+    """A small set of points [M, 3] that stand for themselves."""
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(points)
+    distance, _ = tree.query(points, k=2)
+    none = np.zeros(len(points))
+    return LocalPlanes(
+        points=points,
+        normals=np.zeros_like(points),
+        thickness=none,
+        flatness=none,
+        reach=none,
+        spacing=float(np.median(distance[:, 1])),
+        redundancy=1.0,
+        tree=tree,
+        isolated=True,
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pairs:
     """Correspondences under one operation: indices of sources and targets among the local planes, and their weights."""
@@ -170,20 +192,37 @@ def match(cloud: LocalPlanes, motion: Isometry, uncertainty: float, *, stride: i
     source = np.arange(0, len(cloud.points), stride)
     moved = motion.apply(cloud.points[source])
     distance, target = cloud.tree.query(moved, distance_upper_bound=3.0 * (cloud.spacing + uncertainty))
-    travel = np.linalg.norm(moved - cloud.points[source], axis=1)
-    keep = np.isfinite(distance) & (travel > cloud.spacing)
+    floor = max(SCALE_FLOOR * cloud.spacing, uncertainty)
+    keep = np.isfinite(distance)
+    if not cloud.isolated:
+        travel = np.linalg.norm(moved - cloud.points[source], axis=1)
+        keep &= travel > cloud.spacing
     source, target, moved = source[keep], target[keep], moved[keep]
+    if cloud.isolated:
+        return Pairs(sources=source, targets=target, weights=_robust(distance[keep], floor))
     turned = motion.turn(cloud.normals[source])
     agree = np.abs(np.einsum("ij,ij->i", turned, cloud.normals[target])) > np.sqrt(0.5)
     source, target, moved = source[agree], target[agree], moved[agree]
     error = np.einsum("ij,ij->i", moved - cloud.points[target], cloud.normals[target])
-    floor = max(SCALE_FLOOR * cloud.spacing, uncertainty)
-    return Pairs(sources=source, targets=target, weights=_pair_weights(cloud, source, target, error, floor))
+    flat = np.exp(-((cloud.flatness[source] / WORTH) ** 2) - (cloud.flatness[target] / WORTH) ** 2)
+    return Pairs(sources=source, targets=target, weights=flat * _robust(error, floor))
 
 
-def _pair_weights(cloud: LocalPlanes, source: Index, target: Index, error: Array, floor: float) -> Array:
+def _robust(error: Array, floor: float) -> Array:
+    """Geman-McClure weights [N] at a scale from the residuals [N], not below `floor`."""
     if error.size == 0:
         return np.empty(0)
-    flat = np.exp(-((cloud.flatness[source] / WORTH) ** 2) - (cloud.flatness[target] / WORTH) ** 2)
     scale2 = max(ROBUST * float(np.median(np.abs(error))), floor) ** 2
-    return flat * (scale2 / (scale2 + error**2)) ** 2
+    return (scale2 / (scale2 + error**2)) ** 2
+
+
+def pair_equations(cloud: LocalPlanes, pairs: Pairs) -> tuple[Array, Array, Array, Array]:
+    """Sources [E, 3], targets [E, 3], directions [E, 3] and weights [E] of the equations `(T x - y).n = 0` of the pairs.
+
+    One for each pair of local planes, along the target's normal; three for each pair of isolated points.
+    """
+    sources, targets = cloud.points[pairs.sources], cloud.points[pairs.targets]
+    if not cloud.isolated:
+        return sources, targets, cloud.normals[pairs.targets], pairs.weights
+    directions = np.tile(np.eye(3), (len(sources), 1))
+    return np.repeat(sources, 3, axis=0), np.repeat(targets, 3, axis=0), directions, np.repeat(pairs.weights, 3)

@@ -12,7 +12,7 @@ import numpy as np
 
 from symrefine.gauss_newton import Linearisation, Solution, minimise
 from symrefine.geometry import Array, Isometry, Plane, frame_with_z, householder, read_only
-from symrefine.matching import LocalPlanes, Pairs, match
+from symrefine.matching import LocalPlanes, Pairs, match, pair_equations
 from symrefine.residual import axis_gram, design_rows, frame_model, gram, observable_motions, theta_model, turn_frame
 
 MAX_OUTER = 10
@@ -175,8 +175,8 @@ def _remaining(x: Array, last: Array) -> float:
 
 
 def _pair_gram(cloud: LocalPlanes, pairs: Pairs) -> Array:
-    rows = design_rows(cloud.points[pairs.sources], cloud.points[pairs.targets], cloud.normals[pairs.targets])
-    return gram(rows, pairs.weights)
+    sources, targets, directions, weights = pair_equations(cloud, pairs)
+    return gram(design_rows(sources, targets, directions), weights)
 
 
 def _thetas(grams: Array, state: Framed) -> Array:

@@ -33,6 +33,8 @@ PROMISING = 2.0
 AXIS_HOPELESS = 0.15
 # Excesses between these are close calls.
 CLOSE = (0.5, 1.4)
+# Folds tried one by one about the axes of a small set of points.
+SMALL_FOLD = 12
 # A fold that no moment reaches: only the coefficients with m = 0 are invariant.
 ROUND_FOLD = 10**6
 
@@ -218,6 +220,8 @@ def turns_about(evidence: Evidence, direction: Array, center: Array) -> Turn | N
     """The rotation of highest order about a direction that holds, or None."""
     frame = frame_with_z(direction)
     folds = {c.fold for c in fold_candidates(evidence.points, evidence.weights, direction)}
+    if evidence.judge.cloud.isolated:
+        folds |= set(range(2, min(len(evidence.points), SMALL_FOLD) + 1))
     best: Turn | None = None
     for fold in sorted({*folds, 2, 3}, reverse=True):
         if best is not None and best.order % fold == 0:

@@ -68,11 +68,16 @@ class Judge:
         found = [_summary(miss_distances(self.cloud, m, stride=stride) / self.diagonal) for m in motions]
         worst = Deviation(**{f.name: max(getattr(d, f.name) for d in found) for f in fields(Deviation)})
         ratios = worst.over_limits(self.tolerance, self.floor)
+        if self.cloud.isolated:
+            # Every point counts: one atom out of place breaks the symmetry.
+            ratios = (*ratios, worst.max / (LIMITS[-1] * self.tolerance))
         return Verdict(deviation=worst, excess=max(ratios), bulk=max(ratios[:2]))
 
 
 def make_judge(cloud: LocalPlanes, diagonal: float, tolerance: float) -> Judge:
     """A judge that knows what the cloud shows against itself."""
+    if cloud.isolated:
+        return Judge(cloud=cloud, diagonal=diagonal, tolerance=tolerance, floor=_summary(np.zeros(1)))
     own = disc_distances(cloud, cloud.points[:: max(1, len(cloud.points) // OWN)], skip_self=True) / diagonal
     return Judge(cloud=cloud, diagonal=diagonal, tolerance=tolerance, floor=_summary(own))
 
