@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from symrefine.elements import Element, elements_of, mirror_element
 from symrefine.errors import DegenerateShapeError
-from symrefine.geometry import Array, Isometry, frame_with_z, householder, rotation, rotoreflection, unit
+from symrefine.geometry import Array, frame_with_z, householder, rotation, rotoreflection, unit
 from symrefine.groups import PointGroup, from_elements
 from symrefine.refine import Framed, Iterate
 from symrefine.search import (
@@ -34,8 +35,6 @@ RIVAL = 4.0
 EXACT = 0.35
 # Directions of elements are known to this before the joint refinement.
 DIRECTION_ERROR_RAD = math.radians(1.5)
-# Angles that stand for a continuous axis.
-FREE_TURNS = (0.517, 1.234, 2.6833)
 KNOWN_RAD = math.radians(4.0)
 # Directions closer than this are the same start for an axis, which is then polished.
 APART_RAD = math.radians(1.0)
@@ -45,20 +44,6 @@ ROUND_LIMIT = 0.5
 # How many candidates are looked at for the list of near misses once the group is known.
 NEAR = 5
 NOTHING = np.zeros((0, 3))
-# Distances evaluated in all for the final judgement of a group's elements, and at least for each.
-JUDGED = 12000
-JUDGED_EACH = 600
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Element:
-    """One element of the group in normalised units: "plane", "axis" or "improper", and by how much it misses."""
-
-    kind: str
-    direction: Array
-    point: Array
-    order: float
-    verdict: Verdict
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -80,7 +65,7 @@ def assemble(evidence: Evidence) -> Assembly:
     if math.isinf(bundle.fold):
         return _round(evidence, bundle)
     group = PointGroup(name=f"C{int(bundle.fold)}v", frame=bundle.state.frame)
-    near = [_mirror_element(m) for m in mirrors(evidence, NOTHING, count=NEAR, known=_mirror_of(group), thorough=False)]
+    near = [mirror_element(m) for m in mirrors(evidence, NOTHING, count=NEAR, known=_mirror_of(group), thorough=False)]
     return _finish(evidence, group, bundle.state.center, bundle.history, near)
 
 
@@ -147,7 +132,7 @@ def _from_parts(evidence: Evidence) -> Assembly:
         done = _group_of(evidence, group, held, turns, near)
         if all(e.verdict.excess <= 1.0 for e in done.elements) or not (held or turns):
             return done
-        near.extend(_mirror_element(m) for m in _without_worst(held, turns))
+        near.extend(mirror_element(m) for m in _without_worst(held, turns))
 
 
 def _group_of(
@@ -199,7 +184,7 @@ def _mirror_group(evidence: Evidence) -> tuple[list[Mirror], list[Element], Poin
             group, held, _ = _closed([m for m in held if _holds(m.verdict, limit)], [])
         if lone and held and len(near) >= NEAR:
             break
-    return held, [_mirror_element(m) for m in near], group
+    return held, [mirror_element(m) for m in near], group
 
 
 def _mirror_of(group: PointGroup) -> Callable[[Array], bool]:
@@ -317,10 +302,7 @@ def _joint(group: PointGroup, center: Array) -> Framed | None:
 def _finish(
     evidence: Evidence, group: PointGroup, center: Array, history: tuple[Iterate, ...], near: list[Element]
 ) -> Assembly:
-    parts = _parts(group)
-    stride = evidence.stride(max(JUDGED_EACH, JUDGED // max(1, len(parts))))
-    judged = (_judged(evidence, part, center, stride) for part in parts)
-    elements = tuple(sorted(judged, key=lambda e: (-e.order, e.verdict.excess)))
+    elements = elements_of(evidence, group, center)
     own = [e.direction for e in elements if e.kind == "plane"]
     rejected = [e for e in near if all(abs(e.direction @ n) < np.cos(np.radians(3.0)) for n in own)]
     return Assembly(
@@ -329,55 +311,4 @@ def _finish(
         elements=elements,
         rejected=tuple(sorted(rejected, key=lambda e: e.verdict.excess)),
         history=history,
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Part:
-    """An element to be judged: what it is, and matrices that stand for it."""
-
-    kind: str
-    direction: Array
-    order: float
-    matrices: tuple[Array, ...]
-
-
-def _parts(group: PointGroup) -> list[_Part]:
-    """Every discrete mirror, every axis and rotoreflection axis of the group."""
-    normals = group.mirrors()
-    if group.name in ("Cinfv", "Kh"):
-        normals = NOTHING
-    elif group.name == "Dinfh":
-        normals = group.frame[2:]
-    parts = [_Part(kind="plane", direction=n, order=1.0, matrices=(householder(n),)) for n in normals]
-    for direction, order in _listed_axes(group):
-        angles = FREE_TURNS if math.isinf(order) else (2 * np.pi / order,)
-        turns = tuple(rotation(direction, float(a)) for a in angles)
-        parts.append(_Part(kind="axis", direction=direction, order=order, matrices=turns))
-    for direction, order in group.improper_axes() if group.is_finite else []:
-        turn = rotoreflection(direction, 2 * np.pi / order)
-        parts.append(_Part(kind="improper", direction=direction, order=order, matrices=(turn,)))
-    return parts
-
-
-def _listed_axes(group: PointGroup) -> list[tuple[Array, float]]:
-    """Discrete axes, and the continuous one; a sphere or a cylinder's endless family is left to the group's name."""
-    if group.is_finite:
-        return group.rotation_axes()
-    return [(u, k) for u, k in group.rotation_axes() if math.isinf(k)][:1]
-
-
-def _judged(evidence: Evidence, part: _Part, center: Array, stride: int) -> Element:
-    motions = [Isometry.about(center, m) for m in part.matrices]
-    verdict = evidence.verdict(motions, stride=stride)
-    return Element(kind=part.kind, direction=part.direction, point=center, order=part.order, verdict=verdict)
-
-
-def _mirror_element(m: Mirror) -> Element:
-    return Element(
-        kind="plane",
-        direction=m.plane.normal,
-        point=m.plane.offset * m.plane.normal,
-        order=1.0,
-        verdict=m.verdict,
     )

@@ -9,8 +9,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from symrefine.assemble import Assembly, Element, assemble
+from symrefine.assemble import Assembly, assemble
 from symrefine.axis import TupleClass, classify
+from symrefine.elements import Element
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Axis, Plane, read_only, tight_diagonal
 from symrefine.groups import PointGroup

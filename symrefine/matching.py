@@ -124,8 +124,10 @@ def local_planes(
 
     pick = np.sort(rng.choice(len(points), min(count, len(points)), replace=False))
     chosen, redundancy = points[pick], 1.0
+    thickness: Array = np.zeros(len(pick))
+    flatness: Array = np.zeros(len(pick))
     if normals is not None and exact:
-        n, thickness, flatness = normals[pick], np.zeros(len(pick)), np.zeros(len(pick))
+        n = normals[pick]
     else:
         tree = cKDTree(points, balanced_tree=False, compact_nodes=False) if tree is None else tree
         k = choose_neighbours(points, tree, rng)
@@ -217,7 +219,7 @@ def _robust(error: Array, floor: float) -> Array:
 
 
 def pair_equations(cloud: LocalPlanes, pairs: Pairs) -> tuple[Array, Array, Array, Array]:
-    """Sources [E, 3], targets [E, 3], directions [E, 3] and weights [E] of the equations `(T x - y).n = 0` of the pairs.
+    """Sources, targets and directions [E, 3] and weights [E] of the equations `(T x - y).n = 0` that the pairs make.
 
     One for each pair of local planes, along the target's normal; three for each pair of isolated points.
     """

@@ -16,8 +16,9 @@ from matplotlib.mathtext import MathTextParser
 from symrefine.errors import InputError
 from symrefine.geometry import random_orthogonal
 from symrefine.ntuples import notation
-from symrefine.ntuples.derive import derive, monomial_count, null_space
+from symrefine.ntuples.derive import derive, monomial_count
 from symrefine.ntuples.notation import NTupleBasis, from_json, to_json, to_latex, to_python, to_text
+from symrefine.ntuples.nullspace import null_space
 
 # (dim, orders, rotations only, rotations and a reflection): method.md, section 2; the last line is not there.
 DIMENSIONS = [
