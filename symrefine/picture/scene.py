@@ -1,0 +1,249 @@
+"""The scene that every picture of a detection shows: outlines of planes, axes and near misses, with names and colours.
+
+Everything is relative to the centre of the detection, in input units, so that single precision suffices to draw it.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from symrefine.detect import Detection, FoundAxis
+from symrefine.geometry import Array, Plane, read_only, unit
+from symrefine.picture.words import order_name
+from symrefine.shape import Shape
+
+Colour = tuple[int, int, int]
+
+# Okabe and Ito's colours, which colour-blind people tell apart too, without those that white swallows.
+PALETTE: tuple[Colour, ...] = (
+    (0, 114, 178), (213, 94, 0), (0, 158, 115), (180, 80, 150), (224, 150, 0), (64, 160, 220),
+)  # fmt: skip
+OBJECT: Colour = (168, 178, 194)
+AXIS: Colour = (38, 42, 52)
+MISS: Colour = (120, 120, 128)
+# How far planes and axes stick out of the object, in diagonals.
+MARGIN, AXIS_MARGIN = 0.06, 0.16
+# Axes this close together are one line with two names.
+SAME_LINE_RAD = math.radians(1.0)
+# Radius of the mark that tells the order of an axis, in diagonals.
+MARK = 0.05
+MAX_MARKS = 3
+# Planes without an axis in common that can be seen at once.
+MOST_SHEETS = 8
+
+
+def plane_colour(index: int) -> Colour:
+    """Colour of the plane listed at `index`."""
+    return PALETTE[index % len(PALETTE)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Quad:
+    """Part of a plane to draw: corners [4, 3] in turn, unit normal, name and colour."""
+
+    corners: Array
+    normal: Array
+    name: str
+    colour: Colour
+
+    def __post_init__(self) -> None:
+        for name in ("corners", "normal"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Line:
+    """Part of an axis to draw: ends [2, 3], name, colour, order, and a mark [K, 3] around it that tells its order."""
+
+    ends: Array
+    name: str
+    colour: Colour
+    order: float
+    mark: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def __post_init__(self) -> None:
+        for name in ("ends", "mark"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stage:
+    """Where a shape stands in its picture.
+
+    Attributes:
+        center: [3] the detection's centre; everything else is relative to it.
+        points: [M, 3] some of the shape's points.
+        frame: [3, 3] rows: two horizontal directions and the vertical one, determinant +1.
+        diagonal: of the smallest bounding box.
+    """
+
+    center: Array
+    points: Array
+    frame: Array
+    diagonal: float
+
+    def __post_init__(self) -> None:
+        for name in ("center", "points", "frame"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    def quad(self, plane: Plane, name: str, colour: Colour) -> Quad:
+        """The part of a plane (input units) that the shape fills, and a little more."""
+        along = self._vertical_in(plane.normal)
+        across = np.cross(plane.normal, along)
+        foot = (plane.offset - float(plane.normal @ self.center)) * plane.normal
+        a_low, a_high = self._extent(along, MARGIN)
+        b = max(abs(v) for v in self._extent(across, MARGIN))
+        corners = [foot + s * along + t * across for s, t in ((a_low, -b), (a_low, b), (a_high, b), (a_high, -b))]
+        return Quad(corners=np.array(corners), normal=plane.normal, name=name, colour=colour)
+
+    def line(
+        self, point: Array, direction: Array, name: str, colour: Colour, order: float, *, marked: bool = False
+    ) -> Line:
+        """The part of an axis (input units) that pierces the shape, and a little more, the upper end last."""
+        u = direction * _sign(float(self.frame[2] @ direction))
+        foot = point - self.center
+        foot = foot - (foot @ u) * u
+        low, high = self._extent(u, AXIS_MARGIN)
+        mark = foot + (high - 0.4 * AXIS_MARGIN * self.diagonal) * u + self._mark(u, order)
+        return Line(
+            ends=np.stack([foot + low * u, foot + high * u]),
+            name=name,
+            colour=colour,
+            order=order,
+            mark=mark if marked else np.zeros((0, 3)),
+        )
+
+    def _mark(self, u: Array, order: float) -> Array:
+        """The crystallographer's sign of an axis: a lens, a triangle, a square, ... a circle."""
+        corners = 64 if order > 12 or order == 2 else int(order)
+        angles = 2 * np.pi * np.arange(corners + 1) / corners
+        narrow = 0.35 if order == 2 else 1.0
+        base = self.frame[0] if abs(u @ self.frame[0]) < 0.9 else self.frame[1]
+        side = unit(base - (base @ u) * u)
+        front = np.cross(u, side)
+        ring = np.cos(angles)[:, None] * side + narrow * np.sin(angles)[:, None] * front
+        return MARK * self.diagonal * ring
+
+    def _vertical_in(self, normal: Array) -> Array:
+        """The direction in a plane that is nearest to the vertical, or to a horizontal for planes that lie."""
+        base = self.frame[2] if abs(normal @ self.frame[2]) < 0.95 else self.frame[1]
+        return unit(base - (base @ normal) * normal)
+
+    def _extent(self, direction: Array, margin: float) -> tuple[float, float]:
+        reach = self.points @ direction
+        return float(reach.min()) - margin * self.diagonal, float(reach.max()) + margin * self.diagonal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Scene:
+    """What there is to draw beside the shape: planes and axes found, and the candidates turned down."""
+
+    stage: Stage
+    planes: tuple[Quad, ...]
+    axes: tuple[Line, ...]
+    missed_planes: tuple[Quad, ...]
+    missed_axes: tuple[Line, ...]
+
+    @property
+    def main_axes(self) -> tuple[Line, ...]:
+        """The axes of the highest order."""
+        highest = max((a.order for a in self.axes), default=0.0)
+        return tuple(a for a in self.axes if a.order == highest)
+
+    @property
+    def crowded(self) -> bool:
+        """Whether there are many planes without an axis in common, as in a cube: too many to see through."""
+        normals = np.array([q.normal for q in self.planes]).reshape(-1, 3)
+        return len(normals) > MOST_SHEETS and np.linalg.svd(normals, compute_uv=False)[2] > 0.1
+
+
+def make_scene(detection: Detection, shape: Shape) -> Scene:
+    """The scene of a detection; planes are named 1, 2, ... in their order there, axes by their symbol."""
+    stage = make_stage(detection, shape)
+    missed_planes, missed_axes = _missed(detection, stage)
+    return Scene(
+        stage=stage,
+        planes=tuple(stage.quad(p.plane, str(k + 1), plane_colour(k)) for k, p in enumerate(detection.planes)),
+        axes=_lines(detection, stage),
+        missed_planes=missed_planes,
+        missed_axes=missed_axes,
+    )
+
+
+def make_stage(detection: Detection, shape: Shape, most: int = 20000) -> Stage:
+    """Where the shape stands: up to `most` of its points, and a frame with the main axis upright."""
+    relative = shape.points[:: max(1, len(shape.points) // most)] - detection.center
+    if shape.faces is None and len(relative) >= 1000:
+        distance = np.linalg.norm(relative, axis=1)
+        relative = relative[distance <= 1.02 * np.quantile(distance, 0.999)]
+    diagonal = detection.diagonal or float(np.linalg.norm(np.ptp(relative, axis=0)))
+    return Stage(center=detection.center, points=relative, frame=_upright(detection, relative), diagonal=diagonal)
+
+
+def _upright(detection: Detection, points: Array) -> Array:
+    """Frame with the vertical on the main axis; without one, near the third axis of the input."""
+    name, group = detection.point_group, detection.group
+    x, y, z = group.frame
+    if name == "Cs":
+        return _standing(_in_plane(detection.planes[0].plane.normal if detection.planes else z, points), z)
+    if name in ("C1", "Ci", "Kh"):
+        return np.eye(3)
+    if group.symbol.fold in (0, 2):
+        up = max((x, y, z), key=lambda row: round(abs(float(row[2])), 6))
+        return _standing(up, x if up is not x else y)
+    return _standing(z, x)
+
+
+def _in_plane(normal: Array, points: Array) -> Array:
+    """Vertical of an object with one mirror: the input's, or where that is no choice the object's longest extent."""
+    if abs(normal[2]) < 0.85:
+        return unit(np.array([0.0, 0.0, 1.0]) - normal[2] * normal)
+    across = points - np.multiply.outer(points @ normal, normal)
+    longest: Array = np.linalg.eigh(across.T @ across)[1][:, -1]
+    return unit(longest - (longest @ normal) * normal)
+
+
+def _standing(up: Array, side: Array) -> Array:
+    """Right-handed rows (side, front, up), the vertical pointing to the upper side of the input."""
+    largest = up[2] if abs(up[2]) > 0.05 else up[int(np.argmax(np.abs(up)))]
+    up = up * _sign(float(largest))
+    side = unit(side - (side @ up) * up)
+    return np.stack([side, np.cross(up, side), up])
+
+
+def _sign(value: float) -> float:
+    return -1.0 if value < 0 else 1.0
+
+
+def _lines(detection: Detection, stage: Stage) -> tuple[Line, ...]:
+    """One line for each axis; a rotoreflection about the same line only adds its name."""
+    bundles: list[list[FoundAxis]] = []
+    for found in detection.axes:
+        for known in bundles:
+            if abs(found.axis.direction @ known[0].axis.direction) > math.cos(SAME_LINE_RAD):
+                known.append(found)
+                break
+        else:
+            bundles.append([found])
+    bundles = [sorted(bundle, key=lambda found: found.improper) for bundle in bundles]
+    marked = len(bundles) <= MAX_MARKS
+    return tuple(_line(stage, bundle, marked) for bundle in bundles)
+
+
+def _line(stage: Stage, bundle: list[FoundAxis], marked: bool) -> Line:
+    first = bundle[0]
+    names = " ".join(order_name(found.order, found.improper) for found in bundle)
+    return stage.line(first.axis.point, first.axis.direction, names, AXIS, first.order, marked=marked)
+
+
+def _missed(detection: Detection, stage: Stage) -> tuple[tuple[Quad, ...], tuple[Line, ...]]:
+    quads, lines = [], []
+    for number, miss in enumerate(detection.near_misses, start=1):
+        if miss.kind == "plane":
+            plane = Plane(normal=miss.direction, offset=float(miss.direction @ miss.point))
+            quads.append(stage.quad(plane, f"near miss {number}", MISS))
+        else:
+            name = f"near miss {number}, {order_name(miss.order, miss.kind == 'improper')}"
+            lines.append(stage.line(miss.point, miss.direction, name, MISS, miss.order))
+    return tuple(quads), tuple(lines)

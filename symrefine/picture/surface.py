@@ -1,0 +1,103 @@
+"""The shape as the painter takes it: triangles with their normals, or points with estimated ones."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from symrefine.geometry import Array, read_only
+from symrefine.picture.scene import OBJECT, Quad, Scene
+from symrefine.quadrature import triangle_areas_and_normals
+from symrefine.shape import Index, Shape
+
+# Points of a cloud that are painted, and the fewest whose neighbourhoods say anything about normals.
+MOST_POINTS, FEWEST_FOR_NORMALS, NEIGHBOURS = 40000, 300, 40
+# Radius of a painted point in typical spacings.
+COVER = 0.6
+# Share of the points in a plane from which they are the shape rather than its cut with that plane.
+FLAT = 0.3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Surface:
+    """Something to paint, relative to the centre of its scene.
+
+    Attributes:
+        points: [N, 3] of a cloud, or vertices.
+        normals: [N, 3] of the points or [F, 3] of the faces, unit or zero, any sign.
+        colours: [N, 3] of the points or [F, 3] of the faces, 0 to 1.
+        faces: [F, 3], or None for a cloud.
+        radius: of each point of a cloud.
+        depth_scale: steps in depth of this size look like the edge of something.
+    """
+
+    points: Array
+    normals: Array
+    colours: Array
+    faces: Index | None
+    radius: float
+    depth_scale: float
+
+    def __post_init__(self) -> None:
+        for name in ("points", "normals", "colours"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+def make_surface(shape: Shape, scene: Scene) -> Surface:
+    """The shape, or a part of the points of a large cloud; those that lie in a plane have its colour."""
+    stage = scene.stage
+    if shape.faces is not None:
+        points = shape.points - stage.center
+        _, normals = triangle_areas_and_normals(points, shape.faces)
+        scale = 0.03 * stage.diagonal
+        return Surface(
+            points=points,
+            normals=normals,
+            colours=_plain(len(normals)),
+            faces=shape.faces,
+            radius=0.0,
+            depth_scale=scale,
+        )
+    step = max(1, -(-len(shape.points) // MOST_POINTS))
+    points = shape.points[::step] - stage.center
+    radius = COVER * stage.diagonal * _spacing(points / stage.diagonal)
+    return Surface(
+        points=points,
+        normals=_normals(points / stage.diagonal) if shape.normals is None else shape.normals[::step],
+        colours=_tinted(points, scene.planes, 0.9 * radius),
+        faces=None,
+        radius=radius,
+        depth_scale=0.06 * stage.diagonal,
+    )
+
+
+def _plain(count: int) -> Array:
+    return np.tile(np.array(OBJECT) / 255.0, (count, 1))
+
+
+def _tinted(points: Array, planes: tuple[Quad, ...], width: float) -> Array:
+    """Colours of points: those of the planes they are closer to than `width`."""
+    colours = _plain(len(points))
+    for quad in planes:
+        near = np.abs((points - quad.corners[0]) @ quad.normal) < width
+        if near.mean() < FLAT:
+            colours[near] += 0.75 * (np.array(quad.colour) / 255.0 - colours[near])
+    return colours
+
+
+def _spacing(points: Array) -> float:
+    """Typical distance from a point to its fourth neighbour, as a fraction of the diagonal, within reason."""
+    from scipy.spatial import cKDTree
+
+    distance, _ = cKDTree(points).query(points[:: max(1, len(points) // 2000)], k=min(5, len(points)))
+    return float(np.clip(np.median(distance[:, -1]), 0.003, 0.02))
+
+
+def _normals(points: Array) -> Array:
+    """Unit normals [N, 3] of planes fitted to neighbours; zero for clouds too thin to tell."""
+    if len(points) < FEWEST_FOR_NORMALS:
+        return np.zeros(points.shape)
+    from scipy.spatial import cKDTree
+
+    _, near = cKDTree(points).query(points, k=NEIGHBOURS)
+    spread = points[near] - points[near].mean(axis=1, keepdims=True)
+    return np.asarray(np.linalg.eigh(np.einsum("nki,nkj->nij", spread, spread))[1][:, :, 0])

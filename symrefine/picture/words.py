@@ -1,0 +1,127 @@
+"""What a point group means, in words a person reads."""
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from symrefine.detect import Detection
+from symrefine.geometry import Array
+from symrefine.groups import PointGroup
+
+_NAMED = {
+    "C1": "no symmetry",
+    "Cs": "one mirror plane",
+    "Ci": "an inversion centre, no mirror plane",
+    "Cinfv": "surface of revolution",
+    "Dinfh": "surface of revolution with a mirror plane across its axis",
+    "Kh": "sphere",
+    "D2": "three two-fold axes at right angles, no mirror plane",
+    "D2h": "three mirror planes at right angles",
+    "T": "the rotations of a tetrahedron, no mirror plane",
+    "Td": "the full symmetry of a tetrahedron",
+    "Th": "the rotations of a tetrahedron and an inversion centre",
+    "O": "the rotations of a cube, no mirror plane",
+    "Oh": "the full symmetry of a cube",
+    "I": "the rotations of an icosahedron, no mirror plane",
+    "Ih": "the full symmetry of an icosahedron",
+}
+_AXIAL = {
+    "C": "{axis}, no mirror plane",
+    "Cv": "{mirrors} through {axis}",
+    "Ch": "{axis} with a mirror plane across it",
+    "S": "{rotoreflection}, no mirror plane",
+    "D": "{axis} and {half_turns} across it, no mirror plane",
+    "Dh": "{mirrors} through {axis} and one across it",
+    "Dd": "{mirrors} through {axis}, {half_turns} between them",
+}
+_COUNTS = "no one two three four five six seven eight nine ten eleven twelve".split()
+_TUPLES = {
+    "none": "span space: neither a mirror plane nor an axis is possible",
+    "plane": "lie in one plane: a mirror plane at most",
+    "axis": "lie on one line: an axis, with or without mirror planes through it",
+    "vanish": "all vanish: several axes, an inversion, or a mirror plane across an axis",
+}
+
+
+def headline(detection: Detection) -> str:
+    """The result in one line: the group with its meaning, or why there is none."""
+    if detection.undetermined:
+        return f"Undetermined: {detection.undetermined}"
+    return f"{symbol(detection.point_group)}: {meaning(detection.group)}"
+
+
+def symbol(name: str) -> str:
+    """Schoenflies symbol with its infinity: Cinfv becomes C∞v."""
+    return name.replace("inf", "∞")
+
+
+def meaning(group: PointGroup) -> str:
+    """What a point group stands for."""
+    if group.name in _NAMED:
+        return _NAMED[group.name]
+    fold = group.symbol.fold
+    if math.isinf(fold):
+        return "surface of revolution"
+    n = int(fold)
+    return _AXIAL[group.symbol.family].format(
+        axis=f"{_fold(n)} axis",
+        rotoreflection=f"{_fold(2 * n)} rotoreflection axis",
+        mirrors=count(n, "mirror plane"),
+        half_turns=count(n, "two-fold axis", "two-fold axes"),
+    )
+
+
+def _fold(n: int) -> str:
+    article = "an" if n in (8, 11, 18) or 80 <= n < 90 else "a"
+    return f"{article} {_spelt(n)}-fold"
+
+
+def fit(detection: Detection) -> str:
+    """How well what was found holds, in one sentence; empty when nothing was found."""
+    misses = [p.residual.p95 for p in detection.planes] + [a.residual.p95 for a in detection.axes]
+    if not misses or detection.undetermined:
+        return ""
+    each = "it" if len(misses) == 1 else "each of them"
+    return (
+        f"Under {each}, 95 % of the surface meets itself within {percent(max(*misses, 1e-4))} of the diagonal; "
+        f"{percent(detection.tolerance)} is allowed."
+    )
+
+
+def tuples_meaning(kind: str) -> str:
+    """What the rank of the n-tuples allows."""
+    return _TUPLES[kind]
+
+
+def percent(fraction: float) -> str:
+    """A fraction to two significant digits, in percent."""
+    return f"{100.0 * fraction:.2g} %" if fraction >= 1e-4 or fraction == 0 else "less than 0.01 %"
+
+
+def count(number: int, noun: str, plural: str = "") -> str:
+    """A number with its noun."""
+    return f"{_spelt(number)} {noun if number == 1 else plural or noun + 's'}"
+
+
+def _spelt(number: int) -> str:
+    return _COUNTS[number] if number < len(_COUNTS) else str(number)
+
+
+def order_name(order: float, improper: bool = False) -> str:
+    """Symbol of an axis: C4, S8, C∞."""
+    return ("S" if improper else "C") + ("∞" if math.isinf(order) else str(round(order)))
+
+
+def direction(vector: Array) -> str:
+    """A unit vector in brackets, turned so that its first component of some size is positive."""
+    size = np.abs(vector)
+    turned = vector * np.sign(vector[int(np.argmax(size >= 0.1 * size.max()))])
+    return "(" + ", ".join(f"{round(float(v), 4) + 0.0:.4f}" for v in turned) + ")"
+
+
+def coordinates(values: Iterable[float], scale: float) -> str:
+    """A point in brackets, to a ten-thousandth of `scale`, whatever its distance from the origin."""
+    digits = min(12, max(0, 4 - math.floor(math.log10(scale)))) if scale > 0 else 6
+    plain = [f"{round(float(v), digits) + 0.0:.{digits}f}" for v in values]
+    return "(" + ", ".join(p if len(p) < 18 else f"{float(v):.9g}" for p, v in zip(plain, values, strict=True)) + ")"

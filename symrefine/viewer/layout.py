@@ -1,0 +1,78 @@
+"""How a recording looks when it opens: the shape on the left, series and texts on the right."""
+
+import math
+from typing import Any
+
+from symrefine.detect import Detection
+from symrefine.picture.camera import look_at
+from symrefine.picture.scene import Colour, Scene
+
+# Series of the refinement: entity under /series, title and colour.
+SERIES: dict[str, tuple[str, Colour]] = {
+    "turn_deg": ("turn of the frame [deg]", (255, 150, 60)),
+    "cost": ("cost: mean squared residual", (86, 180, 233)),
+    "inliers": ("pairs in agreement", (60, 200, 150)),
+    "step": ("step [rad, RMS radii]", (220, 130, 190)),
+}
+# What the viewer's camera spans unless told otherwise, and the share of it that is filled.
+FOV_RAD, FILL = math.radians(55.0), 0.78
+BACKGROUND = (22, 25, 32)
+
+
+def blueprint(detection: Detection, scene: Scene, scale: float) -> Any:
+    """The layout; `scale` is that of the transform above all positions."""
+    import rerun.blueprint as rrb
+
+    refined = len(detection.history) > 1
+    views = [_view("Result", scene, scale, ["- /object/refinement/**"])]
+    if refined:
+        without = [
+            "- /object/cloud",
+            "- /object/mesh",
+            "- /object/planes/**",
+            "- /object/ntuples",
+            "- /object/near_misses/**",
+        ]
+        views.append(_view("Refinement", scene, scale, without))
+    report = rrb.TextDocumentView(origin="/report", name="Report")
+    log = rrb.TextLogView(origin="/log", name="Log")
+    right = rrb.Vertical(report, _series(), log, row_shares=[4, 4, 2]) if refined else rrb.Vertical(report, log)
+    return rrb.Blueprint(
+        rrb.Horizontal(rrb.Tabs(*views, active_tab=0), right, column_shares=[3, 2]),
+        rrb.TimePanel(timeline="iteration", state="collapsed", play_state="paused"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+        auto_views=False,
+    )
+
+
+def _view(name: str, scene: Scene, scale: float, without: list[str]) -> Any:
+    """A 3-D view from where the scene shows best; near misses, and planes that crowd it, are switched off."""
+    import rerun.blueprint as rrb
+
+    hidden = ["object/near_misses", *(["object/planes", "object/refinement/planes"] if scene.crowded else [])]
+    camera = look_at(scene, aspect=1.1, fov_rad=FOV_RAD, fill=FILL)
+    return rrb.Spatial3DView(
+        origin="/",
+        name=name,
+        contents=["+ /object/**", *without],
+        overrides={entity: rrb.EntityBehavior(visible=False) for entity in hidden},
+        background=BACKGROUND,
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(
+            position=scale * camera.eye, look_target=scale * camera.target, eye_up=camera.up, kind=rrb.Eye3DKind.Orbital
+        ),
+    )
+
+
+def _series() -> Any:
+    """A tab for each series, and one for the planes' own angles."""
+    import rerun.blueprint as rrb
+
+    hidden = rrb.PlotLegend(visible=False)
+    views = [
+        rrb.TimeSeriesView(origin=f"/series/{name}", name=title.split(":")[0], plot_legend=hidden)
+        for name, (title, _) in SERIES.items()
+    ]
+    views.insert(1, rrb.TimeSeriesView(origin="/series/theta_deg", name="theta [deg]"))
+    return rrb.Tabs(*views, active_tab=0)

@@ -1,0 +1,67 @@
+"""Opening recordings in the viewer."""
+
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from symrefine.errors import InputError, SymrefineError
+
+# Seconds within which a viewer that cannot open a window gives up.
+PATIENCE = 2.0
+
+
+def open_recording(path: Path | str) -> None:
+    """Open a recording in a viewer of its own, and return.
+
+    Raises:
+        InputError: no such file, or not a recording.
+        SymrefineError: the viewer does not start, for want of a display for example.
+    """
+    check_recording(Path(path))
+    with tempfile.TemporaryFile() as said:  # not a pipe: the viewer outlives this process and goes on talking
+        viewer = subprocess.Popen(
+            [*_rerun(), "--new", "--bind", "127.0.0.1", str(path)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=said,
+            start_new_session=True,
+        )
+        try:
+            status = viewer.wait(timeout=PATIENCE)
+        except subprocess.TimeoutExpired:
+            return
+        said.seek(0)
+        reason = _reason(said.read().decode(errors="replace"))
+    if status != 0:
+        raise SymrefineError(
+            f"the viewer did not start: {reason}; `rerun --serve-web --bind 127.0.0.1 {path}` shows it in a browser"
+        )
+
+
+def check_recording(path: Path) -> None:
+    """Refuse what is not a whole recording.
+
+    Raises:
+        InputError: no such file, not a recording, or one that ends too soon.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; `symrefine detect FILE --recording {path}` writes one")
+    with path.open("rb") as file:
+        if file.read(3) != b"RRF":
+            raise InputError(f"{path}: not a recording of rerun; `symrefine detect FILE --recording X.rrd` writes one")
+    done = subprocess.run([*_rerun(), "rrd", "verify", str(path)], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise InputError(f"{path}: the recording is damaged: {_reason(done.stderr)}")
+
+
+def _rerun() -> list[str]:
+    """The command `rerun` of this interpreter; `-m rerun_cli` would lose its exit status."""
+    return [sys.executable, "-c", "import sys; from rerun_cli.__main__ import main; sys.exit(main())"]
+
+
+def _reason(errors: str) -> str:
+    """The last line that says something, without the place in the viewer's source."""
+    lines = [line.strip() for line in errors.splitlines() if line.strip()]
+    return re.sub(r"^(Error: |.*\.rs:\d+: )|\.$", "", lines[-1]) if lines else "it gave no reason"
