@@ -42,7 +42,7 @@ MAX_OPERATIONS = 9
 # An object is called round only if it misses by less than this share of the limits; a nut with its eight sides is not.
 ROUND_LIMIT = 0.5
 # How many candidates are looked at for the list of near misses once the group is known.
-NEAR = 5
+NEAR = 4
 NOTHING = np.zeros((0, 3))
 
 
@@ -173,7 +173,7 @@ def _mirror_group(evidence: Evidence) -> tuple[list[Mirror], list[Element], Poin
     def known(normal: Array) -> bool:
         return _mirror_of(group)(normal)
 
-    lone = evidence.tuples.kind in ("plane", "none")
+    few = evidence.tuples.kind != "vanish"
     for mirror in mirrors(evidence, evidence.tuples.directions[2:], known=known):
         if mirror.verdict.excess > 1.0:
             near.append(mirror)
@@ -182,7 +182,7 @@ def _mirror_group(evidence: Evidence) -> tuple[list[Mirror], list[Element], Poin
             limit = _limit(m.verdict for m in held)
             near += [m for m in held if not _holds(m.verdict, limit)]
             group, held, _ = _closed([m for m in held if _holds(m.verdict, limit)], [])
-        if lone and held and len(near) >= NEAR:
+        if few and held and len(near) >= NEAR:
             break
     return held, [mirror_element(m) for m in near], group
 

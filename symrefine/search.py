@@ -26,8 +26,8 @@ BARELY_ROUND = 1.5
 # Sources of a first look: enough to tell hopeless from possible.
 LOOK = 400
 # Excess beyond which a candidate is not worth refining: at the start, after a first coarse fit, after a second.
-HOPELESS = 15.0
-UNPROMISING = 5.0
+HOPELESS = 12.0
+UNPROMISING = 3.5
 PROMISING = 2.0
 # Fraction of the energy that no true axis moves.
 AXIS_HOPELESS = 0.15
