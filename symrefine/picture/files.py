@@ -12,6 +12,8 @@ from symrefine.errors import InputError
 def whole(path: Path) -> Iterator[Path]:
     """A path to write to; what was written there takes the place of `path` at the end, or vanishes after an error.
 
+    Devices and pipes (`/dev/stdout`) have nothing to replace: they are written to directly.
+
     Raises:
         InputError: the file cannot be written.
     """
@@ -21,6 +23,9 @@ def whole(path: Path) -> Iterator[Path]:
         raise InputError(f"{path}: is a directory; expected a file to write")
     if not place.parent.is_dir():
         raise InputError(f"{path}: cannot be written: there is no directory {path.parent}")
+    if place.exists() and not place.is_file():
+        yield place
+        return
     try:
         yield draft
         draft.replace(place)
@@ -28,9 +33,3 @@ def whole(path: Path) -> Iterator[Path]:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
     finally:
         draft.unlink(missing_ok=True)
-
-
-def write_whole(path: Path, data: bytes) -> None:
-    """Write a file in one step."""
-    with whole(path) as draft:
-        draft.write_bytes(data)

@@ -15,6 +15,7 @@ _NAMED = {
     "Ci": "an inversion centre, no mirror plane",
     "Cinfv": "surface of revolution",
     "Dinfh": "surface of revolution with a mirror plane across its axis",
+    "K": "the rotations of a sphere, no mirror plane",
     "Kh": "sphere",
     "D2": "three two-fold axes at right angles, no mirror plane",
     "D2h": "three mirror planes at right angles",

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from symrefine.detect import Detection
 from symrefine.picture.draw import picture_png
-from symrefine.picture.files import write_whole
+from symrefine.picture.files import whole
 from symrefine.report.page import html_page
 from symrefine.shape import Shape
 
@@ -17,7 +17,8 @@ def draw(detection: Detection, shape: Shape, path: Path | str) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    write_whole(Path(path), picture_png(detection, shape))
+    with whole(Path(path)) as draft:
+        draft.write_bytes(picture_png(detection, shape))
 
 
 def write_html(detection: Detection, shape: Shape, path: Path | str) -> None:
@@ -26,5 +27,6 @@ def write_html(detection: Detection, shape: Shape, path: Path | str) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    page = html_page(detection, shape, picture_png(detection, shape, title=False))
-    write_whole(Path(path), page.encode("utf-8"))
+    with whole(Path(path)) as draft:
+        page = html_page(detection, shape, picture_png(detection, shape, title=False))
+        draft.write_text(page, encoding="utf-8", newline="")

@@ -64,4 +64,4 @@ def _rerun() -> list[str]:
 def _reason(errors: str) -> str:
     """The last line that says something, without the place in the viewer's source."""
     lines = [line.strip() for line in errors.splitlines() if line.strip()]
-    return re.sub(r"^(Error: |.*\.rs:\d+: )|\.$", "", lines[-1]) if lines else "it gave no reason"
+    return re.sub(r"^(Error: )?(.*\.rs:\d+: )?|\.$", "", lines[-1]) if lines else "it gave no reason"

@@ -1,0 +1,227 @@
+"""Recordings: what they hold, that equal input gives equal content, and what opening refuses."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from experiments.shapes import asymmetric, bottle, sample, table
+from symrefine.detect import Detection, detect
+from symrefine.errors import InputError, SymrefineError
+from symrefine.geometry import rotation
+from symrefine.picture.scene import make_scene
+from symrefine.shape import Shape
+from symrefine.viewer import open_recording, opening, record
+
+Case = tuple[Detection, Shape, Path]
+
+
+def recorded(shape: Shape, folder: Path) -> Case:
+    detection = detect(shape)
+    record(detection, shape, folder / "x.rrd")
+    return detection, shape, folder / "x.rrd"
+
+
+def cloud(mesh: Shape, noise: float = 0.005) -> Shape:
+    return Shape(points=sample(mesh, 4000, noise, np.random.default_rng(3)))
+
+
+@pytest.fixture(scope="module")
+def tilted(tmp_path_factory: pytest.TempPathFactory) -> Case:
+    """A table, tilted, far from the origin."""
+    points = 3.0 * cloud(table()).points @ rotation([1, 2, 0], 0.7).T + np.array([1e6, -2e6, 3e5])
+    return recorded(Shape(points=points), tmp_path_factory.mktemp("tilted"))
+
+
+@pytest.fixture(scope="module")
+def shapeless(tmp_path_factory: pytest.TempPathFactory) -> Case:
+    return recorded(asymmetric(), tmp_path_factory.mktemp("shapeless"))
+
+
+def rows(path: Path, entity: str) -> list[dict[str, Any]]:
+    """All rows logged to an entity, in order; static ones without an iteration."""
+    import rerun.chunk as ck
+
+    found = [
+        c.to_record_batch().to_pylist() for c in ck.RrdReader(path).stream().to_chunks() if c.entity_path == entity
+    ]
+    return sorted((row for chunk in found for row in chunk), key=lambda row: row.get("iteration") or 0)
+
+
+def entities(path: Path) -> set[str]:
+    import rerun.chunk as ck
+
+    return {c.entity_path for c in ck.RrdReader(path).stream().to_chunks()}
+
+
+def column(row: dict[str, Any], name: str) -> Any:
+    return next(value for key, value in row.items() if key.split(":")[-1] == name)
+
+
+def rerun(*args: str | Path) -> subprocess.CompletedProcess[str]:
+    command = [*opening._rerun(), *(str(a) for a in args)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_everything_is_there(tilted: Case) -> None:
+    _, _, path = tilted
+    expected = {"object", "object/cloud", "object/ntuples", "object/axes/1", "report", "log"}
+    expected |= {f"object/planes/{k}" for k in range(1, 5)} | {f"object/refinement/planes/{k}" for k in range(1, 5)}
+    expected |= {"object/refinement/pairs", "series/cost", "series/step", "series/inliers", "series/turn_deg"}
+    assert {f"/{name}" for name in expected} <= entities(path)
+
+
+def test_opens_with_a_layout_of_its_own(tilted: Case) -> None:
+    import rerun.chunk as ck
+
+    reader = ck.RrdReader(tilted[2])
+    assert len(reader.recordings()) == len(reader.blueprints()) == 1
+    assert [c.name for c in reader.store().schema().index_columns()] == ["iteration"]
+
+
+def test_every_iteration_has_its_planes_and_pairs(tilted: Case) -> None:
+    detection, _, path = tilted
+    iterations = list(range(len(detection.history)))
+    assert len(iterations) > 1
+    assert [row["iteration"] for row in rows(path, "/object/refinement/planes/1")] == iterations
+    pairs = rows(path, "/object/refinement/pairs")
+    assert [row["iteration"] for row in pairs] == iterations[1:]
+    assert all(0 < len(column(row, "strips")) <= 300 for row in pairs)
+
+
+def test_pairs_join_points_that_agree(tilted: Case) -> None:
+    detection, _, path = tilted
+    last = np.array(column(rows(path, "/object/refinement/pairs")[-1], "strips"))
+    lengths = np.linalg.norm(last[:, 1] - last[:, 0], axis=1)
+    assert np.median(lengths) < 0.03 * detection.diagonal
+
+
+def test_series_are_those_of_the_history(tilted: Case) -> None:
+    detection, _, path = tilted
+    for name, values in {
+        "cost": [i.cost for i in detection.history],
+        "step": [i.step for i in detection.history],
+    }.items():
+        logged = [row for row in rows(path, f"/series/{name}") if row.get("iteration")]
+        assert [column(row, "scalars")[0] for row in logged] == pytest.approx(values[1:])
+
+
+def test_positions_are_relative_to_the_centre(tilted: Case) -> None:
+    """A float32 at 2e6 has steps of 0.25; relative to the centre they are 1e-7."""
+    detection, shape, path = tilted
+    logged = np.array(column(rows(path, "/object/cloud")[0], "positions"))
+    assert np.allclose(logged, shape.points - detection.center, atol=1e-6)
+    assert f"centre ({detection.center[0]:.4f}" in column(rows(path, "/report")[0], "text")[0]
+
+
+def test_planes_lie_where_they_were_found(tilted: Case) -> None:
+    detection, _, path = tilted
+    for k, found in enumerate(detection.planes, start=1):
+        corners = np.array(column(rows(path, f"/object/planes/{k}")[0], "vertex_positions")) + detection.center
+        assert np.abs(found.plane.signed_distance(corners)).max() < 1e-6 * detection.diagonal
+
+
+def test_the_last_iterate_is_what_was_found(tilted: Case) -> None:
+    detection, _, path = tilted
+    normals = np.array([p.plane.normal for p in detection.planes])
+    for k in range(1, 5):
+        corners = np.array(column(rows(path, f"/object/refinement/planes/{k}")[-1], "vertex_positions"))
+        assert np.abs(corners @ normals.T).max(axis=0).min() < 0.02 * detection.diagonal
+
+
+def test_same_input_gives_same_content(tilted: Case, tmp_path: Path) -> None:
+    detection, shape, path = tilted
+    record(detection, shape, tmp_path / "again.rrd")
+    assert rerun("rrd", "compare", path, tmp_path / "again.rrd").returncode == 0
+    assert rerun("rrd", "verify", path).returncode == 0
+    other = Shape(points=shape.points[:-1])
+    record(detection, other, tmp_path / "other.rrd")
+    assert rerun("rrd", "compare", path, tmp_path / "other.rrd").returncode != 0
+
+
+def test_no_symmetry_no_iterations(shapeless: Case) -> None:
+    detection, _, path = shapeless
+    assert detection.point_group == "C1"
+    names = entities(path)
+    assert {"/object/mesh", "/object/near_misses/1", "/report", "/log"} <= names
+    assert not [n for n in names if n.startswith(("/object/planes", "/object/refinement", "/series"))]
+    assert "no symmetry" in str(rows(path, "/report"))
+
+
+def test_revolution(tmp_path: Path) -> None:
+    detection, _, path = recorded(cloud(bottle()), tmp_path)
+    assert detection.point_group == "Cinfv"
+    assert column(rows(path, "/object/axes/1/name")[0], "labels") == ["C∞"]
+    assert not [n for n in entities(path) if n.startswith("/object/planes")]
+
+
+def test_meshes_keep_their_triangles(tmp_path: Path) -> None:
+    detection, shape, path = recorded(table(), tmp_path)
+    assert shape.faces is not None
+    corners = np.array(column(rows(path, "/object/mesh")[0], "vertex_positions"))
+    assert np.allclose(corners, (shape.points - detection.center)[shape.faces].reshape(-1, 3), atol=1e-6)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+def test_objects_of_any_size_fill_the_view(size: float, tmp_path: Path) -> None:
+    shape = Shape(points=size * table().points, faces=table().faces, measure="surface")
+    detection, _, path = recorded(shape, tmp_path)
+    scale = column(rows(path, "/object")[0], "scale")[0][0]
+    assert 1.0 <= scale * make_scene(detection, shape).stage.diagonal < 10.0
+
+
+def test_nothing_is_left_of_a_recording_that_cannot_be_written(shapeless: Case, tmp_path: Path) -> None:
+    detection, shape, _ = shapeless
+    with pytest.raises(InputError, match="no directory"):
+        record(detection, shape, tmp_path / "none" / "x.rrd")
+    with pytest.raises(InputError, match="is a directory"):
+        record(detection, shape, tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_recording_takes_the_place_of_another(shapeless: Case, tmp_path: Path) -> None:
+    detection, shape, path = shapeless
+    (tmp_path / "x.rrd").write_text("old")
+    record(detection, shape, tmp_path / "x.rrd")
+    assert rerun("rrd", "compare", path, tmp_path / "x.rrd").returncode == 0
+    assert [p.name for p in tmp_path.iterdir()] == ["x.rrd"]
+
+
+def test_opening_refuses_what_is_no_recording(shapeless: Case, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        open_recording(tmp_path / "none.rrd")
+    (tmp_path / "text.rrd").write_text("hello")
+    with pytest.raises(InputError, match="not a recording"):
+        open_recording(tmp_path / "text.rrd")
+    whole = shapeless[2].read_bytes()
+    (tmp_path / "half.rrd").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match="damaged"):
+        open_recording(tmp_path / "half.rrd")
+
+
+def test_opening_tells_why_there_is_no_window(shapeless: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    fails = "import sys; sys.exit('Error: a.rs:7: no display is set.')"
+    monkeypatch.setattr(opening, "check_recording", lambda _: None)
+    monkeypatch.setattr(opening, "_rerun", lambda: [sys.executable, "-c", fails])
+    with pytest.raises(SymrefineError, match="did not start: no display is set;"):
+        open_recording(shapeless[2])
+
+
+def test_opening_leaves_the_viewer_alone(shapeless: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Viewer:
+        def __init__(self, command: list[str], **options: Any) -> None:
+            started.append(command)
+            assert options["start_new_session"]
+
+        def wait(self, timeout: float) -> int:
+            raise subprocess.TimeoutExpired("rerun", timeout)
+
+    started: list[list[str]] = []
+    monkeypatch.setattr(opening, "check_recording", lambda _: None)
+    monkeypatch.setattr(subprocess, "Popen", Viewer)
+    open_recording(shapeless[2])
+    assert started[0][-1] == str(shapeless[2])
+    assert "127.0.0.1" in started[0]
