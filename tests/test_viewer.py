@@ -182,6 +182,12 @@ def test_nothing_is_left_of_a_recording_that_cannot_be_written(shapeless: Case, 
     assert not list(tmp_path.iterdir())
 
 
+def test_rerun_switched_off_is_told(shapeless: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RERUN", "off")
+    with pytest.raises(InputError, match="RERUN"):
+        record(*shapeless[:2], tmp_path / "x.rrd")
+
+
 def test_a_recording_takes_the_place_of_another(shapeless: Case, tmp_path: Path) -> None:
     detection, shape, path = shapeless
     (tmp_path / "x.rrd").write_text("old")

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from symrefine.detect import Detection
+from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane
 from symrefine.picture.files import whole
 from symrefine.picture.measures import cost_series, inlier_series, step_series, theta_series_deg, turn_series_deg
@@ -42,7 +43,7 @@ def record(detection: Detection, shape: Shape, path: Path | str) -> None:
     Args:
         detection: what `detect` returned.
         shape: what it was given.
-        path: the file, by custom `.rrd`.
+        path: the file, `.rrd` by custom.
 
     Raises:
         InputError: the file cannot be written.
@@ -52,23 +53,26 @@ def record(detection: Detection, shape: Shape, path: Path | str) -> None:
     scene = make_scene(detection, shape)
     with whole(Path(path)) as draft:
         stream = rr.RecordingStream(
-            _application(shape),
-            recording_id=_identity(detection, shape),
-            send_properties=False,
-            default_enabled=True,
+            _application(shape), recording_id=_identity(detection, shape), send_properties=False
         )
         stream.set_log_time_enabled(False)
         stream.set_log_tick_enabled(False)
         stream.save(draft, default_blueprint=blueprint(detection, scene, display_scale(scene)))
         try:
-            _log_shape(stream, shape, scene)
-            _log_found(stream, scene)
-            _log_tuples(stream, detection, scene)
-            _log_refinement(stream, detection, scene)
-            _log_texts(stream, detection, shape)
-            stream.flush()
+            _log(stream, detection, shape, scene)
         finally:
             stream.disconnect()
+        if not draft.exists():
+            raise InputError(f"{path}: rerun wrote nothing; is the environment variable RERUN set to off?")
+
+
+def _log(stream: Any, detection: Detection, shape: Shape, scene: Scene) -> None:
+    _log_shape(stream, shape, scene)
+    _log_found(stream, scene)
+    _log_tuples(stream, detection, scene)
+    _log_refinement(stream, detection, scene)
+    _log_texts(stream, detection, shape)
+    stream.flush()
 
 
 def display_scale(scene: Scene) -> float:
