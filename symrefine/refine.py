@@ -151,7 +151,7 @@ def refine(
             theta_rad=theta,
             step=step,
             covariance=covariance,
-            cost=solution.cost / weight,
+            cost=max(solution.cost, 0.0) / weight,
             inliers=sum(len(p.sources) for p in pairs),
             pairs=pairs,
             inner_steps=solution.steps,
