@@ -152,7 +152,30 @@ def detect(
         evidence = (few_points if few else gather)(shape, moments, vectors, tolerance, np.random.default_rng(seed))
     with clock("search"):
         found = assemble(evidence)
-    return _report(found, evidence, vectors, tolerance, clock.seconds)
+    doubt = _doubt(evidence)
+    return _report(_unclaimed(found) if doubt else found, evidence, vectors, doubt, clock.seconds)
+
+
+def _doubt(evidence: Evidence) -> str:
+    """Why the cloud supports no decision at this tolerance, or nothing if it does."""
+    floor, tolerance = evidence.judge.floor.p95, evidence.judge.tolerance
+    if floor <= tolerance:
+        return ""
+    return (
+        f"the cloud does not even agree with itself: 5 % of its surface misses the rest by {floor:.1%} of the diagonal or "
+        f"more, against a tolerance of {tolerance:.1%}; give more points, less noise, or a larger tolerance"
+    )
+
+
+def _unclaimed(found: Assembly) -> Assembly:
+    """The same findings as candidates only."""
+    return Assembly(
+        group=PointGroup(name="C1"),
+        center=found.center,
+        elements=(),
+        rejected=found.elements + found.rejected,
+        history=found.history,
+    )
 
 
 class Clock:
@@ -220,9 +243,7 @@ def _cloud(shape: Shape, rng: np.random.Generator) -> tuple[Array, Array | None,
     return shape.points, shape.normals, np.ones(len(shape.points)) if shape.weights is None else shape.weights
 
 
-def _report(
-    found: Assembly, evidence: Evidence, vectors: NTuples, tolerance: float, timings: dict[str, float]
-) -> Detection:
+def _report(found: Assembly, evidence: Evidence, vectors: NTuples, doubt: str, timings: dict[str, float]) -> Detection:
     origin, scale = evidence.moments.center, evidence.moments.scale
     planes = [e for e in found.elements if e.kind == "plane"]
     axes = [e for e in found.elements if e.kind != "plane"]
@@ -259,9 +280,9 @@ def _report(
             for e in found.rejected[:8]
         ),
         iterations=max(0, len(found.history) - 1),
-        tolerance=tolerance,
+        tolerance=evidence.judge.tolerance,
         diagonal=evidence.judge.diagonal * scale,
-        undetermined="",
+        undetermined=doubt,
         tuples=evidence.tuples,
         vectors=vectors,
         history=found.history,
