@@ -162,8 +162,8 @@ def _doubt(evidence: Evidence) -> str:
     if floor <= tolerance:
         return ""
     return (
-        f"the cloud does not even agree with itself: 5 % of its surface misses the rest by {floor:.1%} of the diagonal or "
-        f"more, against a tolerance of {tolerance:.1%}; give more points, less noise, or a larger tolerance"
+        f"the cloud does not even agree with itself: 5 % of its surface misses the rest by {floor:.1%} of the diagonal "
+        f"or more, against a tolerance of {tolerance:.1%}; give more points, less noise, or a larger tolerance"
     )
 
 
