@@ -6,7 +6,7 @@ no symmetry but the identity, two a mirror, one an axis; only where all vanish i
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -65,7 +65,11 @@ def assemble(evidence: Evidence) -> Assembly:
     if math.isinf(bundle.fold):
         return _round(evidence, bundle)
     group = PointGroup(name=f"C{int(bundle.fold)}v", frame=bundle.state.frame)
-    near = [mirror_element(m) for m in mirrors(evidence, NOTHING, count=NEAR, known=_mirror_of(group), thorough=False)]
+    others = list(mirrors(evidence, NOTHING, count=NEAR, known=_mirror_of(group), thorough=False))
+    if any(_holds(m.verdict, _limit([bundle.verdict])) for m in others):
+        # A mirror beside the bundle: the axis the n-tuples claimed by chance is not all there is.
+        return _from_parts(replace(evidence, tuples=replace(evidence.tuples, kind="vanish")))
+    near = [mirror_element(m) for m in others]
     return _finish(evidence, group, bundle.state.center, bundle.history, near)
 
 

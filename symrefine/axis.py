@@ -12,8 +12,8 @@ from symrefine.ntuples.contract import NTuples
 TupleKind = Literal["none", "plane", "axis", "vanish"]
 
 # A singular value speaks when it exceeds what sampling noise alone gives by this factor.
-SIGNIFICANT = 2.0
-# ... and, for exact moments, this fraction of the bound |v| <= 1: below it the miss is a matter of the tolerance.
+SIGNIFICANT = 3.0
+# ... and, for exact moments, twice this fraction of the bound |v| <= 1: below it the miss is a matter of the tolerance.
 FLOOR = 2e-3
 MAX_FOLD = 36
 # Points that are enough for the azimuthal spectrum.
@@ -61,7 +61,7 @@ def classify(tuples: NTuples) -> TupleClass:
         sigma = np.sqrt((parts - 1) / parts * (along**2).sum(axis=(0, 1)))
     else:
         sigma = np.zeros(3)
-    significance = values / np.hypot(sigma, np.sqrt(len(weighted)) * FLOOR * weights.min())
+    significance = values / np.hypot(sigma, np.sqrt(len(weighted)) * FLOOR * weights.min() / 1.5)
     rank = int((significance > SIGNIFICANT).sum())
     kinds: tuple[TupleKind, ...] = ("vanish", "axis", "plane", "none")
     return TupleClass(

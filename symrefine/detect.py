@@ -143,6 +143,7 @@ def detect(
         raise InputError(f"{shape.source}: detect takes 3-D shapes; these points have {shape.dim} coordinates")
     if not 0.0 < tolerance <= 0.2:
         raise InputError(f"tolerance is {tolerance}; expected a fraction of the diagonal in (0, 0.2]")
+    shape = _with_mass(shape)
     clock = Clock()
     few = shape.faces is None and len(shape.points) <= FEW
     with clock("moments"):
@@ -154,6 +155,15 @@ def detect(
         found = assemble(evidence)
     doubt = _doubt(evidence)
     return _report(_unclaimed(found) if doubt else found, evidence, vectors, doubt, clock.seconds)
+
+
+def _with_mass(shape: Shape) -> Shape:
+    """The shape without points of no mass, which are no part of the object."""
+    if shape.weights is None or shape.faces is not None or shape.weights.all():
+        return shape
+    kept = shape.weights > 0
+    normals = None if shape.normals is None else shape.normals[kept]
+    return replace(shape, points=shape.points[kept], weights=shape.weights[kept], normals=normals)
 
 
 def _doubt(evidence: Evidence) -> str:

@@ -78,7 +78,7 @@ def choose_neighbours(points: Array, tree: Any, rng: np.random.Generator, *, pro
     Flatness is compared with what a blob without any structure shows in a sample of the same size.
     """
     pick = rng.choice(len(points), min(probes, len(points)), replace=False)
-    distance, near = tree.query(points[pick], k=min(NEIGHBOURS[-1], len(points) // 8 + 4))
+    distance, near = tree.query(points[pick], k=min(NEIGHBOURS[-1], len(points) // 8 + 4, len(points)))
     widths = np.median(distance, axis=0)
     sizes = [k for k in NEIGHBOURS if k <= near.shape[1] and widths[k - 1] < WIDEST] or [
         min(NEIGHBOURS[0], near.shape[1])
@@ -101,7 +101,7 @@ def _blob_flatness(k: int) -> float:
     """Median flatness of k points of an isotropic Gaussian."""
     blob = np.random.default_rng(0).standard_normal((200, k, 3))
     values, _ = smallest_eigenvectors(blob.transpose(0, 2, 1) @ blob / k)
-    return float(np.median(_flatness(values)))
+    return max(float(np.median(_flatness(values))), 1e-12)
 
 
 def local_planes(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from symrefine.errors import DegenerateShapeError
 from symrefine.geometry import Array, read_only
-from symrefine.quadrature import mesh_nodes
+from symrefine.quadrature import mesh_nodes, triangle_areas_and_normals
 from symrefine.shape import Shape
 
 # Points per block: the monomials of a block stay in the L2 cache (method.md, section 1: a factor of ten).
@@ -175,12 +175,15 @@ def _solid_moments(nodes: Array, weights: Array, shape: Shape, order: int) -> Mo
     raw = raw_moments(nodes, weights, order) / (degree + 3)
     if not abs(raw[0]) > 1e-12 * shape.diagonal**3:
         raise DegenerateShapeError(f"{shape.source}: the mesh encloses no volume; use the surface measure")
+    if not _closed(shape):
+        raise DegenerateShapeError(
+            f"{shape.source}: the mesh is not a closed, consistently oriented surface, so it has no solid; "
+            "use the surface measure"
+        )
     values = recentred(raw / raw[0], 3, order)
     spread = values[tensor_index(3, 2, order)].trace()
     if not spread > 0:
-        raise DegenerateShapeError(
-            f"{shape.source}: the mesh is not a closed, consistently oriented surface; use the surface measure"
-        )
+        raise DegenerateShapeError(f"{shape.source}: the mesh overlaps itself; use the surface measure")
     scale = float(np.sqrt(spread))
     return Moments(
         dim=3,
@@ -190,6 +193,16 @@ def _solid_moments(nodes: Array, weights: Array, shape: Shape, order: int) -> Mo
         center=shape.points[0] + raw[1:4] / raw[0],
         scale=scale,
     )
+
+
+def _closed(shape: Shape) -> bool:
+    """Whether the area vectors sum to zero, as those of a closed and consistently oriented surface do.
+
+    Unlike a count of edges this lets pass what meets along an edge without sharing its vertices.
+    """
+    assert shape.faces is not None
+    areas, normals = triangle_areas_and_normals(shape.points, shape.faces)
+    return bool(np.linalg.norm(areas @ normals) <= 1e-6 * areas.sum())
 
 
 def _jackknife(points: Array, weights: Array, order: int, parts: int) -> tuple[Array, Array]:

@@ -1,7 +1,7 @@
 """Shape: what every source of data becomes before any mathematics sees it."""
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,6 +46,8 @@ class Shape:
             object.__setattr__(self, "normals", _normals(self.normals, points, self.source))
         if self.faces is not None:
             object.__setattr__(self, "faces", _faces(self.faces, points, self.source))
+        if self.measure not in get_args(Measure):
+            raise InputError(f"{self.source}: measure is {self.measure!r}; expected one of {list(get_args(Measure))}")
         if (self.faces is None) != (self.measure == "points"):
             raise InputError(
                 f"{self.source}: measure is {self.measure!r}, but a cloud has measure 'points' "
@@ -73,11 +75,20 @@ class Shape:
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
 
-def _matrix(values: ArrayLike, name: str, source: str) -> Array:
+def _numbers(values: ArrayLike, name: str, source: str) -> Array:
     try:
-        array = np.asarray(values, dtype=np.float64)
+        array = np.asarray(values)
+        if np.iscomplexobj(array):
+            raise InputError(f"{source}: {name} are complex; expected real numbers")
+        return array.astype(np.float64)
+    except InputError:
+        raise
     except (TypeError, ValueError) as error:
-        raise InputError(f"{source}: {name} are not numbers: {error}") from None
+        raise InputError(f"{source}: {name} are not numbers in rows of one length: {error}") from None
+
+
+def _matrix(values: ArrayLike, name: str, source: str) -> Array:
+    array = _numbers(values, name, source)
     if array.ndim != 2 or array.shape[1] < 2:
         raise InputError(f"{source}: {name} have shape {array.shape}; expected [N, n] with n >= 2")
     if len(array) == 0:
@@ -92,7 +103,7 @@ def _matrix(values: ArrayLike, name: str, source: str) -> Array:
 
 
 def _weights(values: ArrayLike, count: int, source: str) -> Array:
-    array = np.asarray(values, dtype=np.float64)
+    array = _numbers(values, "weights", source)
     if array.shape != (count,):
         raise InputError(f"{source}: weights have shape {array.shape}; expected ({count},), one for each point")
     if not np.isfinite(array).all() or (array < 0).any() or array.sum() == 0:
@@ -101,7 +112,7 @@ def _weights(values: ArrayLike, count: int, source: str) -> Array:
 
 
 def _normals(values: ArrayLike, points: Array, source: str) -> Array:
-    array = np.asarray(values, dtype=np.float64)
+    array = _numbers(values, "normals", source)
     if array.shape != points.shape:
         raise InputError(f"{source}: normals have shape {array.shape}; expected {points.shape}, one for each point")
     length = np.linalg.norm(array, axis=1)
@@ -114,13 +125,17 @@ def _normals(values: ArrayLike, points: Array, source: str) -> Array:
 
 
 def _faces(values: ArrayLike, points: Array, source: str) -> Index:
-    array = np.array(values)
+    try:
+        array = np.array(values)
+    except ValueError:
+        raise InputError(f"{source}: faces are ragged; expected [F, 3] integers, triangles only") from None
     if array.ndim != 2 or array.shape[1] != 3 or not np.issubdtype(array.dtype, np.integer) or len(array) == 0:
         raise InputError(f"{source}: faces have shape {array.shape} of {array.dtype}; expected [F, 3] integers, F >= 1")
     if points.shape[1] != 3:
         raise InputError(f"{source}: faces need points in 3-space, these have {points.shape[1]} coordinates")
     if array.min() < 0 or array.max() >= len(points):
-        raise InputError(f"{source}: face index {array.max()} is out of range; there are {len(points)} vertices")
+        wrong = array.min() if array.min() < 0 else array.max()
+        raise InputError(f"{source}: face index {wrong} is out of range; there are {len(points)} vertices")
     array = array.astype(np.int64)
     array.flags.writeable = False
     return array

@@ -174,9 +174,6 @@ def test_surfaces_of_every_group(name, form):
     assert groups == [name] * 2
 
 
-@pytest.mark.xfail(
-    reason="the n-tuples of independent samples claim an axis by chance: C4v, C3v, C2v on a third of them"
-)
 def test_independent_samples_of_a_cube():
     rng = np.random.default_rng(8)
     dense = sample_surface(CLEAN["cube"][0](), 200_000, rng)[0]
@@ -303,7 +300,6 @@ def test_weights_undo_an_uneven_density():
     np.testing.assert_allclose(found.origin[:2], 0.0, atol=0.03)
 
 
-@pytest.mark.xfail(reason="weights enter the moments only: points of no mass are still judged and matched")
 def test_points_of_no_mass_are_no_part_of_the_object():
     other = sample(join([box((1.2, 0, 0.3), (0.4, 0.4, 0.4))]), 2000, 0.0, np.random.default_rng(15))
     weights = np.append(np.ones(8000), np.zeros(2000))
@@ -452,7 +448,6 @@ def test_a_disc_has_the_plane_it_lies_in():
         assert any(line_angle_rad(p.plane.normal, turn[:, 2]) < 1e-3 for p in found.planes)
 
 
-@pytest.mark.xfail(reason="n-tuples of independent samples claim an axis within the disc by chance: C2v")
 def test_a_disc_is_round():
     assert [detect(disc(np.random.default_rng(seed))).point_group for seed in range(4)] == ["Dinfh"] * 4
 

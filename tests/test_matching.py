@@ -128,7 +128,6 @@ def test_a_handful_of_points_may_stand_for_themselves(count):
     check_handful(isolated_points(points), count)
 
 
-@pytest.mark.xfail(reason="kd-tree queries for k = N // 8 + 4 > N neighbours return the index N: IndexError")
 @pytest.mark.parametrize("count", [2, 3])
 def test_local_planes_of_two_or_three_points_are_no_error(count):
     points = np.random.default_rng(count).standard_normal((count, 3))

@@ -23,7 +23,8 @@ class NTuples:
     """Vectors that turn with the object, v(R X) = R v(X), scaled to be comparable across orders and objects.
 
     Attributes:
-        vectors: [T, n] tuples; each is divided by a bound that only the radial moments enter, so |v| <= 1.
+        vectors: [T, n] tuples, each divided by a bound that only the even radial moments enter, so |v| <= 1 (an odd
+            order that the moments do not exceed is divided by an estimate of that bound).
         replicates: [B, T, n] jackknife replicates; B = 0 where the moments are exact.
         labels: [T] orders and ranks each tuple was made from.
     """
@@ -93,7 +94,7 @@ class _Traces:
         return self._known[key]
 
     def radial(self, degree: int) -> float:
-        """A bound of `int r^degree`, from even orders only."""
+        """A bound of `int r^degree` from the even orders around it, or an estimate where the upper one is missing."""
         low, high = degree - degree % 2, degree + degree % 2
         if high > self.order:
             return float(self(low, 0)[0]) ** (degree / low)

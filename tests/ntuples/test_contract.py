@@ -120,14 +120,6 @@ def test_no_tuple_is_longer_than_one(points, weights, order):
     assert np.linalg.norm(found.vectors, axis=1).max() <= 1 + 1e-12
 
 
-@pytest.mark.xfail(reason="at the highest order, odd, the bound is (int r^low)^(p/low) <= int r^p: a bound from below")
-@pytest.mark.parametrize("order", [3, 5])
-def test_no_tuple_is_longer_than_one_at_an_odd_highest_order(order):
-    points, weights = np.array([[0.0, 0, 0], [1, 0, 0]]), np.array([1.0, 1e-2])
-    found = ntuples(central_moments(points, weights, order), [(order,)])
-    assert np.linalg.norm(found.vectors, axis=1).max() <= 1 + 1e-12
-
-
 def test_tuples_vanish_where_the_group_fixes_no_vector():
     found = ntuples(shape_moments(join([box((1, 2, 3), (1, 0.7, 0.4))]), 8))
     np.testing.assert_allclose(found.vectors, 0.0, atol=1e-12)
