@@ -28,9 +28,10 @@ APART_RAD = 0.35
 FLOOR = 1e-8
 # Added to the strength of a row of coefficients before it is divided by it: weak rows are noise.
 WEAK = 1e-3
-# Longest step of the Gauss-Newton, radians, and the step that ends it.
+# Longest step of the Gauss-Newton, radians. It ends with a step of 1e-7, after which quadratic convergence leaves 1e-14
+# where the moments agree to rounding, or where the costs stand still because they do not.
 STEP = 0.3
-SETTLED = 1e-12
+SETTLED, STANDSTILL = 1e-7, 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -203,12 +204,13 @@ def fit(pair: HarmonicPair, starts: Array, *, steps: int = 10) -> HarmonicFit:
         trial = _rotations(step) @ matrices
         there = _linearised(pair, trial)
         better = there[0] <= costs
+        still = bool(np.all(better & (costs - there[0] < STANDSTILL * there[0])))
         costs = np.where(better, there[0], costs)
         matrices = np.where(better[:, None, None], trial, matrices)
         # A step that does not descend is halved.
         gradients = np.where(better[:, None], there[1], 0.5 * gradients)
         hessians = np.where(better[:, None, None], there[2], hessians)
-        if length.max() < SETTLED:
+        if still or length.max() < SETTLED:
             break
     u, _, vt = np.linalg.svd(matrices)
     order = np.argsort(costs, kind="stable")
@@ -253,18 +255,44 @@ def rotation_covariance(pair: HarmonicPair, matrix: Array, hessian: Array) -> Ar
     """
     turner = Turner.of(matrix[None], max(pair.source))
     inverse = np.linalg.pinv(hessian, rcond=1e-12, hermitian=True)
-    total = np.zeros((3, 3))
-    for side, sign in ((pair.source, 1.0), (pair.target, -1.0)):
+    moved = {}
+    for l, c in pair.source.items():
+        here = turner(c[0])[0] * pair.weights[l][:, None]
+        moved[l] = (here @ _stacked_generators(l)).reshape(len(here), 3, 2 * l + 1)
+    return inverse @ _projected_covariance(pair, turner, moved) @ inverse
+
+
+def _projected_covariance(pair: HarmonicPair, turner: Turner, directions: dict[int, Array]) -> Array:
+    """Jackknife covariance [A, A] of the residual `D_l(R) a - b` along directions {l: [P, A, 2l+1]}."""
+    count = next(iter(directions.values())).shape[1]
+    total: Array = np.zeros((count, count))
+    for side in (pair.source, pair.target):
         parts = len(side[1]) - 1
-        gradients = np.zeros((parts, 3))
+        along: Array = np.zeros((parts, count))
         for l, c in side.items():
-            spread = c[1:] - c[1:].mean(axis=0)
-            if sign > 0:
+            spread = c[1:] - c[1:].mean(axis=0) if parts else c[1:]
+            if side is pair.source:
                 spread = turner(spread.reshape(-1, 2 * l + 1))[0].reshape(spread.shape)
-            here = turner(pair.source[l][0])[0] * pair.weights[l][:, None]
-            moved = (here @ _stacked_generators(l)).reshape(len(here), 3, 2 * l + 1)
-            gradients += sign * np.einsum("pam,bpm->ba", moved, spread)
-        if parts:
-            steps = gradients @ inverse
-            total += (parts - 1) / parts * steps.T @ steps
+            along += np.einsum("pam,bpm->ba", directions[l], spread)
+        total += (parts - 1) / max(parts, 1) * along.T @ along
     return total
+
+
+def preference(pair: HarmonicPair, better: Array, other: Array) -> float:
+    """By how many standard deviations of sampling noise the moments prefer one matrix [3, 3] to another.
+
+    With d = D_l(R) a - D_l(R') a the difference of the costs is linear in the residual r = D_l(R) a - b, namely
+    `|d|^2 - 2 d.r`; its noise is that of 2 d.r. Unlike the costs themselves, whose many coefficients err together, this
+    tells chiral objects (3.6 and more on 10,000 points) from mirror-symmetric ones (below 2.5, nearly symmetric ones
+    below 4.2).
+    """
+    turner, turner_other = (Turner.of(m[None], max(pair.source)) for m in (better, other))
+    directions, difference, model = {}, 0.0, 0.0
+    for l, c in pair.source.items():
+        weights = pair.weights[l][:, None]
+        here, there = turner(c[0])[0], turner_other(c[0])[0]
+        directions[l] = (weights * (here - there))[:, None]
+        difference += float(np.sum(weights * ((there - pair.target[l][0]) ** 2 - (here - pair.target[l][0]) ** 2)))
+        model += FLOOR * float(np.sum(directions[l] ** 2))
+    variance = float(_projected_covariance(pair, turner, directions)[0, 0]) + model
+    return difference / (2.0 * float(np.sqrt(variance)) + 1e-300)

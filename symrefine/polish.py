@@ -70,10 +70,16 @@ class Surfaces:
 
     @cached_property
     def floor(self) -> Array:
-        """Miss [4] that sampling alone explains: each surface against itself, both together."""
+        """Miss [5] that sampling alone explains: each surface against itself, and what only one of the two blurs.
+
+        Local planes merge the two faces of a thin sheet, or follow each, as the density of the points has it.
+        """
         both = (self.source, self.target)
+        if self.target.isolated:
+            return np.zeros(5)
         own = [disc_distances(s, s.points[:: _stride(s, FLOOR_QUERIES)], skip_self=True) for s in both]
-        return np.sum([_statistics(d) for d in own], axis=0) / self.diagonal
+        blurred = abs(float(self.source.thickness.mean() - self.target.thickness.mean()))
+        return (np.sum([_statistics(d) for d in own], axis=0) + blurred) / self.diagonal
 
     def misses(self, motion: Similarity, *, queries: int = 10**9) -> Array:
         """Distances from the moved source to the target, fractions of the diagonal."""
@@ -81,13 +87,17 @@ class Surfaces:
         return disc_distances(self.target, motion.apply(points)) / self.diagonal
 
     def excess(self, motion: Similarity, *, queries: int = 10**9) -> float:
-        """Largest of mean, 95th, 99th and 99.5th percentile of the miss over its limit; <= 1 if the surfaces agree."""
+        """Largest of mean, 95th, 99th and 99.5th percentile of the miss over its limit; <= 1 if the surfaces agree.
+
+        Of isolated points every one counts.
+        """
         own = _statistics(self.misses(motion, queries=queries))
-        return float(np.max(own / (np.asarray(LIMITS) * self.tolerance + self.floor)))
+        limits = np.array([*LIMITS, LIMITS[-1] if self.target.isolated else np.inf])
+        return float(np.max(own / (limits * self.tolerance + self.floor)))
 
 
 def _statistics(distances: Array) -> Array:
-    return np.array([distances.mean(), *np.quantile(distances, [0.95, 0.99, 0.995])])
+    return np.array([distances.mean(), *np.quantile(distances, [0.95, 0.99, 0.995, 1.0])])
 
 
 def _stride(surface: LocalPlanes, count: int) -> int:
@@ -160,15 +170,28 @@ def _matched(surfaces: Surfaces, motion: Similarity, reach: float, stride: int) 
     distance, near = target.tree.query(moved, distance_upper_bound=3.0 * (target.spacing + reach))
     found = np.flatnonzero(np.isfinite(distance))
     met = near[found]
+    if target.isolated:
+        return _isolated_rows(points[found], target.points[met], _robust(distance[found], target, reach))
     facing = np.abs(np.einsum("ij,ij->i", normals[found] @ motion.matrix.T, target.normals[met])) > AGREE
     found, met = found[facing], met[facing]
     if len(found) == 0:
         return np.empty((0, SIZE)), np.empty(0)
     error = np.einsum("ij,ij->i", moved[found] - target.points[met], target.normals[met])
     flat = np.exp(-((source.flatness[::stride][found] / WORTH) ** 2) - (target.flatness[met] / WORTH) ** 2)
-    scale2 = max(ROBUST * float(np.median(np.abs(error))), SCALE_FLOOR * target.spacing, reach) ** 2
-    weights = flat * (scale2 / (scale2 + error**2)) ** 2
-    return design_rows(points[found], target.points[met], target.normals[met]), weights
+    return design_rows(points[found], target.points[met], target.normals[met]), flat * _robust(error, target, reach)
+
+
+def _robust(error: Array, target: LocalPlanes, reach: float) -> Array:
+    """Geman-McClure weights [P] at a scale from the residuals, bounded from below (method.md, section 4)."""
+    middle = float(np.median(np.abs(error))) if len(error) else 0.0
+    scale2 = max(ROBUST * middle, SCALE_FLOOR * target.spacing, reach) ** 2
+    return (scale2 / (scale2 + error**2)) ** 2
+
+
+def _isolated_rows(sources: Array, targets: Array, weights: Array) -> tuple[Array, Array]:
+    """Three equations for each pair of points that stand for themselves."""
+    directions = np.tile(np.eye(3), (len(sources), 1))
+    return design_rows(np.repeat(sources, 3, axis=0), np.repeat(targets, 3, axis=0), directions), np.repeat(weights, 3)
 
 
 def _normal_equations(

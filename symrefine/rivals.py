@@ -7,30 +7,14 @@ polished and judged on the points.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.axis import azimuthal_spectrum
 from symrefine.geometry import Array, frame_with_z, rotation
-from symrefine.harmonic_fit import (
-    HarmonicFit,
-    HarmonicPair,
-    fit,
-    harmonic_pair,
-    hills,
-    landscape,
-    mismatch,
-    rotation_covariance,
-)
-from symrefine.matching import LocalPlanes, local_planes
-from symrefine.moments import Moments
-from symrefine.ntuples.contract import ntuples
-from symrefine.polish import Polished, Similarity, Surfaces, polish
-from symrefine.procrustes import Procrustes, procrustes
-from symrefine.quadrature import sample_surface
-from symrefine.shape import Shape
+from symrefine.harmonic_fit import HarmonicFit, fit, hills, landscape, mismatch, preference, rotation_covariance
+from symrefine.pair import Evidence, few
+from symrefine.polish import Polished, Similarity, polish
 
 # Hills of the landscape that are climbed, for each determinant: a few steps for all, the rest for those in sight.
 HILLS = 8
@@ -40,91 +24,28 @@ IN_SIGHT = 30.0
 # costs of true maps scatter between 0.02 and 2.5 per coefficient.
 RIVAL = 5.0
 PER_COEFFICIENT = 2.0
-# Above this cost per coefficient the moments do not fit at all: other densities, other noise, or other objects.
-MISFIT = 20.0
+# Above this cost per coefficient the moments hardly fit, and the densities may differ; above the second not at all.
+UNEVEN, MISFIT = 4.0, 20.0
 # Moments that agree to this are those of the same points.
 ROUNDING = 1e-7
 # Singular values of the n-tuples this many times beyond significance make the landscape unnecessary.
 CLEAR = 5.0
-# Local planes of the source and of the target, and points below which local planes say nothing.
-SOURCE_PLANES, TARGET_PLANES, FEWEST = 1000, 2000, 60
+# Standard deviations by which the moments must prefer one determinant to decide it alone.
+DECIDED = 5.0
 # A rival that misses by less than this share of the limits is good; no other of its determinant is tried.
 GOOD = 0.35
-# The mirrored map is as good if its miss is below this many times the other's (compare `assemble`).
-AS_GOOD = 4.0
-# Rivals judged for each determinant, planes and iterations spent on each.
+# The proper map is as good if its miss is below this many times that of the improper one: 1.2 at most for exact mirror
+# symmetry; 2.5 and more for a propeller, a camera, a posed ant.
+AS_GOOD = 2.0
+# Rivals judged for each determinant, planes and iterations spent on each; fewer where the other determinant has a good
+# one already, and no search for phases where they are hopeless.
 JUDGED, LOOK, LOOK_OUTER = 4, 400, 4
+LAST_CHANCE, HOPELESS = 2, 2.0
 # Bounds of what the start of a polish may be off, radians; the moments' own estimate lies between.
-START_ERROR = (0.03, 0.3)
+START_ERROR = (0.01, 0.3)
 # Standard deviation that the moments' rotation is never trusted beyond, radians.
 TRUST = 1e-3
 PHASES, PHASE_GRID = 3, 720
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Side:
-    """One of the two objects: its moments, and the weights of its points if it is a cloud."""
-
-    shape: Shape
-    moments: Moments
-    weights: Array
-
-    def planes(self, count: int, unit: float, rng: np.random.Generator) -> LocalPlanes:
-        """`count` local planes about the centre, in units of `unit`."""
-        points, normals = self.shape.points, self.shape.normals
-        exact = self.shape.faces is not None
-        if exact:
-            points, normals, _ = sample_surface(self.shape, 2 * count, rng)
-        return local_planes((points - self.moments.center) / unit, count, rng, normals=normals, exact=exact)
-
-    def azimuths(self, frame: Array) -> Array:
-        """Azimuthal coefficients [K, 4] about the frame's third axis, scaled by what random azimuths would give."""
-        points = self.shape.points
-        weights = self.weights
-        if self.shape.faces is not None:
-            points, _, _ = sample_surface(self.shape, 20000, np.random.default_rng(0))
-            weights = np.full(len(points), 1.0 / len(points))
-        local = (points - self.moments.center) @ frame.T / self.moments.scale
-        c, sigma = azimuthal_spectrum(local, weights, np.array([0.0, 0.0, 1.0]))
-        return c / sigma
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Evidence:
-    """Everything an alignment in 3-space may use; each part is worked out when first needed."""
-
-    source: Side
-    target: Side
-    scale: bool
-    tolerance: float
-    seed: int
-
-    @cached_property
-    def closed(self) -> Procrustes:
-        """Procrustes solution of the n-tuples."""
-        return procrustes(ntuples(self.source.moments), ntuples(self.target.moments))
-
-    @cached_property
-    def harmonics(self) -> HarmonicPair:
-        """Harmonic moments of both sides."""
-        return harmonic_pair(self.source.moments, self.target.moments)
-
-    @cached_property
-    def surfaces(self) -> Surfaces:
-        """Local planes of both sides in units of the target."""
-        unit = self.source.moments.scale if self.scale else self.target.moments.scale
-        return Surfaces(
-            source=self.source.planes(SOURCE_PLANES, unit, np.random.default_rng(self.seed)),
-            target=self.target.planes(TARGET_PLANES, self.target.moments.scale, np.random.default_rng(self.seed)),
-            tolerance=self.tolerance,
-        )
-
-    @property
-    def has_points(self) -> bool:
-        """Whether there is enough of a surface on both sides for local planes."""
-        sides = (self.source.shape, self.target.shape)
-        solid = {s.measure for s in sides} == {"solid", "points"}
-        return not solid and all(s.faces is not None or len(s.points) >= FEWEST for s in sides)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -132,30 +53,65 @@ class Choice:
     """The map chosen, in units of the target about the two centres.
 
     Attributes:
+        evidence: what it rests on; the centres are those of its moments.
         motion: matrix, shift and scale.
         covariance: [3, 3] of the rotation as the moments know it, target axes.
         exact: whether the moments agree to rounding, as for the same points on both sides.
+        misfit: cost per coefficient; about 1 or below if sampling noise explains the difference of the moments.
+        excess: miss over its limit; 0 where the moments were enough to decide.
     """
 
+    evidence: Evidence
     motion: Similarity
     covariance: Array
     exact: bool
+    misfit: float
+    excess: float
+
+    @property
+    def merit(self) -> tuple[float, float]:
+        """The less the better: first that the surfaces agree well, then that the moments do."""
+        return max(self.excess, GOOD), self.misfit
 
 
 def choose(evidence: Evidence, *, reflections: bool = True) -> Choice:
-    """The best map over O(3), or over SO(3) without reflections; determinant +1 wherever both do equally well."""
+    """The best map over O(3), or over SO(3) without reflections; determinant +1 wherever both do equally well.
+
+    Where the moments do not fit, the densities of the clouds may differ: a second try gives every point its share of
+    the area.
+    """
+    first = _choose(evidence, reflections)
+    if first.merit <= (GOOD, UNEVEN) or few(evidence.source.shape, evidence.target.shape):
+        return first
+    evened = replace(evidence, source=evidence.source.evened(), target=evidence.target.evened())
+    return min(first, _choose(evened, reflections), key=lambda c: c.merit)
+
+
+def _choose(evidence: Evidence, reflections: bool) -> Choice:
     fitted = candidates(evidence, (1, -1) if reflections else (1,))
     exact = fitted.matrices[mismatch(evidence.harmonics, fitted.matrices) < ROUNDING]
     if len(exact):
-        best = exact[int(np.argmax(np.linalg.det(exact)))]
-        return Choice(motion=Similarity(matrix=best, shift=np.zeros(3)), covariance=np.zeros((3, 3)), exact=True)
-    size = evidence.harmonics.size
-    rivals = fitted[fitted.costs <= fitted.costs[0] * RIVAL + PER_COEFFICIENT * size]
-    covariance = _covariance(evidence, fitted)
-    motion = Similarity(matrix=rivals.matrices[0], shift=np.zeros(3))
-    if (len(rivals.costs) > 1 or rivals.costs[0] > MISFIT * size) and evidence.has_points:
-        motion = _judged(evidence, rivals, start_error(covariance))
-    return Choice(motion=motion, covariance=covariance, exact=False)
+        best = Similarity(matrix=exact[int(np.argmax(np.linalg.det(exact)))], shift=np.zeros(3))
+        return Choice(evidence=evidence, motion=best, covariance=np.zeros((3, 3)), exact=True, misfit=0.0, excess=0.0)
+    rivals, misfit = _rivals(evidence, fitted), float(fitted.costs[0]) / evidence.harmonics.size
+    covariance = _covariance(evidence, fitted, max(1.0, misfit))
+    motion, excess = Similarity(matrix=rivals.matrices[0], shift=np.zeros(3)), 0.0
+    if (len(rivals.costs) > 1 or misfit > MISFIT) and evidence.has_points:
+        judged = _judged(evidence, rivals, covariance)
+        motion, excess = judged.motion, judged.excess
+    return Choice(evidence=evidence, motion=motion, covariance=covariance, exact=False, misfit=misfit, excess=excess)
+
+
+def _rivals(evidence: Evidence, fitted: HarmonicFit) -> HarmonicFit:
+    """Fits that sampling noise cannot tell from the best; of the best one's determinant alone if that is decided."""
+    pair = evidence.harmonics
+    near = fitted[fitted.costs <= fitted.costs[0] * RIVAL + PER_COEFFICIENT * pair.size]
+    signs = np.sign(np.linalg.det(near.matrices))
+    mirrored = np.flatnonzero(signs != signs[0])
+    misfit = max(1.0, float(fitted.costs[0]) / pair.size)
+    if len(mirrored) and preference(pair, near.matrices[0], near.matrices[mirrored[0]]) > DECIDED * np.sqrt(misfit):
+        return near[np.flatnonzero(signs == signs[0])]
+    return near
 
 
 def candidates(evidence: Evidence, determinants: tuple[int, ...]) -> HarmonicFit:
@@ -181,10 +137,10 @@ def _distinct(fitted: HarmonicFit) -> HarmonicFit:
     return fitted[np.array(kept)]
 
 
-def _covariance(evidence: Evidence, fitted: HarmonicFit) -> Array:
-    """Jackknife covariance of the best fit, raised by what the moments misfit beyond their noise."""
-    misfit = max(1.0, float(fitted.costs[0]) / evidence.harmonics.size)
-    return misfit * rotation_covariance(evidence.harmonics, fitted.matrices[0], fitted.hessians[0])
+def _covariance(evidence: Evidence, fitted: HarmonicFit, misfit: float) -> Array:
+    """Covariance of the best fit from the jackknife and from what the moments misfit beyond their noise."""
+    inverse = np.linalg.pinv(fitted.hessians[0], rcond=1e-12, hermitian=True)
+    return misfit * (rotation_covariance(evidence.harmonics, fitted.matrices[0], fitted.hessians[0]) + inverse)
 
 
 def start_error(covariance: Array) -> float:
@@ -198,28 +154,36 @@ class _Judged:
     excess: float
 
 
-def _judged(evidence: Evidence, rivals: HarmonicFit, error: float) -> Similarity:
+def _judged(evidence: Evidence, rivals: HarmonicFit, covariance: Array) -> _Judged:
     """The rival that the points confirm best; the proper one if its mirror image does no better."""
     best: dict[int, _Judged] = {}
-    for det in (1, -1):
+    for det in _by_cost(rivals.matrices):
         of_det = [m for m in rivals.matrices if np.linalg.det(m) * det > 0.0]
-        found = _first_good(evidence, iter(of_det[:JUDGED]), error)
-        if of_det and min((f.excess for f in found), default=np.inf) > GOOD:
-            found += _first_good(evidence, _phases(evidence, of_det[0], rivals), error)
-        if found:
-            best[det] = min(found, key=lambda f: f.excess)
+        beaten = any(b.excess <= GOOD for b in best.values())
+        found = _first_good(evidence, iter(of_det[: LAST_CHANCE if beaten else JUDGED]), covariance)
+        nearest = min(f.excess for f in found)
+        if nearest > GOOD and not (beaten and nearest > HOPELESS):
+            found += _first_good(evidence, _phases(evidence, of_det[0], rivals), covariance)
+        best[det] = min(found, key=lambda f: f.excess)
     if len(best) < 2:
-        return next(iter(best.values())).motion
+        return next(iter(best.values()))
     proper, improper = best[1], best[-1]
     as_good = proper.excess <= min(1.0, max(GOOD, AS_GOOD * improper.excess)) or proper.excess <= improper.excess
-    return proper.motion if as_good else improper.motion
+    return proper if as_good else improper
 
 
-def _first_good(evidence: Evidence, matrices: Iterator[Array], error: float) -> list[_Judged]:
+def _by_cost(matrices: Array) -> list[int]:
+    """The determinants among matrices, in the order in which they first occur."""
+    return list(dict.fromkeys(int(s) for s in np.sign(np.linalg.det(matrices))))
+
+
+def _first_good(evidence: Evidence, matrices: Iterator[Array], covariance: Array) -> list[_Judged]:
+    """Polish and judge one after the other until one is good."""
     found: list[_Judged] = []
+    error, known = start_error(covariance), information(evidence, covariance)
     for m in matrices:
         start = Similarity(matrix=m, shift=np.zeros(3))
-        motion = polished(evidence, start, error=error, known=np.zeros((6, 6)), queries=LOOK, outer=LOOK_OUTER).motion
+        motion = polished(evidence, start, error=error, known=known, queries=LOOK, outer=LOOK_OUTER).motion
         found.append(_Judged(motion=motion, excess=evidence.surfaces.excess(motion)))
         if found[-1].excess <= GOOD:
             break
