@@ -8,20 +8,20 @@ Elsewhere than in 3-space: moments -> n-tuples -> Procrustes -> Gauss-Newton on 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from symrefine.alignment import Alignment
-from symrefine.coset import Coset, coset_of_group, coset_of_list, lifted
 from symrefine.detect import Clock, detect
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.groups import PointGroup
-from symrefine.moment_fit import moment_fit
 from symrefine.moments import Moments, central_moments, shape_moments
 from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
-from symrefine.pair import Evidence, Side, few
-from symrefine.polish import Similarity
-from symrefine.procrustes import procrustes
 from symrefine.quadrature import mesh_nodes
-from symrefine.rivals import MISFIT, ROUNDING, choose, information, polished, start_error
+from symrefine.registration.alignment import Alignment
+from symrefine.registration.coset import Coset, coset_of_group, coset_of_list, lifted
+from symrefine.registration.moment_fit import moment_fit
+from symrefine.registration.pair import Evidence, Side, few
+from symrefine.registration.polish import Similarity
+from symrefine.registration.procrustes import procrustes
+from symrefine.registration.rivals import MISFIT, ROUNDING, choose, information, polished, start_error
 from symrefine.shape import Shape
 from symrefine.verify import TOLERANCE
 

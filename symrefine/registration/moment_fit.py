@@ -16,7 +16,7 @@ import numpy as np
 from symrefine.geometry import Array
 from symrefine.moments import Moments, exponents, transformed
 from symrefine.ntuples.contract import NTuples
-from symrefine.procrustes import Procrustes
+from symrefine.registration.procrustes import Procrustes
 from symrefine.shape import Index
 
 # Variance of a moment that no sample takes away, in whitened units; widths of axes are bounded from below by the other.

@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from symrefine.coset import Coset
 from symrefine.geometry import Array, read_only
+from symrefine.registration.coset import Coset
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -12,9 +12,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symrefine.geometry import Array, frame_with_z, rotation
-from symrefine.harmonic_fit import HarmonicFit, fit, hills, landscape, mismatch, preference, rotation_covariance
-from symrefine.pair import Evidence, few
-from symrefine.polish import Polished, Similarity, polish
+from symrefine.registration.harmonic_fit import (
+    HarmonicFit,
+    fit,
+    hills,
+    landscape,
+    mismatch,
+    preference,
+    rotation_covariance,
+)
+from symrefine.registration.pair import Evidence, few
+from symrefine.registration.polish import Polished, Similarity, polish
 
 # Hills of the landscape that are climbed, for each determinant: a few steps for all, the rest for those in sight.
 HILLS = 8

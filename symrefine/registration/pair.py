@@ -7,13 +7,13 @@ import numpy as np
 
 from symrefine.axis import azimuthal_spectrum
 from symrefine.geometry import Array
-from symrefine.harmonic_fit import HarmonicPair, harmonic_pair
 from symrefine.matching import LocalPlanes, isolated_points, local_planes
 from symrefine.moments import Moments, central_moments
 from symrefine.ntuples.contract import ntuples
-from symrefine.polish import Surfaces
-from symrefine.procrustes import Procrustes, procrustes
 from symrefine.quadrature import sample_surface
+from symrefine.registration.harmonic_fit import HarmonicPair, harmonic_pair
+from symrefine.registration.polish import Surfaces
+from symrefine.registration.procrustes import Procrustes, procrustes
 from symrefine.shape import Shape
 
 # Local planes of the source and of the target, and points below which local planes say nothing.

@@ -1,0 +1,452 @@
+"""Alignment: exact on the same points, close on other samples, honest about what cannot be known."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+
+from experiments.shapes import asymmetric, bottle, box, join, mug, sample, table
+from symrefine.align import Alignment, align
+from symrefine.errors import DegenerateShapeError, InputError
+from symrefine.geometry import Array, householder, random_orthogonal, rotation
+from symrefine.groups.orthogonal import chord_angles
+from symrefine.harmonics import evaluate
+from symrefine.moments import central_moments
+from symrefine.ntuples.contract import ntuples
+from symrefine.registration.harmonic_fit import (
+    Turner,
+    euler_zyz,
+    fit,
+    harmonic_pair,
+    hills,
+    landscape,
+    mismatch,
+    preference,
+)
+from symrefine.registration.moment_fit import moment_fit
+from symrefine.registration.procrustes import procrustes
+from symrefine.shape import Shape
+
+DETERMINANTS = (1, -1)
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def rng_of(*seed: int) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+def skewed(count: int, dim: int, seed: int) -> Array:
+    """Points with nothing symmetric about them: each coordinate has its own width and skewness, and they mix."""
+    rng = rng_of(seed, dim)
+    points = rng.random((count, dim)) ** np.linspace(1.5, 4.0, dim) * np.linspace(1.0, 2.0, dim)
+    return points @ (np.eye(dim) + 0.4 * np.triu(np.ones((dim, dim)), 1))
+
+
+def angle_deg(found: Array, truth: Array) -> float:
+    """Angle between orthogonal matrices, 180 where the determinants differ."""
+    return float(np.degrees(chord_angles(found, truth)))
+
+
+def turned(shape: Shape, matrix: Array, shift: Array, scale: float = 1.0) -> Shape:
+    return Shape(points=scale * shape.points @ matrix.T + shift, faces=shape.faces, measure=shape.measure)
+
+
+def explains(result: Alignment, source: Array, target: Array, tolerance: float) -> None:
+    assert np.abs(result.apply(source) - target).max() <= tolerance
+
+
+# --- the same points --------------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=12, deadline=None)
+@given(seed=SEEDS, det=st.sampled_from(DETERMINANTS), size=st.floats(1e-6, 1e6))
+def test_same_points_are_recovered_to_rounding(seed: int, det: int, size: float) -> None:
+    points = size * skewed(400, 3, 1)
+    matrix, shift = random_orthogonal(rng_of(seed), det=det), size * rng_of(seed, 1).uniform(-5, 5, 3)
+    found = align(points, points @ matrix.T + shift)
+    assert found.exact
+    assert found.determinant == det
+    assert found.scale == 1.0
+    # Moments of order 8 add up some 400 products of 8 factors: a few hundred roundings.
+    np.testing.assert_allclose(found.matrix, matrix, atol=1e-13)
+    explains(found, points, points @ matrix.T + shift, 1e-12 * size)
+    assert found.rms < 1e-12
+    assert found.status == "ok"
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+@pytest.mark.parametrize("factor", [1e-3, 1.0, 25.4])
+def test_scale_is_recovered_when_asked_for(det: int, factor: float) -> None:
+    points, matrix = skewed(300, 3, 2), random_orthogonal(rng_of(3), det=det)
+    target = factor * points @ matrix.T + 7.0
+    found = align(points, target, scale=True)
+    assert found.scale == pytest.approx(factor, rel=1e-12)
+    explains(found, points, target, 1e-11 * (1.0 + factor))
+    np.testing.assert_allclose(found.transform[:3, :3], factor * matrix, atol=1e-12 * factor)
+
+
+def test_unlike_sizes_are_named_when_scale_is_not_asked_for() -> None:
+    points, matrix = skewed(300, 3, 2), random_orthogonal(rng_of(3), det=-1)
+    found = align(points, 3.0 * points @ matrix.T)
+    np.testing.assert_allclose(found.matrix, matrix, atol=1e-12)
+    assert not found.exact
+    assert found.status == "the target is 3 times as large as the source: ask for the scale"
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_far_from_the_origin(det: int) -> None:
+    # Coordinates of 1e6 carry 1e-10; the matrix can be no better than that over the size of the object.
+    points, matrix = skewed(400, 3, 4), random_orthogonal(rng_of(5), det=det)
+    near, far = points + 1e6, points @ matrix.T - 1e6
+    found = align(near, far)
+    assert found.exact
+    np.testing.assert_allclose(found.matrix, matrix, atol=1e-8)
+    explains(found, near, far, 1e-8 * 2e6)
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_order_of_the_points_does_not_matter(det: int) -> None:
+    points, matrix = skewed(400, 3, 6), random_orthogonal(rng_of(7), det=det)
+    found = align(points, rng_of(8).permutation(points @ matrix.T))
+    np.testing.assert_allclose(found.matrix, matrix, atol=1e-13)
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_a_mesh_and_its_finer_copy_are_the_same(det: int) -> None:
+    mesh, matrix = asymmetric(), random_orthogonal(rng_of(9), det=det)
+    corners = mesh.points[mesh.faces]
+    middle = corners.mean(axis=1)
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    fine = np.concatenate([np.stack(t, axis=1) for t in ((a, b, middle), (b, c, middle), (c, a, middle))])
+    finer = Shape(points=fine.reshape(-1, 3), faces=np.arange(3 * len(fine)).reshape(-1, 3), measure="surface")
+    found = align(mesh, turned(finer, matrix, np.array([1.0, 2.0, 3.0])))
+    assert found.exact
+    np.testing.assert_allclose(found.matrix, matrix, atol=1e-12)
+
+
+@pytest.mark.parametrize("dim", [2, 4, 5, 8])
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_other_dimensions_are_exact_too(dim: int, det: int) -> None:
+    points, matrix = skewed(300, dim, 10), random_orthogonal(rng_of(11, dim), dim, det)
+    found = align(points, points @ matrix.T + 3.0)
+    assert found.exact
+    assert found.observable == "full"
+    np.testing.assert_allclose(found.matrix, matrix, atol=1e-12)
+    explains(found, points, points @ matrix.T + 3.0, 1e-11)
+
+
+# --- other samples of the same object ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+@pytest.mark.parametrize("counts", [(10000, 10000), (10000, 2500), (2000, 8000)])
+def test_independent_samples(det: int, counts: tuple[int, int]) -> None:
+    rng = rng_of(12, *counts)
+    matrix, shift = random_orthogonal(rng, det=det), rng.uniform(-5, 5, 3)
+    source, target = (sample(asymmetric(), n, 0.0, rng) for n in counts)
+    found = align(source, target @ matrix.T + shift)
+    assert angle_deg(found.matrix, matrix) < 0.3
+    assert np.abs(found.apply([[0.0, 0.0, 0.0]]) - shift).max() < 0.005 * asymmetric().diagonal
+    assert not found.exact
+    assert 0.0 < np.degrees(found.sigma_rad) < 0.3
+    assert found.rms < 0.005
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_the_moments_alone(det: int) -> None:
+    rng = rng_of(13)
+    matrix = random_orthogonal(rng, det=det)
+    source, target = (sample(asymmetric(), 10000, 0.0, rng) for _ in range(2))
+    found = align(source, target @ matrix.T, polish=False)
+    assert angle_deg(found.matrix, matrix) < 1.5
+    assert np.radians(angle_deg(found.matrix, matrix)) < 4.0 * found.sigma_rad
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_mesh_against_cloud_and_cloud_against_mesh(det: int) -> None:
+    rng = rng_of(14)
+    matrix, mesh = random_orthogonal(rng, det=det), asymmetric()
+    cloud = sample(mesh, 6000, 0.0, rng)
+    assert angle_deg(align(mesh, cloud @ matrix.T).matrix, matrix) < 0.3
+    assert angle_deg(align(cloud, turned(mesh, matrix, np.zeros(3))).matrix, matrix) < 0.3
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+@pytest.mark.parametrize(("noise_rel", "limit_deg"), [(0.005, 0.5), (0.02, 2.0)])
+def test_noise_on_both_sides(det: int, noise_rel: float, limit_deg: float) -> None:
+    rng = rng_of(15)
+    matrix = random_orthogonal(rng, det=det)
+    source, target = (sample(asymmetric(), 10000, noise_rel, rng) for _ in range(2))
+    found = align(source, target @ matrix.T)
+    assert angle_deg(found.matrix, matrix) < limit_deg
+    # The paper reports 1e-2 under noise.
+    assert np.mean((found.matrix - matrix) ** 2) < 1e-3
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_uneven_density(det: int) -> None:
+    # Four times as many points at one end of either cloud, and not at the same end.
+    rng = rng_of(16)
+    matrix = random_orthogonal(rng, det=det)
+
+    def uneven(direction: Array) -> Array:
+        points = sample(asymmetric(), 30000, 0.0, rng)
+        height = points @ direction
+        height = (height - height.min()) / np.ptp(height)
+        return points[rng.random(len(points)) < (1.0 + 3.0 * height) / 4.0][:10000]
+
+    found = align(uneven(np.array([1.0, 0.0, 0.0])), uneven(np.array([-0.6, 0.8, 0.0])) @ matrix.T)
+    assert angle_deg(found.matrix, matrix) < 0.5
+
+
+def test_equivariance() -> None:
+    # align(gX, hY) = h align(X, Y) g^-1: the points picked at random are the same ones, so this holds to rounding.
+    rng = rng_of(17)
+    source, target = sample(asymmetric(), 4000, 0.002, rng), sample(asymmetric(), 4000, 0.002, rng)
+    plain = align(source, target)
+    g, h = random_orthogonal(rng, det=-1), random_orthogonal(rng, det=1)
+    both = align(source @ g.T + 5.0, target @ h.T - 3.0)
+    assert angle_deg(both.matrix, h @ plain.matrix @ g.T) < 1e-3
+    moved = (plain.apply(source) @ h.T) - 3.0
+    np.testing.assert_allclose(both.apply(source @ g.T + 5.0), moved, atol=1e-4)
+
+
+def test_there_and_back() -> None:
+    rng = rng_of(18)
+    source = sample(asymmetric(), 6000, 0.0, rng)
+    target = sample(asymmetric(), 6000, 0.0, rng) @ random_orthogonal(rng, det=-1).T + 2.0
+    there, back = align(source, target), align(target, source)
+    assert angle_deg(there.matrix @ back.matrix, np.eye(3)) < 0.2
+    assert np.abs(back.apply(there.apply(source)) - source).max() < 0.005 * asymmetric().diagonal
+
+
+def test_a_rotation_is_given_if_no_reflection_is_allowed() -> None:
+    rng = rng_of(19)
+    source = sample(asymmetric(), 4000, 0.0, rng)
+    mirrored = align(source, sample(asymmetric(), 4000, 0.0, rng) @ householder([1, 2, 3]), allow_reflection=False)
+    assert mirrored.determinant == 1
+    assert "the objects differ by" in mirrored.status
+    turn = rotation([1, 1, 0], 2.0)
+    turned_only = align(source, sample(asymmetric(), 4000, 0.0, rng) @ turn.T, allow_reflection=False)
+    assert angle_deg(turned_only.matrix, turn) < 0.3
+    assert turned_only.status == "ok"
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_molecules_are_points_that_stand_for_themselves(det: int) -> None:
+    rng = rng_of(20)
+    atoms, matrix = rng.normal(size=(24, 3)), random_orthogonal(rng, det=det)
+    found = align(atoms, rng.permutation(atoms + rng.normal(scale=0.02, size=atoms.shape)) @ matrix.T)
+    assert found.determinant == det
+    assert angle_deg(found.matrix, matrix) < 2.0
+    assert found.observable == "full"
+
+
+# --- symmetric objects ------------------------------------------------------------------------------------------------
+
+SYMMETRIC: list[tuple[Callable[[], Shape], str, int]] = [
+    (mug, "Cs", 2),
+    (table, "C4v", 8),
+    (lambda: join([box((0, 0, 0), (1.0, 1.6, 2.7))]), "D2h", 8),
+]
+
+
+@pytest.mark.parametrize(("make", "group", "order"), SYMMETRIC, ids=["mug", "table", "box"])
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_the_coset_of_a_symmetric_object(make: Callable[[], Shape], group: str, order: int, det: int) -> None:
+    rng = rng_of(21, order)
+    mesh, matrix = make(), random_orthogonal(rng, det=det)
+    source, target = (sample(mesh, 10000, 0.0, rng) for _ in range(2))
+    found = align(source, target @ matrix.T + 4.0)
+    assert found.determinant == 1
+    assert (found.coset.symmetry, len(found.equivalents)) == (group, order)
+    assert found.observable == f"up to the {order} operations of {group}, and the determinant is free"
+    np.testing.assert_allclose(found.equivalents[0], found.matrix, atol=1e-12)
+    np.testing.assert_allclose(found.equivalent_transforms[0], found.transform, atol=1e-12)
+    assert min(angle_deg(m, matrix) for m in found.equivalents) < 0.6
+    assert np.sign(np.linalg.det(found.equivalents)).sum() == 0
+    surface = cKDTree(sample(mesh, 40000, 0.0, rng) @ matrix.T + 4.0)
+    for transform in found.equivalent_transforms:
+        distance, _ = surface.query(source[::10] @ transform[:3, :3].T + transform[:3, 3])
+        assert np.quantile(distance, 0.99) < 0.015 * mesh.diagonal
+
+
+def test_without_reflections_the_coset_has_rotations_only() -> None:
+    rng = rng_of(22)
+    source, target = (sample(table(), 6000, 0.0, rng) for _ in range(2))
+    found = align(source, target, allow_reflection=False)
+    assert len(found.equivalents) == 4
+    assert (np.linalg.det(found.equivalents) > 0).all()
+
+
+def test_a_body_of_revolution_leaves_one_turn_free() -> None:
+    rng = rng_of(23)
+    matrix = random_orthogonal(rng)
+    source, target = (sample(bottle(), 8000, 0.0, rng) for _ in range(2))
+    found = align(source, target @ matrix.T)
+    axis = matrix[:, 2]
+    assert found.coset.symmetry == "Cinfv"
+    assert abs(found.free_axis[0] @ axis) > np.cos(np.radians(0.5))
+    assert (found.matrix[:, 2] @ axis) > np.cos(np.radians(0.5))
+    assert "up to any turn about" in found.observable
+
+
+def test_exact_points_of_a_symmetric_object_keep_their_determinant() -> None:
+    # A sample of a mirror-symmetric mug is not itself mirror symmetric; the moments tell to rounding.
+    points = sample(mug(), 3000, 0.0, rng_of(24))
+    for det in DETERMINANTS:
+        matrix = random_orthogonal(rng_of(25), det=det)
+        found = align(points, points @ matrix.T)
+        assert found.exact
+        np.testing.assert_allclose(found.matrix, matrix, atol=1e-12)
+
+
+def test_a_symmetric_mesh_gets_a_rotation() -> None:
+    mesh, matrix = mug(), random_orthogonal(rng_of(26), det=-1)
+    found = align(mesh, turned(mesh, matrix, np.ones(3)))
+    assert found.determinant == 1
+    assert min(angle_deg(m, matrix) for m in found.equivalents) < 0.2
+
+
+# --- what the points do not span, and other dimensions ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_a_planar_set_leaves_the_reflection_across_it_free(det: int) -> None:
+    flat = np.column_stack([skewed(500, 2, 27), np.zeros(500)])
+    matrix = random_orthogonal(rng_of(28), det=det)
+    found = align(flat, flat @ matrix.T + 1.0)
+    assert found.determinant == 1
+    assert "the points span 2 of 3 dimensions: the reflection across" in found.observable
+    assert min(np.abs(m - matrix).max() for m in found.equivalents) < 1e-12
+    explains(found, flat, flat @ matrix.T + 1.0, 1e-12)
+    assert len(align(flat, flat @ matrix.T, allow_reflection=False).equivalents) == 1
+
+
+def test_points_on_a_line_leave_every_map_across_it_free() -> None:
+    line = np.multiply.outer(rng_of(29).random(100) ** 2, [1.0, 2.0, 3.0])
+    matrix = random_orthogonal(rng_of(30))
+    found = align(line, line @ matrix.T)
+    assert found.coset.free.shape == (2, 3)
+    explains(found, line, line @ matrix.T, 1e-12)
+    np.testing.assert_allclose(np.abs(found.free_axis[0] @ matrix @ line[0]), np.linalg.norm(line[0]), rtol=1e-9)
+
+
+def test_a_rectangle_has_four_maps_and_a_disc_has_them_all() -> None:
+    rng = rng_of(31)
+    matrix = random_orthogonal(rng, 2, -1)
+    first, second = (rng.uniform(-1, 1, (4000, 2)) * [2.0, 1.0] for _ in range(2))
+    found = align(first, second @ matrix.T)
+    assert found.determinant == 1
+    assert len(found.equivalents) == 4
+    assert min(angle_deg(*(np.pad(m, (0, 1)) for m in (e, matrix))) for e in found.equivalents) < 2.0
+    discs = [p[np.linalg.norm(p, axis=1) < 1.0] for p in (rng.uniform(-1, 1, (5000, 2)) for _ in range(2))]
+    assert align(*discs).observable == "up to any orthogonal map within 2 of the 2 dimensions"
+    assert align(*discs).sigma_rad == np.inf
+
+
+# --- bad input --------------------------------------------------------------------------------------------------------
+
+GOOD = skewed(50, 3, 32)
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "options", "message"),
+    [
+        (np.empty((0, 3)), GOOD, {}, "source: no points"),
+        (GOOD, np.where(GOOD > 1.0, np.nan, GOOD), {}, "target: .* hold NaN"),
+        (GOOD[:, :2], GOOD, {}, "source has 2 coordinates, target has 3"),
+        (GOOD.ravel(), GOOD, {}, "expected \\[N, n\\]"),
+        (GOOD, GOOD, {"tolerance": 0.5}, "expected a fraction of the diagonal"),
+        (np.ones((20, 12)) * np.arange(20)[:, None], np.ones((20, 12)), {}, "all 20 points coincide"),
+        (np.eye(12), np.eye(12), {}, "align takes 10 at most"),
+    ],
+)
+def test_bad_input(source: Array, target: Array, options: dict[str, float], message: str) -> None:
+    with pytest.raises((InputError, DegenerateShapeError), match=message) as caught:
+        align(source, target, **options)
+    assert "\n" not in str(caught.value)
+
+
+def test_all_points_in_one_place() -> None:
+    with pytest.raises(DegenerateShapeError, match="target: all 5 points coincide"):
+        align(GOOD, np.ones((5, 3)))
+
+
+def test_measures_do_not_mix() -> None:
+    mesh = asymmetric()
+    with pytest.raises(InputError, match="give both the same measure"):
+        align(mesh, Shape(points=mesh.points, faces=mesh.faces, measure="solid"))
+
+
+# --- the parts --------------------------------------------------------------------------------------------------------
+
+
+@given(seed=SEEDS)
+@settings(max_examples=20, deadline=None)
+def test_harmonics_turn_as_the_points_do(seed: int) -> None:
+    rng = rng_of(seed)
+    near_pole = rotation(rng.normal(size=3), 1e-9) @ np.diag([1.0, -1.0, -1.0])
+    matrices = np.stack([random_orthogonal(rng, det=d) for d in DETERMINANTS] + [np.eye(3), near_pole, -np.eye(3)])
+    points = rng.normal(size=(5, 3))
+    turner = Turner.of(matrices, 6)
+    for l in (1, 2, 6):
+        expected = np.stack([evaluate(l, points @ m.T) for m in matrices])
+        scale = np.linalg.norm(points, axis=1).max() ** l
+        np.testing.assert_allclose(turner(evaluate(l, points)), expected, atol=1e-13 * scale)
+
+
+def test_euler_angles_give_the_rotation_back_at_the_poles_too() -> None:
+    generic = [random_orthogonal(rng_of(33, k)) for k in range(5)]
+    poles = [rotation([0, 0, 1], 0.7), rotation([0, 0, 1], 0.7) @ rotation([0, 1, 0], 1e-9), np.diag([1.0, -1.0, -1.0])]
+    for r in generic + poles:
+        a, b, c = (float(x[0]) for x in euler_zyz(r[None]))
+        again = rotation([0, 0, 1], a) @ rotation([0, 1, 0], b) @ rotation([0, 0, 1], c)
+        np.testing.assert_allclose(again, r, atol=1e-15 * 10)
+
+
+def test_procrustes_comes_with_its_determinant() -> None:
+    moments = central_moments(skewed(500, 3, 34), np.ones(500), 5)
+    for det in DETERMINANTS:
+        matrix = random_orthogonal(rng_of(35), det=det)
+        target = central_moments(skewed(500, 3, 34) @ matrix.T, np.ones(500), 5)
+        found = procrustes(ntuples(moments), ntuples(target))
+        assert found.rank == 3
+        np.testing.assert_allclose(found.matrix, matrix, atol=1e-11)
+        assert np.linalg.det(found.flipped) == pytest.approx(-det)
+
+
+def test_the_landscape_peaks_at_the_truth() -> None:
+    matrix = random_orthogonal(rng_of(36), det=-1)
+    points = skewed(3000, 3, 37)
+    source, target = (central_moments(p, np.ones(len(p)), 8) for p in (points, points @ matrix.T))
+    pair = harmonic_pair(source, target)
+    proper, improper = landscape(source, target, pair)
+    assert improper.max() > proper.max()
+    best = hills(improper, -1, count=1)
+    assert angle_deg(best[0], matrix) < 15.0
+    fitted = fit(pair, best)
+    np.testing.assert_allclose(fitted.matrices[0], matrix, atol=1e-12)
+    assert mismatch(pair, fitted.matrices)[0] < 1e-12
+
+
+def test_the_moments_prefer_the_right_hand_only_of_chiral_objects() -> None:
+    rng = rng_of(38)
+    for shape, chiral in ((asymmetric(), True), (mug(), False)):
+        pair = harmonic_pair(
+            *(central_moments(sample(shape, 10000, 0.0, rng), np.ones(10000), 8, parts=16) for _ in range(2))
+        )
+        mirror = fit(pair, np.stack([householder(n) for n in np.eye(3)])).matrices[0]
+        assert (preference(pair, fit(pair, np.eye(3)[None]).matrices[0], mirror) > 5.0) is chiral
+
+
+def test_moments_in_the_plane_agree_with_procrustes() -> None:
+    points, matrix = skewed(400, 2, 39), random_orthogonal(rng_of(40), 2, -1)
+    source, target = (central_moments(p, np.ones(400), 5) for p in (points, points @ matrix.T))
+    tuples = ntuples(source), ntuples(target)
+    closed = procrustes(*tuples)
+    np.testing.assert_allclose(closed.matrix, matrix, atol=1e-11)
+    np.testing.assert_allclose(moment_fit(source, target, tuples, closed).matrices, matrix[None], atol=1e-12)
