@@ -57,7 +57,7 @@ def coset_of_group(
     """
     group = group.for_point_set()
     if group.is_finite:
-        operations, free = group.operations(), np.zeros((0, 3))
+        operations, free = group.operations(), group.frame[:0]
     else:
         family = group.symbol.family
         operations = np.stack([group.frame.T @ np.diag(d) @ group.frame for d in np.array(_PARTS[family], float)])
@@ -129,7 +129,7 @@ def lifted(
     within = []
     for m in inner.matrices:
         for sign in (1.0, -1.0):
-            full = np.eye(dim)
+            full: Array = np.eye(dim)
             full[:rank, :rank] = m
             full[-1, -1] = sign
             within.append(target_basis.T @ full @ source_basis)

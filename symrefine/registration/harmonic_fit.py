@@ -11,8 +11,10 @@ grid of rotations gives the whole landscape, both determinants at once, in one m
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symrefine.geometry import Array, read_only
 from symrefine.harmonics import generators, harmonic_moments, turn
@@ -184,7 +186,7 @@ class HarmonicFit:
     costs: Array
     hessians: Array
 
-    def __getitem__(self, index: slice | Array) -> "HarmonicFit":
+    def __getitem__(self, index: slice | NDArray[Any]) -> "HarmonicFit":
         return HarmonicFit(matrices=self.matrices[index], costs=self.costs[index], hessians=self.hessians[index])
 
 
