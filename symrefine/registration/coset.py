@@ -136,7 +136,7 @@ def lifted(
     within = [m for m in within if reflections or np.linalg.det(m) > 0.0]
     matrices = np.array(sorted(within, key=lambda m: -np.sign(np.linalg.det(m))))
     across = target_basis[rank:]
-    parts = [inner.free @ target_basis[:rank]] if len(inner.free) else []
+    parts: list[Array] = [inner.free @ target_basis[:rank]] if len(inner.free) else []
     if len(across) > 1:
         parts.append(across)
     missing = f"the points span {rank} of {dim} dimensions: "
