@@ -1,5 +1,7 @@
 """Local planes against the surfaces they stand for, and correspondences against brute force."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -267,9 +269,12 @@ def test_rough_neighbourhoods_count_less():
     flat = np.column_stack([rng.uniform(-1, 1, (2000, 2)), np.zeros(2000)])
     blob = 0.15 * rng.standard_normal((400, 3)) + [0, 0, 1]
     cloud = local_planes(np.concatenate([flat, blob]), 2400, rng)
-    pairs = match(cloud, mirror([1, 0, 0]), 0.05)
+    # With so large an uncertainty no residual is too large: only the flatness of the neighbourhoods is left.
+    pairs = match(cloud, mirror([1, 0, 0]), 10.0)
     high = cloud.points[pairs.sources, 2] > 0.5
     assert pairs.weights[high].mean() < 0.7 * pairs.weights[~high].mean()
+    flatness = np.exp(-(cloud.flatness[pairs.sources] ** 2) - cloud.flatness[pairs.targets] ** 2)
+    np.testing.assert_allclose(pairs.weights, flatness, rtol=0.05)
 
 
 # Points that stand for themselves
@@ -283,8 +288,10 @@ def test_isolated_points_pair_with_their_images_in_three_equations():
     np.testing.assert_allclose(motion.apply(atoms[pairs.sources]), atoms[pairs.targets], atol=1e-14)
     assert sorted(pairs.sources.tolist()) == [0, 1, 2, 3]  # those on the plane stay, and count
     np.testing.assert_allclose(pairs.weights, 1.0)
-    sources, targets, directions, weights = pair_equations(cloud, pairs)
+    uneven = replace(pairs, weights=np.arange(1.0, 5.0))
+    sources, targets, directions, weights = pair_equations(cloud, uneven)
     assert len(sources) == len(targets) == len(directions) == len(weights) == 12
+    np.testing.assert_array_equal(weights.reshape(4, 3), np.outer([1, 2, 3, 4], [1, 1, 1]))
     off = Isometry.about(np.array([0.1, 0.2, 0.3]), motion.matrix)
     by_equation = np.einsum("ij,ij->i", off.apply(sources) - targets, directions).reshape(4, 3)
     np.testing.assert_allclose(by_equation, off.apply(atoms[pairs.sources]) - atoms[pairs.targets], atol=1e-14)

@@ -216,7 +216,8 @@ def test_replicates_do_not_depend_on_the_order_the_file_lists_its_points_in():
     sorted_, shuffled = (
         central_moments(p, ones, 2, parts=16).replicates for p in (points[np.argsort(points[:, 0])], points)
     )
-    assert sorted_[:, 4:].std(axis=0).max() < 3 * shuffled[:, 4:].std(axis=0).max()
+    # Deviations of 16 replicates are good to a fifth each; blocks would have twelve times the spread along x.
+    assert (sorted_[:, 4:].std(axis=0) / shuffled[:, 4:].std(axis=0)).max() < 4
 
 
 # Meshes
