@@ -20,6 +20,7 @@ from symrefine.registration.harmonic_fit import (
     Turner,
     euler_zyz,
     fit,
+    grid_rotations,
     harmonic_pair,
     hills,
     landscape,
@@ -406,6 +407,16 @@ def test_euler_angles_give_the_rotation_back_at_the_poles_too() -> None:
         a, b, c = (float(x[0]) for x in euler_zyz(r[None]))
         again = rotation([0, 0, 1], a) @ rotation([0, 1, 0], b) @ rotation([0, 0, 1], c)
         np.testing.assert_allclose(again, r, atol=1e-15 * 10)
+
+
+def test_the_grid_leaves_no_rotation_far_away() -> None:
+    grid = grid_rotations().reshape(-1, 9)
+    products = grid_rotations() @ grid_rotations().transpose(0, 2, 1)
+    np.testing.assert_allclose(products, np.broadcast_to(np.eye(3), products.shape), atol=1e-12)
+    assert (np.linalg.det(grid_rotations()) > 0.0).all()
+    anywhere = np.stack([random_orthogonal(rng_of(41, k)) for k in range(300)]).reshape(-1, 9)
+    farthest = np.degrees(np.arccos((np.max(anywhere @ grid.T, axis=1).min() - 1.0) / 2.0))
+    assert farthest < 12.0
 
 
 def test_procrustes_comes_with_its_determinant() -> None:

@@ -133,13 +133,16 @@ def euler_zyz(rotations: Array) -> tuple[Array, Array, Array]:
 @lru_cache(maxsize=1)
 def grid_rotations() -> Array:
     """Even rotations [GRID, 3, 3] (super-Fibonacci spirals; Alexa 2022)."""
-    from symrefine.groups.orthogonal import rotation_matrix
-
     i = np.arange(GRID) + 0.5
     low, high = np.sqrt(i / GRID), np.sqrt(1.0 - i / GRID)
     alpha, beta = 2.0 * np.pi * i / np.sqrt(2.0), 2.0 * np.pi * i / 1.533751168755204288118041
-    q = np.stack([low * np.sin(alpha), low * np.cos(alpha), high * np.sin(beta), high * np.cos(beta)], axis=1)
-    return read_only([rotation_matrix(row) for row in q])
+    x, y, z, w = low * np.sin(alpha), low * np.cos(alpha), high * np.sin(beta), high * np.cos(beta)
+    half = [
+        [-y * y - z * z, x * y - z * w, x * z + y * w],
+        [x * y + z * w, -x * x - z * z, y * z - x * w],
+        [x * z - y * w, y * z + x * w, -x * x - y * y],
+    ]
+    return read_only(np.eye(3) + 2.0 * np.array(half).transpose(2, 0, 1))
 
 
 @lru_cache(maxsize=GRID_DEGREE)

@@ -18,6 +18,8 @@ from symrefine.shape import Shape
 
 # Local planes of the source and of the target, and points below which local planes say nothing.
 SOURCE_PLANES, TARGET_PLANES, FEWEST = 1000, 2000, 60
+# Points of a cloud that local planes are fitted to at most.
+DENSE = 40000
 # Where neither side has more points than this they stand for themselves (atoms), not for a surface.
 FEW = 250
 # Neighbours whose distance tells the density at a point, and the bound of what is made of it, over the median.
@@ -56,6 +58,9 @@ class Side:
         points, normals = self.shape.points, self.shape.normals
         if self.is_mesh:
             points, normals, _ = sample_surface(self.shape, 2 * count, rng)
+        elif len(points) > DENSE:
+            some = rng.choice(len(points), DENSE, replace=False)
+            points, normals = points[some], None if normals is None else normals[some]
         return local_planes((points - self.moments.center) / unit, count, rng, normals=normals, exact=self.is_mesh)
 
     def azimuths(self, frame: Array) -> Array:
