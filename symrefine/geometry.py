@@ -150,7 +150,7 @@ def _box_trials() -> tuple[Array, Array, Array]:
 
 
 def tight_diagonal(points: Array) -> float:
-    """Diagonal of the smallest box around points [N, 3] over all orientations, to about one percent.
+    """Diagonal of the smallest box around points [N, 3] over all orientations, to within about three percent.
 
     Unlike the axis-aligned box of the input it does not change when the object is turned. The search starts from the
     principal axes and a fixed set of rotations, then shrinks.
