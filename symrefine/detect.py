@@ -140,7 +140,7 @@ def detect(
     elif weights is not None or normals is not None:
         raise InputError("weights and normals belong to the Shape; give them there, or give an array of points")
     if shape.dim != 3:
-        raise InputError(f"{shape.source}: detect takes 3-D shapes; these points have {shape.dim} coordinates")
+        raise InputError(f"{shape.source}: detect takes 3-D shapes; {_elsewhere(shape.dim)}")
     if not 0.0 < tolerance <= 0.2:
         raise InputError(f"tolerance is {tolerance}; expected a fraction of the diagonal in (0, 0.2]")
     shape = _with_mass(shape)
@@ -164,6 +164,16 @@ def _with_mass(shape: Shape) -> Shape:
     kept = shape.weights > 0
     normals = None if shape.normals is None else shape.normals[kept]
     return replace(shape, points=shape.points[kept], weights=shape.weights[kept], normals=normals)
+
+
+def _elsewhere(dim: int) -> str:
+    """What is offered for points of another dimension."""
+    if dim == 2:
+        return "these points have 2 coordinates: use symrefine.planar.detect_planar"
+    return (
+        f"these points have {dim} coordinates: for 4 and more symrefine.subspace.detect_nd tells the rank of the "
+        "n-tuples and the one hyperplane of symmetry there may be, no turns and no groups"
+    )
 
 
 def _doubt(evidence: Evidence) -> str:
