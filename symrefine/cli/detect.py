@@ -5,27 +5,30 @@ import sys
 import time
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from symrefine.cli.outputs import STDOUT, Writer, check_outputs, note, say, text_writer, waiting, write_all
-from symrefine.cli.values import add_detection_options, natural, positive
+from symrefine.cli.values import add_detection_options, grey, natural, positive
+from symrefine.errors import InputError
 
 if TYPE_CHECKING:
     from symrefine.detect import Detection
+    from symrefine.planar import PlanarDetection
     from symrefine.shape import Shape
 
 NAME = "detect"
-HELP = "find the planes, axes and point group of a mesh or cloud"
+HELP = "find the planes, axes and point group of a mesh, cloud or picture"
 DESCRIPTION = (
     "Find the mirror planes, rotation axes and point group of the mesh or point cloud in PATH (.ply .stl .obj .off "
-    ".glb .gltf .pcd .xyz .csv .txt .npy .npz). Prints a table; lengths are in the units of the file, misses in "
-    "percent of the bounding-box diagonal."
+    ".glb .gltf .pcd .xyz .csv .txt .npy .npz), or the mirror lines and turns of a picture (.png .jpg .jpeg .bmp) or "
+    "of points with two coordinates (.csv .txt .npy .npz). Prints a table; lengths are in the units of the file, "
+    "misses in percent of the bounding-box diagonal."
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", metavar="PATH", help="mesh or point cloud")
+    parser.add_argument("path", metavar="PATH", help="mesh, point cloud or picture")
     parser.add_argument("--json", metavar="FILE|-", help="write the whole report as JSON; - is stdout, with no table")
     parser.add_argument("--bop", metavar="FILE", help="put the symmetries into this models_info.json of BOP")
     parser.add_argument(
@@ -40,6 +43,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--recording", metavar="FILE.rrd", help="write the iterations, for `symrefine view`")
     parser.add_argument("--report", metavar="FILE.html", help="write a page with pictures and tables")
+    parser.add_argument(
+        "--threshold",
+        type=grey,
+        metavar="GREY",
+        help="make a picture binary: grey value from 0 (black) to 1 (white), or `otsu` (default: pixels weigh as much "
+        "as they differ from the background, which is what most of the border shows)",
+    )
+    parser.add_argument("--invert", action="store_true", help="exchange object and background of a picture")
     add_detection_options(parser)
 
 
@@ -50,11 +61,13 @@ def run(args: argparse.Namespace) -> int:
     if args.bop is not None:
         _check_bop(Path(args.bop))
     with waiting("detecting"):
-        shape, detection, record = examine(args.path, args.measure, args.tolerance, args.seed)
+        shape, detection, record = examine(
+            args.path, args.measure, args.tolerance, args.seed, threshold=args.threshold, invert=args.invert
+        )
         writers = _writers(args, shape, detection, record)
         write_all(writers)
     if args.bop is not None:
-        _note_limits(detection)
+        _note_limits(cast("Detection", detection))
     if args.json == STDOUT:
         from symrefine.export.files import json_text
 
@@ -65,20 +78,34 @@ def run(args: argparse.Namespace) -> int:
 
 
 def examine(
-    path: str, measure: Literal["surface", "solid"] | None, tolerance: float, seed: int
-) -> tuple["Shape", "Detection", dict[str, Any]]:
-    """Shape, detection and JSON record of a file."""
-    from symrefine.detect import detect
-    from symrefine.export.records import detection_record
-    from symrefine.load import load
+    path: str,
+    measure: Literal["surface", "solid"] | None,
+    tolerance: float,
+    seed: int,
+    *,
+    threshold: float | Literal["otsu"] | None = None,
+    invert: bool = False,
+) -> tuple["Shape", "Detection | PlanarDetection", dict[str, Any]]:
+    """Shape, detection and JSON record of a file, in space or in the plane as its points are."""
+    from symrefine.load import IMAGES, load
 
     start = time.perf_counter()
-    shape = load(path, measure=measure)
+    shape = load(path, measure=measure, threshold=threshold, invert=invert)
     load_s = time.perf_counter() - start
+    options: dict[str, Any] = {"tolerance": tolerance, "measure": measure, "seed": seed}
+    if shape.dim == 2:
+        from symrefine.export.planar import planar_record
+        from symrefine.planar import detect_planar
+
+        flat = detect_planar(shape, tolerance=tolerance, seed=seed)
+        if Path(path).suffix.lower() in IMAGES:
+            options |= {"threshold": threshold, "invert": invert}
+        return shape, flat, planar_record(flat, shape, options=options, load_s=load_s)
+    from symrefine.detect import detect
+    from symrefine.export.records import detection_record
+
     detection = detect(shape, tolerance=tolerance, seed=seed)
-    options = {"tolerance": tolerance, "measure": measure, "seed": seed}
-    record = detection_record(detection, shape, options=options, load_s=load_s)
-    return shape, detection, record
+    return shape, detection, detection_record(detection, shape, options=options, load_s=load_s)
 
 
 def _check_bop(path: Path) -> None:
@@ -88,13 +115,28 @@ def _check_bop(path: Path) -> None:
 
 
 def _writers(
-    args: argparse.Namespace, shape: "Shape", detection: "Detection", record: dict[str, Any]
+    args: argparse.Namespace, shape: "Shape", detection: "Detection | PlanarDetection", record: dict[str, Any]
 ) -> dict[str, Writer]:
     writers: dict[str, Writer] = {}
     if args.json not in (None, STDOUT):
         from symrefine.export.files import json_text
 
         writers[args.json] = text_writer(json_text(record))
+    if shape.dim == 2:
+        _refuse_spatial(args)
+        return writers
+    return writers | _spatial_writers(args, shape, cast("Detection", detection))
+
+
+def _refuse_spatial(args: argparse.Namespace) -> None:
+    options = {"--bop": args.bop, "--recording": args.recording, "--report": args.report}
+    for option, name in options.items():
+        if name is not None:
+            raise InputError(f"{option} {name}: is for objects in space; {args.path} lies in the plane, use --json")
+
+
+def _spatial_writers(args: argparse.Namespace, shape: "Shape", detection: "Detection") -> dict[str, Writer]:
+    writers: dict[str, Writer] = {}
     if args.bop is not None:
         writers[args.bop] = _bop_writer(args, shape, detection)
     if args.recording is not None:
@@ -125,10 +167,10 @@ def _note_limits(detection: "Detection") -> None:
 
 def _print(record: dict[str, Any], written: list[str]) -> None:
     from symrefine.cli.outputs import console
-    from symrefine.cli.tables import detection_lines
+    from symrefine.cli.tables import detection_lines, planar_lines
 
     out = console()
-    for line in detection_lines(record):
+    for line in planar_lines(record) if "lines" in record else detection_lines(record):
         out.print(line, soft_wrap=isinstance(line, str))
     for name in written:
         out.print(f"wrote {name}", soft_wrap=True)

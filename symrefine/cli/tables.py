@@ -23,6 +23,11 @@ _TUPLES = {
     "axis": "lie on one line: an axis, with or without mirror planes through it",
     "vanish": "all vanish: several axes, an inversion, or a mirror across an axis",
 }
+_DOUBLETS = {
+    "none": "span the plane: no exact mirror line and no turn",
+    "line": "lie on one line: a mirror line at most",
+    "centre": "all vanish: turns, with or without mirror lines",
+}
 _KINDS = {"axis": "rotation", "improper": "rotoreflection"}
 
 
@@ -70,6 +75,75 @@ def _elements(record: Record) -> str:
     return ", ".join(p for p in parts if p and not p.startswith("0 "))
 
 
+def planar_lines(record: Record) -> Iterator[Table | str]:
+    """Everything a table can say about one detection in the plane."""
+    yield f"{record['source']}: {planar_headline(record)}"
+    yield f"n-tuples {_DOUBLETS[record['ntuples']['kind']]}"
+    centre = ", ".join(_length(x, record) for x in record["center"])
+    yield f"centre ({centre}), diagonal {_length(record['diagonal'], record)} in units of the file"
+    found, near = record["lines"], record["near_misses"]
+    if found or record["rotation"]:
+        yield ""
+        yield _planar_elements(record)
+    if near:
+        yield ""
+        yield _planar_near_misses(record)
+    if record["ntuples"]["kind"] != "centre":
+        yield ""
+        yield _ratios(record)
+    yield ""
+    yield "Offsets in units of the file (of a picture: pixels, y up), misses in % of the diagonal."
+    if near:
+        yield "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows."
+    yield f"{sum(record['timings'].values()):.2f} s"
+
+
+def planar_headline(record: Record) -> str:
+    """The group of the plane and what it means, or why there is none."""
+    name, rotation = record["point_group"], record["rotation"]
+    tolerance = f"tolerance {100 * record['tolerance']:g} %"
+    if record["undetermined"]:
+        return f"undetermined: {record['undetermined']}"
+    if name == "C1":
+        return f"C1, no symmetry at {tolerance}; confidence {record['confidence']:.2f}"
+    lines = _count(len(record["lines"]), "mirror line") if record["lines"] else "no mirror line"
+    turns = f", turns of order {rotation['order']}" if rotation else ""
+    meaning = "round" if name == "O(2)" else lines + turns
+    return f"{name}, {meaning}; {tolerance}, confidence {record['confidence']:.2f}"
+
+
+def _planar_elements(record: Record) -> Table:
+    table = _table("mirror lines: normal", "offset", "kind", *_RESIDUALS, "confidence")
+    for line in record["lines"]:
+        offset = _length(line["offset"], record)
+        table.add_row(_direction(line["normal"]), offset, "mirror", *_misses(line), f"{line['confidence']:.2f}")
+    rotation = record["rotation"]
+    if rotation:
+        kind = "all turns" if rotation["order"] == "inf" else f"turns of order {rotation['order']}"
+        table.add_row("", "", kind, *_misses(rotation), f"{rotation['confidence']:.2f}")
+    return table
+
+
+def _planar_near_misses(record: Record) -> Table:
+    table = _table("near misses: normal", "offset", "kind", *_RESIDUALS, "x limit")
+    for m in record["near_misses"]:
+        mirror = m["kind"] == "line"
+        where = (_direction(m["normal"]), _length(m["offset"], record)) if mirror else ("", "")
+        kind = "mirror" if mirror else "all turns" if m["order"] == "inf" else f"turns of order {m['order']}"
+        table.add_row(*where, kind, *_misses(m), f"{m['excess']:.2f}")
+    return table
+
+
+def _ratios(record: Record) -> Table:
+    """Singular values of the doublets of each vector of moments, and their ratio, as the paper prints it."""
+    table = _table("doublets of v(p,p')", "sigma 1", "sigma 2", "ratio")
+    for v in record["ntuples"]["vectors"]:
+        ratio = v["ratio"]
+        told = "they vanish" if ratio is None else ratio if ratio == "inf" else f"{ratio:.4g}"
+        table.add_row(str(tuple(v["orders"])), *(f"{s:.2e}" for s in v["singular_values"]), told)
+    return table
+
+
 def alignment_lines(record: Record) -> Iterator[str]:
     """Everything a person wants to know about one alignment."""
     yield f"{record['source']} onto {record['target']}: {record['status']}"
@@ -95,17 +169,25 @@ def batch_table(rows: Sequence[Record]) -> Table:
         if row["error"] is not None:
             table.add_row(row["file"], f"failed: {row['error']}")
             continue
-        elements = row["planes"] + row["axes"]
+        mirrors, turns = _mirrors_and_turns(row)
+        elements = mirrors + turns
         table.add_row(
             row["file"],
             "undetermined" if row["undetermined"] else row["point_group"],
-            str(len(row["planes"])),
-            str(len(row["axes"])),
+            str(len(mirrors)),
+            str(len(turns)),
             _percent(max(e["residual"]["p95"] for e in elements)) if elements else "",
             f"{min(e['confidence'] for e in elements):.2f}" if elements else "",
             f"{sum(row['timings'].values()):.2f}",
         )
     return table
+
+
+def _mirrors_and_turns(row: Record) -> tuple[list[Record], list[Record]]:
+    """Planes and axes of a detection in space, lines and turns of one in the plane."""
+    if "lines" in row:
+        return row["lines"], [row["rotation"]] if row["rotation"] else []
+    return row["planes"], row["axes"]
 
 
 def _planes(record: Record) -> Table:

@@ -2,6 +2,7 @@
 
 import argparse
 import math
+from typing import Literal
 
 # The same as `verify.TOLERANCE` and the range that `detect` takes, which are too heavy to import for `--help`.
 TOLERANCE, LARGEST_TOLERANCE = 0.02, 0.2
@@ -34,6 +35,16 @@ def tolerance(text: str) -> float:
         raise argparse.ArgumentTypeError(
             f"{text!r} is not a fraction of the bounding-box diagonal in (0, {LARGEST_TOLERANCE}], such as 0.02"
         )
+    return value
+
+
+def grey(text: str) -> float | Literal["otsu"]:
+    """A grey value between black and white, or the name of the method that chooses one."""
+    if text == "otsu":
+        return "otsu"
+    value = _float(text)
+    if not 0.0 < value < 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a grey value between 0 (black) and 1 (white), nor 'otsu'")
     return value
 
 

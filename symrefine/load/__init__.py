@@ -7,7 +7,7 @@ uninitialised memory for truncated files and ended the process (signal 11) on a 
 its OBJ and OFF readers round to float32, and that for OBJ leaves out every quadrilateral; its PCD reader returns zeros
 for binary doubles and reads `x` as 0. trimesh 5.2 cuts ragged OBJ rows to the shortest. So text formats, PLY, STL and
 uncompressed PCD are read here, line by line or straight from the bytes; glTF by trimesh, after a check of what it would
-leave out; compressed PCD by open3d, after a check of sizes.
+leave out; compressed PCD by open3d, after a check of sizes. Images are read by Pillow.
 """
 
 from collections.abc import Callable
@@ -18,6 +18,7 @@ from typing import Literal
 from symrefine.errors import InputError
 from symrefine.load.content import Content, check_distinct, check_finite
 from symrefine.load.gltf import read_glb, read_gltf
+from symrefine.load.image import FORMATS, Threshold, read_image
 from symrefine.load.mesh import mesh_shape
 from symrefine.load.obj import read_obj
 from symrefine.load.off import read_off
@@ -27,9 +28,9 @@ from symrefine.load.stl import read_stl
 from symrefine.load.tables import read_npy, read_npz, read_table, read_xyz
 from symrefine.shape import Shape
 
-__all__ = ["READERS", "load"]
+__all__ = ["IMAGES", "READERS", "load"]
 
-# A reader gets the bytes of a file and its path, which messages begin with. Images would join here.
+# A reader gets the bytes of a file and its path, which messages begin with.
 Reader = Callable[[bytes, str], Content]
 
 READERS: dict[str, Reader] = {
@@ -46,27 +47,46 @@ READERS: dict[str, Reader] = {
     ".txt": read_table,
     ".xyz": read_xyz,
 }
+# Suffixes of pictures: apart from the others, because the textures of meshes lie beside these in one directory.
+IMAGES = frozenset(FORMATS)
 
 
-def load(path: str | PathLike[str], *, measure: Literal["surface", "solid"] | None = None) -> Shape:
+def load(
+    path: str | PathLike[str],
+    *,
+    measure: Literal["surface", "solid"] | None = None,
+    threshold: Threshold | None = None,
+    invert: bool = False,
+) -> Shape:
     """Shape in a file: a mesh if it has faces, else a cloud with its normals where the file has them.
+
+    A picture becomes the weighted points of the plane that its pixels are (see `symrefine.load.image`).
 
     Coordinates keep the precision of the file, float64 where it has that. Polygons become triangles; several parts of
     a scene become one shape in the frame of the scene.
 
     Args:
-        path: file whose suffix is one of `READERS`, in any case.
-        measure: what carries the mass of a mesh, "surface" if None. Clouds have no choice.
+        path: file whose suffix is one of `READERS` or `IMAGES`, in any case.
+        measure: what carries the mass of a mesh, "surface" if None. Clouds and pictures have no choice.
+        threshold: of a picture: grey value from 0 to 1 that makes it binary, or "otsu"; it is taken as it is if None.
+        invert: of a picture: exchange object and background.
 
     Raises:
         InputError: the file is missing, unreadable, not what its suffix says, incomplete, contradicts itself, holds
-            coordinates that are not finite, fewer than two distinct points or no area; a measure for a cloud.
+            coordinates that are not finite, fewer than two distinct points or no area; a measure for a cloud, a
+            threshold or `invert` for what is no picture.
     """
     if measure not in (None, "surface", "solid"):
         raise InputError(f"measure is {measure!r}; expected 'surface', 'solid' or None")
     source = str(path)
-    reader = _reader(Path(path), source)
-    content = reader(_read(Path(path), source), source)
+    suffix = Path(path).suffix.lower()
+    if suffix in IMAGES and not Path(path).is_dir():
+        content = read_image(_read(Path(path), source), source, suffix, threshold=threshold, invert=invert)
+    else:
+        reader = _reader(Path(path), source)
+        if threshold is not None or invert:
+            raise InputError(f"{source}: is no picture: threshold and invert apply to {' '.join(sorted(IMAGES))} only")
+        content = reader(_read(Path(path), source), source)
     check_finite(content, source)
     check_distinct(content, source)
     if content.faces is not None:
@@ -81,8 +101,8 @@ def _reader(path: Path, source: str) -> Reader:
         raise InputError(f"{source}: is a directory; expected a file")
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        known = " ".join(sorted(READERS))
-        raise InputError(f"{source}: unknown suffix {path.suffix!r}; known are {known}")
+        known, images = " ".join(sorted(READERS)), " ".join(sorted(IMAGES))
+        raise InputError(f"{source}: unknown suffix {path.suffix!r}; known are {known}, and images {images}")
     return reader
 
 

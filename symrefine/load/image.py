@@ -1,0 +1,166 @@
+"""Images, .png .jpg .jpeg and .bmp: pixels as weighted points of the plane.
+
+Frame: the unit is a pixel, x points to the right and y up, the origin is the lower left corner of the picture as a
+viewer shows it, so that the pixel in column c and row r of an H pixels high picture stands at (c + 1/2, H - r - 1/2).
+Grey values run from 0 (black) to 1 (white); colours become grey by ITU-R 601, 0.299 R + 0.587 G + 0.114 B.
+"""
+
+import io
+import warnings
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symrefine.errors import InputError
+from symrefine.geometry import Array
+from symrefine.load.content import Content
+from symrefine.load.text import shorten
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+Threshold = float | Literal["otsu"]
+
+FORMATS = {".bmp": "BMP", ".jpeg": "JPEG", ".jpg": "JPEG", ".png": "PNG"}
+# More pixels add nothing to the moments, only gigabytes.
+LARGEST = 2**24
+_LUMA = (0.299, 0.587, 0.114)
+_DEEP = {"I;16": 65535.0, "I;16B": 65535.0, "I;16L": 65535.0, "I": 65535.0}
+# Standard deviations of the border that a pixel must differ by from the background to weigh anything.
+_NOISE = 4.0
+
+
+def read_image(data: bytes, source: str, suffix: str, *, threshold: Threshold | None, invert: bool) -> Content:
+    """Pixels of the object in a picture, with their weights; what weighs nothing is left out.
+
+    Args:
+        data: bytes of the file.
+        source: file, for messages.
+        suffix: one of `FORMATS`, which the content has to agree with.
+        threshold: make the picture binary: the grey value that parts dark from light, or "otsu" to choose it.
+        invert: exchange object and background.
+
+    Raises:
+        InputError: damaged, animated, too large, of one grey value only, or a threshold outside (0, 1).
+    """
+    named = threshold is None or threshold == "otsu"
+    if not named and not (isinstance(threshold, int | float) and 0.0 < threshold < 1.0):
+        raise InputError(f"threshold is {threshold}; expected a grey value between 0 (black) and 1 (white), or 'otsu'")
+    grey = _grey(_open(data, source, suffix))
+    if np.ptp(grey) == 0.0:
+        size = f"{grey.shape[1]} x {grey.shape[0]} pixels"
+        raise InputError(f"{source}: all {size} have the same grey value {grey.flat[0]:.3g}: there is no object")
+    weights = pixel_weights(grey, threshold=threshold, invert=invert)
+    if np.ptp(weights) == 0.0:
+        low, high = float(grey.min()), float(grey.max())
+        raise InputError(
+            f"{source}: nothing stands out: grey values run from {low:.3g} to {high:.3g}"
+            + (f"; choose a threshold between them, not {threshold}" if threshold is not None else "")
+        )
+    row, column = np.nonzero(weights)
+    points = np.column_stack([column + 0.5, len(grey) - row - 0.5])
+    return Content(points=points, weights=weights[row, column])
+
+
+def pixel_weights(grey: Array, *, threshold: Threshold | None = None, invert: bool = False) -> Array:
+    """What each pixel [H, W] weighs: 1 and 0 in a binary picture, its distance from the background in a grey one.
+
+    The background is what most of the border shows. A picture with two grey values is binary; of a grey one the
+    background is the median of its border, and pixels within the scatter of the border weigh nothing.
+
+    Args:
+        grey: [H, W] values from 0 (black) to 1 (white).
+        threshold: make it binary first, light being what reaches the threshold.
+        invert: exchange object and background; in a grey picture, weights become their largest value minus them.
+    """
+    if threshold is not None:
+        grey = (grey >= (otsu(grey) if threshold == "otsu" else threshold)).astype(np.float64)
+    border = np.concatenate([grey[0], grey[-1], grey[1:-1, 0], grey[1:-1, -1]])
+    levels = np.unique(grey)
+    if len(levels) <= 2:
+        background = _majority([border == level for level in levels], [grey == level for level in levels])
+        return ((grey != levels[background]) != invert).astype(np.float64)
+    level = float(np.median(border))
+    scatter = 1.4826 * float(np.median(np.abs(border - level)))
+    contrast = np.abs(grey - level)
+    contrast[contrast <= _NOISE * scatter] = 0.0
+    return contrast.max() - contrast if invert else contrast
+
+
+def otsu(grey: Array) -> float:
+    """The grey value that parts a picture into the two most uniform classes."""
+    counts, edges = np.histogram(grey, bins=256)
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    below = np.cumsum(counts)[:-1]
+    above = below[-1] + counts[-1] - below
+    sums = np.cumsum(counts * middles)
+    apart = sums[:-1] / np.maximum(below, 1) - (sums[-1] - sums[:-1]) / np.maximum(above, 1)
+    score = below * above * apart**2
+    # Between two clean levels every threshold is as good: take the middle of them.
+    best = np.flatnonzero(score >= score.max() * (1.0 - 1e-12))
+    return float(edges[1 + best[[0, -1]]].mean())
+
+
+def _majority(border: Sequence[NDArray[np.bool_]], everywhere: Sequence[NDArray[np.bool_]]) -> int:
+    """Index of the level that most of the border has; of the whole picture if that is a tie; then the lightest."""
+    votes = [(int(on.sum()), int(over.sum()), k) for k, (on, over) in enumerate(zip(border, everywhere, strict=True))]
+    return max(votes)[-1]
+
+
+def _open(data: bytes, source: str, suffix: str) -> "Image":
+    """The picture as a viewer shows it, complete and undamaged."""
+    from PIL import Image, ImageOps, UnidentifiedImageError
+
+    kind = FORMATS[suffix]
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            if kind == "PNG":
+                Image.open(io.BytesIO(data), formats=[kind]).verify()  # the checksums of all chunks
+            image = Image.open(io.BytesIO(data), formats=[kind])
+            _check(image, source)
+            image.load()
+            return ImageOps.exif_transpose(image)
+    except InputError:
+        raise
+    except Image.DecompressionBombError:
+        raise InputError(f"{source}: more pixels than {LARGEST:,}; scale it down") from None
+    except UnidentifiedImageError:
+        raise InputError(f"{source}: not a {kind} image: begins with {shorten(data[:8].decode('latin-1'))}") from None
+    except Exception as error:  # noqa: BLE001 (Pillow leaks many types on damaged files; nothing else in the block)
+        raise InputError(f"{source}: not a whole {kind} image: {shorten(str(error), 80)}") from None
+
+
+def _check(image: "Image", source: str) -> None:
+    width, height = image.size
+    if width * height > LARGEST:
+        raise InputError(f"{source}: {width} x {height} pixels; at most {LARGEST:,} pixels: scale it down")
+    frames = getattr(image, "n_frames", 1)
+    if frames > 1:
+        raise InputError(f"{source}: holds {frames} pictures, an animation or a series; save one of them by itself")
+
+
+def _grey(image: "Image") -> Array:
+    """Grey values [H, W] from 0 to 1, what is transparent painted in that of black and white which it differs from."""
+    if image.mode in _DEEP or image.mode == "F":
+        return np.asarray(image, dtype=np.float64) / _DEEP.get(image.mode, 1.0)
+    if image.mode == "1":
+        return np.asarray(image, dtype=np.float64)
+    if not image.has_transparency_data:
+        return _luma(np.asarray(image if image.mode == "L" else image.convert("RGB")))
+    channels = np.asarray(image.convert("RGBA"))
+    grey, alpha = _luma(channels[:, :, :3]), channels[:, :, 3] / 255.0
+    visible = float((grey * alpha).sum()) / max(float(alpha.sum()), 1e-300)
+    ground = 1.0 if visible <= 0.5 else 0.0
+    return alpha * grey + (1.0 - alpha) * ground
+
+
+def _luma(channels: NDArray[Any]) -> Array:
+    """Grey values of 8-bit pixels, [H, W] or [H, W, 3]; equal channels keep their value exactly."""
+    if channels.ndim == 2:
+        return channels / 255.0
+    red, green, blue = (channels[:, :, k].astype(np.float64) for k in range(3))
+    # The weights sum to 1: written so, rounding cannot make two pixels of one grey differ.
+    return np.asarray((green + _LUMA[0] * (red - green) + _LUMA[2] * (blue - green)) / 255.0)
