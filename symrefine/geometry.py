@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from symrefine.errors import InputError
+
 Array = NDArray[np.floating[Any]]
 
 
@@ -27,16 +29,31 @@ def unit(vector: ArrayLike) -> Array:
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
+def _length(vector: ArrayLike, name: str) -> float:
+    """Length of a vector that is to be a direction."""
+    length = float(np.linalg.norm(vector))
+    if not 0.0 < length < np.inf:
+        raise InputError(f"{name} is {np.asarray(vector).tolist()}; expected a direction: finite and not zero")
+    return length
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Plane:
-    """Hyperplane `normal.x = offset` in Hessian normal form, the sign of the normal being arbitrary."""
+    """Hyperplane `normal.x = offset`, kept in Hessian normal form: both are divided by the length of the normal.
+
+    The sign of the pair is arbitrary.
+
+    Raises:
+        InputError: a normal that is zero or not finite.
+    """
 
     normal: Array
     offset: float
 
     def __post_init__(self) -> None:
+        length = _length(self.normal, "normal")
         object.__setattr__(self, "normal", read_only(unit(self.normal)))
-        object.__setattr__(self, "offset", float(self.offset))
+        object.__setattr__(self, "offset", float(self.offset) / length)
 
     def signed_distance(self, points: Array) -> Array:
         """Signed distances [N] of points [N, n]."""
@@ -49,19 +66,24 @@ class Plane:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Axis:
-    """Line through `point` along the unit `direction`, the sign of the direction being arbitrary."""
+    """Line through `point` along the unit `direction`, the sign of the direction being arbitrary.
+
+    Raises:
+        InputError: a direction that is zero or not finite.
+    """
 
     point: Array
     direction: Array
 
     def __post_init__(self) -> None:
+        _length(self.direction, "direction")
         object.__setattr__(self, "point", read_only(self.point))
         object.__setattr__(self, "direction", read_only(unit(self.direction)))
 
 
 def householder(normal: ArrayLike) -> Array:
     """Reflection `I - 2 n n'` [n, n] with determinant -1 across the plane through 0 normal to `normal`."""
-    n = unit(normal)
+    n = np.asarray(normal, dtype=np.float64) / _length(normal, "normal")
     return np.eye(n.size) - 2.0 * np.outer(n, n)
 
 
@@ -73,7 +95,7 @@ def cross_matrix(u: ArrayLike) -> Array:
 
 def rotation(axis: ArrayLike, angle_rad: float) -> Array:
     """Rotation [3, 3], determinant +1, by `angle_rad` about `axis` (Rodrigues)."""
-    u = unit(axis)
+    u = np.asarray(axis, dtype=np.float64) / _length(axis, "axis")
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     return c * np.eye(3) + s * cross_matrix(u) + (1.0 - c) * np.outer(u, u)
 
@@ -85,7 +107,7 @@ def rotoreflection(axis: ArrayLike, angle_rad: float) -> Array:
 
 def frame_with_z(direction: ArrayLike) -> Array:
     """Right-handed orthonormal rows (p0, p1, u) with u along `direction`; p0 and p1 span the plane normal to it."""
-    u = unit(direction)
+    u = np.asarray(direction, dtype=np.float64) / _length(direction, "direction")
     helper = np.eye(3)[int(np.argmin(np.abs(u)))]
     p0 = unit(np.cross(helper, u))
     return np.stack([p0, np.cross(u, p0), u])

@@ -41,7 +41,8 @@ def mesh_nodes(shape: Shape, degree: int) -> tuple[Array, Array]:
     """Weighted nodes whose discrete moments to `degree` are those of the mesh's surface, or carry those of its solid.
 
     For a solid, `int_V f dV = 1/(p+3) * int f (x.n) dA` for homogeneous f of degree p (method.md, section 1): the
-    signed weights here hold `(x.n) dA`, nodes are relative to the first vertex, and the division is the caller's.
+    signed weights here hold `(x.n) dA`, where x.n is constant on a triangle, nodes are relative to the first vertex,
+    and the division is the caller's.
 
     Returns: nodes [F*Q, 3] relative to the first vertex and weights [F*Q].
     Raises:  DegenerateShapeError: the mesh has no area.

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
+from symrefine.errors import InputError
 from symrefine.geometry import (
     Axis,
     Isometry,
@@ -113,6 +114,31 @@ def test_a_plane_halves_the_way_to_every_mirror_image(seed, dim):
     np.testing.assert_allclose(plane.signed_distance(image), -plane.signed_distance(x), atol=1e-13)
     np.testing.assert_allclose(plane.reflect(image), x, atol=1e-13)
     np.testing.assert_allclose(image - x, -2 * np.outer(plane.signed_distance(x), plane.normal), atol=1e-13)
+
+
+@pytest.mark.parametrize("length", [1e-150, 0.5, 2.0, 1e150])
+def test_the_length_of_a_normal_does_not_matter(length):
+    plane = Plane(normal=[0, 0, length], offset=2 * length)
+    assert plane.offset == pytest.approx(2.0)
+    np.testing.assert_allclose(plane.reflect(np.array([[0.0, 0.0, 5.0]])), [[0, 0, -1]])
+
+
+@pytest.mark.parametrize("vector", [[0, 0, 0], [0, np.nan, 1], [np.inf, 0, 0]])
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda v: Plane(normal=v, offset=1.0),
+        lambda v: Axis(point=[0, 0, 0], direction=v),
+        householder,
+        lambda v: rotation(v, 1.0),
+        lambda v: rotoreflection(v, 1.0),
+        frame_with_z,
+    ],
+    ids=["plane", "axis", "householder", "rotation", "rotoreflection", "frame"],
+)
+def test_a_direction_must_point_somewhere(make, vector):
+    with pytest.raises(InputError, match="expected a direction"):
+        make(vector)
 
 
 def test_the_sign_of_a_normal_does_not_matter():

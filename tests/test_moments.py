@@ -22,6 +22,7 @@ from symrefine.moments import (
     tensor_index,
     transformed,
 )
+from symrefine.quadrature import triangle_areas_and_normals
 from symrefine.shape import Shape
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -307,12 +308,66 @@ def test_a_solid_without_volume_is_degenerate(faces):
         shape_moments(Shape(points=[[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces=faces, measure="solid"), 3)
 
 
-@pytest.mark.parametrize("damage", ["open", "one face turned round"])
-def test_a_solid_must_be_closed_and_consistently_oriented(damage):
-    points, faces = box((0, 0, 0), (1, 2, 3))
-    faces = faces[1:] if damage == "open" else np.concatenate([faces[:1, ::-1], faces[1:]])
+BOX = box((0, 0, 0), (1, 2, 3))
+TURNED = BOX[1].copy()
+TURNED[[8, 10]] = TURNED[[8, 10], ::-1]
+DAMAGED = {
+    "open": BOX[1][1:],
+    "one face turned round": np.concatenate([BOX[1][:1, ::-1], BOX[1][1:]]),
+    "a tube": BOX[1][:8],
+    "a face turned round at either end": TURNED,
+}
+
+
+@pytest.mark.parametrize("faces", DAMAGED.values(), ids=DAMAGED)
+def test_a_solid_must_be_closed_and_consistently_oriented(faces):
     with pytest.raises(DegenerateShapeError):
-        shape_moments(Shape(points=points, faces=faces, measure="solid"), 3)
+        shape_moments(Shape(points=BOX[0], faces=faces, measure="solid"), 3)
+
+
+def test_a_hole_in_every_face_is_seen_though_area_vectors_and_their_moments_agree():
+    # With the middle of all six faces gone the rest has sum n dA = 0 and int x n' dA proportional to I.
+    whole = cube_with_holes(holes=False)
+    shape_moments(whole, 3)
+    holed = cube_with_holes(holes=True)
+    areas, normals = triangle_areas_and_normals(holed.points, holed.faces)
+    vectors = areas[:, None] * normals
+    first = holed.points[holed.faces].mean(axis=1).T @ vectors
+    np.testing.assert_allclose(vectors.sum(axis=0), 0, atol=1e-14)
+    np.testing.assert_allclose(first, first[0, 0] * np.eye(3), atol=1e-14)
+    with pytest.raises(DegenerateShapeError, match="not a closed"):
+        shape_moments(holed, 3)
+
+
+def cube_with_holes(*, holes):
+    """Each face of a cube in a 3 x 3 grid, with the middle squares or without."""
+    points, faces = [], []
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            for i, j in np.ndindex(3, 3):
+                if holes and (i, j) == (1, 1):
+                    continue
+                square = np.array([[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]]) / 1.5 - 1.0
+                corner = np.insert(square, axis, side, axis=1)
+                outward = (side > 0) == (axis != 1)
+                start = len(points)
+                points += list(corner if outward else corner[::-1])
+                faces += [[start, start + 1, start + 2], [start, start + 2, start + 3]]
+    return Shape(points=np.array(points), faces=np.array(faces), measure="solid")
+
+
+@pytest.mark.parametrize("single", [False, True], ids=["double", "single precision"])
+def test_triangles_may_meet_without_sharing_vertices(single):
+    # One face of a box cut where the others know nothing of it, the whole turned and far out.
+    points, faces = BOX
+    a, b, c = faces[0]
+    points = np.concatenate([points, [(points[a] + 2 * points[b]) / 3]])
+    cut = np.concatenate([faces[1:], [[a, len(points) - 1, c], [len(points) - 1, b, c]]])
+    posed = points @ random_orthogonal(np.random.default_rng(0)).T + 7.0
+    posed = posed.astype(np.float32).astype(float) if single else posed
+    found = shape_moments(Shape(points=posed, faces=cut, measure="solid"), 2)
+    exact = shape_moments(Shape(points=BOX[0], faces=faces, measure="solid"), 2)
+    assert found.scale == pytest.approx(exact.scale, rel=1e-6)
 
 
 def test_moments_are_read_only():

@@ -15,12 +15,12 @@ import pytest
 from experiments.shapes import asymmetric, bottle, box, join, sample, table
 from symrefine.detect import Detection, detect
 from symrefine.errors import InputError
+from symrefine.files import whole
 from symrefine.geometry import Array, Plane, rotation
 from symrefine.groups import point_group
 from symrefine.picture import words
 from symrefine.picture.camera import Camera, look_at
 from symrefine.picture.draw import picture_png, place_labels
-from symrefine.picture.files import whole
 from symrefine.picture.measures import rms_series, theta_series_deg, turn_series_deg
 from symrefine.picture.painter import paint
 from symrefine.picture.raster import Raster

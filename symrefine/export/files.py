@@ -1,54 +1,12 @@
-"""Files that are whole or absent: written beside their place under another name, then moved there in one step."""
+"""The text of JSON files, beside the writing of whole files (`symrefine.files`)."""
 
 import json
-import os
-import secrets
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
-from symrefine.errors import InputError
+from symrefine.files import check_target, replacing
 
-
-def check_target(path: Path) -> None:
-    """Refuse a path that cannot be written, before any work is done for it.
-
-    Raises:
-        InputError: a directory, no such parent directory, or no permission.
-    """
-    if path.is_dir():
-        raise InputError(f"{path}: is a directory; expected a file to write")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: cannot be written: there is no directory {path.parent}")
-    if path.exists() and not os.access(path, os.W_OK):
-        raise InputError(f"{path}: cannot be written: the file is write-protected")
-    if _is_replaceable(path) and not os.access(path.resolve().parent, os.W_OK | os.X_OK):
-        raise InputError(f"{path}: cannot be written: no permission in the directory {path.resolve().parent}")
-
-
-@contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """A path to write to; what was written there takes the place of `path` at the end, or vanishes after an error.
-
-    Devices and pipes (`/dev/stdout`) have nothing to replace: they are written to directly.
-    """
-    if not _is_replaceable(path):
-        yield path
-        return
-    place = path.resolve()
-    draft = place.with_name(f".{place.stem}.{secrets.token_hex(4)}{place.suffix}")
-    try:
-        yield draft
-        if place.exists():
-            draft.chmod(place.stat().st_mode)
-        draft.replace(place)
-    finally:
-        draft.unlink(missing_ok=True)
-
-
-def _is_replaceable(path: Path) -> bool:
-    return path.is_file() or not path.exists()
+__all__ = ["check_target", "json_text", "replacing"]
 
 
 def json_text(data: Mapping[str, Any]) -> str:

@@ -14,7 +14,7 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array, read_only
 from symrefine.moments import Moments, tensor_index
 
-# The 3-D orders of the paper's experiments: nine triplets from moments to order 5.
+# The 3-D orders of the paper's experiments: 17 triplets from moments to order 5.
 PAPER_ORDERS: tuple[tuple[int, ...], ...] = ((3,), (5,), (2, 3), (2, 5), (4, 3), (4, 5))
 
 
@@ -23,8 +23,8 @@ class NTuples:
     """Vectors that turn with the object, v(R X) = R v(X), scaled to be comparable across orders and objects.
 
     Attributes:
-        vectors: [T, n] tuples, each divided by a bound that only the even radial moments enter, so |v| <= 1 (an odd
-            order that the moments do not exceed is divided by an estimate of that bound).
+        vectors: [T, n] tuples, each divided by a bound of it, so |v| <= 1: radial moments of the even orders around
+            each factor's, or where the moments end at an odd order, what they themselves say (`_Traces.bound`).
         replicates: [B, T, n] jackknife replicates; B = 0 where the moments are exact.
         labels: [T] orders and ranks each tuple was made from.
     """
@@ -93,21 +93,27 @@ class _Traces:
                 self._known[key] = np.trace(self(degree, rank + 2), axis1=-2, axis2=-1)
         return self._known[key]
 
-    def radial(self, degree: int) -> float:
-        """A bound of `int r^degree` from the even orders around it, or an estimate where the upper one is missing."""
+    def bound(self, degree: int) -> float:
+        """At least the Frobenius norm of T_degree traced to any rank, which is at most `int r^degree`.
+
+        By Cauchy and Schwarz that integral is below the geometric mean of the even orders around. Without the upper one
+        no bound of it is known; then the bound is the largest of those norms, or `(int r^low)^(degree/low)`, which is
+        never above the integral (Jensen), if that is larger: objects whose odd moments vanish need a scale too.
+        """
         low, high = degree - degree % 2, degree + degree % 2
-        if high > self.order:
-            return float(self(low, 0)[0]) ** (degree / low)
-        return float(np.sqrt(self(low, 0)[0] * self(high, 0)[0]))
+        if high <= self.order:
+            return float(np.sqrt(self(low, 0)[0] * self(high, 0)[0]))
+        norms = [float(np.linalg.norm(self(degree, rank)[0])) for rank in range(1, degree + 1, 2)]
+        return max(float(self(low, 0)[0]) ** (degree / max(low, 1)), *norms)
 
 
 def _contractions(traced: _Traces, orders: Sequence[Sequence[int]]) -> Iterator[tuple[str, Array]]:
     for term in orders:
         if len(term) == 1:
-            yield f"({term[0]})", traced(term[0], 1) / traced.radial(term[0])
+            yield f"({term[0]})", traced(term[0], 1) / traced.bound(term[0])
             continue
         even, odd = sorted(term, key=lambda p: p % 2)
-        bound = traced.radial(even) * traced.radial(odd)
+        bound = traced.bound(even) * traced.bound(odd)
         for low in range(even, -1, -2):
             for high in (low - 1, low + 1):
                 if 1 <= high <= odd:

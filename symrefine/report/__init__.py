@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from symrefine.detect import Detection
+from symrefine.files import whole
 from symrefine.picture.draw import picture_png
-from symrefine.picture.files import whole
 from symrefine.report.page import html_page
 from symrefine.shape import Shape
 

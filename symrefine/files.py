@@ -1,0 +1,64 @@
+"""Files that are whole or absent: written beside their place under another name, then moved there in one step."""
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from symrefine.errors import InputError
+
+
+def check_target(path: Path) -> None:
+    """Refuse a path that cannot be written, before any work is done for it.
+
+    Raises:
+        InputError: a directory, no such parent directory, or no permission.
+    """
+    if path.is_dir():
+        raise InputError(f"{path}: is a directory; expected a file to write")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: cannot be written: there is no directory {path.parent}")
+    if path.exists() and not os.access(path, os.W_OK):
+        raise InputError(f"{path}: cannot be written: the file is write-protected")
+    if _is_replaceable(path) and not os.access(path.resolve().parent, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: cannot be written: no permission in the directory {path.resolve().parent}")
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A path to write to; what was written there takes the place of `path` at the end, or vanishes after an error.
+
+    Devices and pipes (`/dev/stdout`) have nothing to replace: they are written to directly.
+    """
+    if not _is_replaceable(path):
+        yield path
+        return
+    place = path.resolve()
+    draft = place.with_name(f".{place.stem}.{secrets.token_hex(4)}{place.suffix}")
+    try:
+        yield draft
+        if place.exists():
+            draft.chmod(place.stat().st_mode)
+        draft.replace(place)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """`replacing` for a path that nobody has checked yet.
+
+    Raises:
+        InputError: the file cannot be written, before or while it is.
+    """
+    check_target(path)
+    try:
+        with replacing(path) as draft:
+            yield draft
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def _is_replaceable(path: Path) -> bool:
+    return path.is_file() or not path.exists()
