@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.config import read_config
 from experiments.measure import bundle_normals, score_planes
 from experiments.shapes import SHAPES, random_pose, sample
 from symrefine.detect import detect
+from symrefine.study.typed import read_config
 
 DEFAULT = Path(__file__).parents[1] / "configs" / "accuracy.yaml"
 FOLDS = {"C1": 0, "Cs": 1, "Cinfv": 0}

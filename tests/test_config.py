@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from experiments.accuracy import DEFAULT, Config
-from experiments.config import read_config
 from symrefine.errors import InputError
+from symrefine.study.typed import read_config
 
 
 def edited(tmp_path: Path, old: str, new: str) -> Path:
@@ -26,12 +26,12 @@ def test_shipped_config_is_read() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("seeds: 10", "sedes: 10", r":2: config.sedes: unknown key; expected one of \['seeds'"),
-        ("seeds: 10", "seeds: ten", r":2: config.seeds: expected int, got 'ten'"),
-        ("seeds: 10", "seeds: true", r":2: config.seeds: expected int, got True"),
-        ("  points: [20000, 5000]", "  points: [20000, 1.5]", r":4: config.table.points\[1\]: expected int, got 1.5"),
-        ("  points: [20000, 5000]", "  points: 20000", ":4: config.table.points: expected a list"),
-        ("  points: 20000\n", "", "config.shapes: missing points"),
+        ("seeds: 10", "sedes: 10", r":2: sedes: unknown key; expected one of \['seeds'"),
+        ("seeds: 10", "seeds: ten", r":2: seeds: expected int, got 'ten'"),
+        ("seeds: 10", "seeds: true", r":2: seeds: expected int, got True"),
+        ("  points: [20000, 5000]", "  points: [20000, 1.5]", r":4: table.points\[1\]: expected int, got 1.5"),
+        ("  points: [20000, 5000]", "  points: 20000", ":4: table.points: expected a list"),
+        ("  points: 20000\n", "", "shapes: missing points"),
         ("seeds: 10", "seeds: [10", "not YAML"),
     ],
 )

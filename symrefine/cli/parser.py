@@ -4,14 +4,14 @@ import argparse
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from symrefine.cli import align, batch, derive, detect, view
+from symrefine.cli import align, batch, derive, detect, run, view
 from symrefine.errors import InputError
 
-_COMMANDS = (detect, align, derive, batch, view)
+_COMMANDS = (detect, align, derive, batch, run, view)
 _DESCRIPTION = "Symmetry of 3-D shapes: mirror planes, rotation axes and the point group of a mesh or a point cloud."
 _EPILOG = (
-    "`symrefine COMMAND --help` explains a command. Exit status: 0 done, 1 some files of a batch failed, 2 bad input "
-    "or options, 130 interrupted."
+    "`symrefine COMMAND --help` explains a command. Exit status: 0 done, 1 some files of a batch or runs failed, 2 bad "
+    "input or options, 130 interrupted."
 )
 
 

@@ -1,0 +1,57 @@
+"""`symrefine run`: an experiment over the sweep of a YAML config; a run that was killed goes on where it ended."""
+
+import argparse
+from pathlib import Path
+
+from symrefine.cli.outputs import console, note, progress, say
+from symrefine.cli.values import count
+
+NAME = "run"
+HELP = "run the experiment of a YAML config and write its rows, tables and figures"
+DESCRIPTION = (
+    "Run an experiment for every case of the sweep in CONFIG.yaml. Every finished run is on disk at once; run again, "
+    "it is not done again. A run that fails gives a row with its error, the others go on, and the exit status is 1. "
+    "A directory holds the rows of one config and one version of the code; others are refused unless --replace."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("config", metavar="CONFIG.yaml", help="experiment, sweep, tables, figures")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="put another value in the config, such as sweep.seed=[0,1] or fixed.points=5000; may be repeated",
+    )
+    parser.add_argument("--quick", action="store_true", help="the quick version: what the config sets under `quick`")
+    parser.add_argument(
+        "--workers", type=count, default=1, metavar="N", help="runs done at the same time (default: %(default)s)"
+    )
+    parser.add_argument("--out", metavar="DIR", help="directory to write to (default: `out` of the config)")
+    parser.add_argument("--limit", type=count, metavar="N", help="only the first N runs of the sweep")
+    parser.add_argument(
+        "--replace", action="store_true", help="drop rows of another config or code version in the directory"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the study, print its tables, tell whether all went well."""
+    from symrefine.study.work import one_thread_each
+
+    one_thread_each()  # before anything heavy is imported
+    from symrefine.study.plan import make_plan
+    from symrefine.study.runner import run_study
+
+    plan = make_plan(Path(args.config), args.set, quick=args.quick)
+    folder = Path(args.out or plan.study.out)
+    outcome = run_study(plan, folder, workers=args.workers, limit=args.limit, replace=args.replace, progress=progress)
+    if outcome.tables:
+        say(outcome.tables + "\n")
+    for row in [row for row in outcome.rows if row["error"] is not None][:5]:
+        note(f"a run failed: {row['error']}")
+    parts = [f"{len(outcome.rows)} runs", f"{outcome.resumed} done before" if outcome.resumed else ""]
+    parts += [f"{outcome.failed} failed" if outcome.failed else "", f"written to {folder}"]
+    console().print(", ".join(part for part in parts if part))
+    return int(outcome.failed > 0)

@@ -1,0 +1,100 @@
+"""Claims of a paper beside our figures and those of others, and which of them ours miss."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from symrefine.study.experiment import Experiment, Row
+from symrefine.study.plan import matches, select
+from symrefine.study.schema import Claim, Study
+from symrefine.study.summary import EMPTY, Measure, Summary, read_expectation, read_measure, short, summarise
+from symrefine.study.tables import grid
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """A claim with its figures.
+
+    Attributes:
+        claim: as the config states it.
+        ours: our figure.
+        peers: those of others, by name.
+        met: whether ours is as expected; None where nothing is expected or nothing was run.
+    """
+
+    claim: Claim
+    ours: Summary
+    peers: dict[str, Summary]
+    met: bool | None
+
+
+def check_claims(study: Study, experiment: Experiment) -> list[Measure]:
+    """The measures of all claims.
+
+    Raises:
+        InputError: fields, aggregates or comparisons that do not exist.
+    """
+    for claim in study.claims:
+        for where in (claim.where, claim.ours, *claim.peers.values()):
+            select(where, experiment)
+        if claim.expect:
+            read_expectation(claim.node.at("expect"), claim.expect)
+    return [_measure(claim) for claim in study.claims]
+
+
+def _measure(claim: Claim) -> Measure:
+    return read_measure(claim.node.at("value"), claim.value)
+
+
+def judge(claim: Claim, rows: Sequence[Row], experiment: Experiment) -> Verdict:
+    """Our figure and those of others, and whether ours is as expected; a failed run of ours is a miss."""
+    common = select(claim.where, experiment)
+    chosen = [row for row in rows if matches(row, common)]
+
+    def of(who: dict[str, frozenset[object]]) -> list[Row]:
+        return [row for row in chosen if matches(row, who)]
+
+    measure = _measure(claim)
+    own = of(dict(select(claim.ours, experiment)))
+    ours = summarise(own, measure)
+    met = None
+    if claim.expect and own:
+        expected = read_expectation(claim.node.at("expect"), claim.expect)
+        met = expected.holds(ours) and all(row["error"] is None for row in own)
+    peers = {name: summarise(of(dict(select(node, experiment))), measure) for name, node in claim.peers.items()}
+    return Verdict(claim=claim, ours=ours, peers=peers, met=met)
+
+
+def verdict_rows(verdicts: Sequence[Verdict]) -> list[Row]:
+    """The verdicts as flat rows."""
+    return [
+        {
+            "claim": v.claim.claim,
+            "source": v.claim.source,
+            "paper": v.claim.paper,
+            "ours": v.ours.text,
+            "peers": "; ".join(f"{name}: {peer.text}" for name, peer in v.peers.items()),
+            "value": v.claim.value,
+            "expected": v.claim.expect,
+            "met": v.met,
+            "unit": v.claim.unit,
+            "note": v.claim.note,
+        }
+        for v in verdicts
+    ]
+
+
+def claims_table(verdicts: Sequence[Verdict], *, source: bool = True) -> str:
+    """A Markdown table: the claim, the paper's figure, ours, those of others, and whether ours holds."""
+    peers = list({name: None for v in verdicts for name in v.peers})
+    head = ["claim", *(["where"] if source else []), "paper", "ours", *peers, *(["as expected"] if source else [])]
+    return grid(head, [_line(v, peers, source=source) for v in verdicts])
+
+
+def _line(verdict: Verdict, peers: Sequence[str], *, source: bool) -> list[str]:
+    claim = verdict.claim
+    figures = [verdict.peers[name].text if name in verdict.peers else "" for name in peers]
+    word = {True: "yes", False: "**no**", None: ""}[verdict.met] + (f" ({claim.expect})" if claim.expect else "")
+    unit = f" {claim.unit}" if claim.unit else ""
+    shown = [text + unit if text not in ("", EMPTY) else text for text in (verdict.ours.text, *figures)]
+    paper = claim.paper if isinstance(claim.paper, str) else short(claim.paper) + unit
+    return [claim.claim, *([claim.source] if source else []), paper, *shown, *([word] if source else [])]

@@ -1,0 +1,166 @@
+"""YAML documents as trees whose every value knows its file, line and key path; `--set` puts other values in."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from symrefine.errors import InputError
+
+_DEEPEST = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Node:
+    """A value of a document: a scalar, a list of nodes, or a dict of nodes."""
+
+    value: Any
+    place: str  # "configs/table.yaml:7" or "--set sweep.seed=[0,1]"
+    path: str  # "sweep.seed"; empty at the root
+
+    def error(self, message: str) -> InputError:
+        """An error that says where this value stands."""
+        return InputError(f"{self.place}: {self.path or 'config'}: {message}")
+
+    def at(self, *keys: str | int) -> "Node":
+        """The node under a key path; the last one that is there."""
+        node = self
+        for key in keys:
+            inside = node.value if isinstance(node.value, dict) else dict(enumerate(_items(node)))
+            if key not in inside:
+                return node
+            node = inside[key]
+        return node
+
+    def plain(self) -> Any:
+        """The value without its places."""
+        if isinstance(self.value, dict):
+            return {key: node.plain() for key, node in self.value.items()}
+        return [node.plain() for node in self.value] if isinstance(self.value, list) else self.value
+
+
+def _items(node: Node) -> list[Node]:
+    return node.value if isinstance(node.value, list) else []
+
+
+def read_document(path: Path) -> Node:
+    """The tree of a YAML 1.2 file.
+
+    Raises:
+        InputError: no such file, not text, not YAML, keys that are no text or stand there twice.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such config file")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not YAML: no text in UTF-8") from None
+    return _parse(text, str(path), lines=True)
+
+
+def _parse(text: str, source: str, *, lines: bool) -> Node:
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+    try:
+        return _node(YAML(typ="rt", pure=True).load(text), source, 1 if lines else None, "", 0)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f":{mark.line + 1 if mark else 1}" if lines else ""
+        raise InputError(f"{source}{where}: not YAML: {error.problem}") from None
+    except YAMLError as error:
+        raise InputError(f"{source}: not YAML: {str(error).splitlines()[0]}") from None
+
+
+def _node(value: Any, source: str, line: int | None, path: str, depth: int) -> Node:
+    """A value as ruamel loads it, as a node; lines are counted unless `line` is None."""
+    place = source if line is None else f"{source}:{line}"
+    if depth > _DEEPEST:
+        raise InputError(f"{place}: {path.split('.')[0]}: nested too deep")
+    if isinstance(value, dict):
+        inside: Any = {}
+        for key, inner in value.items():
+            if not isinstance(key, str):
+                raise InputError(f"{place}: {path or 'config'}: keys are text, got {key!r}")
+            below = None if line is None else _line(value, "key", key, line)
+            inside[key] = _node(inner, source, below, f"{path}.{key}" if path else key, depth + 1)
+    elif isinstance(value, list):
+        inside = []
+        for i, inner in enumerate(value):
+            below = None if line is None else _line(value, "item", i, line)
+            inside.append(_node(inner, source, below, f"{path}[{i}]", depth + 1))
+    else:
+        inside = _scalar(value)
+    return Node(value=inside, place=place, path=path)
+
+
+def _line(holder: Any, kind: str, key: str | int, line: int) -> int:
+    """Line of an entry, counted from 1; that of its holder for entries merged in from elsewhere."""
+    try:
+        return int(getattr(holder.lc, kind)(key)[0]) + 1
+    except (KeyError, TypeError):
+        return line
+
+
+def _scalar(value: Any) -> Any:
+    """Of the plain type that it stands for: ruamel remembers how a number was written."""
+    for kind in (bool, int, float, str):
+        if isinstance(value, kind):
+            return kind(value)
+    return value
+
+
+def override(root: Node, settings: Sequence[str]) -> Node:
+    """The tree with every `KEY.KEY=VALUE` put in; a name below a list stands for each of its mappings.
+
+    Raises:
+        InputError: not of this form, or the key path leads through something that holds no keys.
+    """
+    for setting in settings:
+        name, equals, text = setting.partition("=")
+        keys = name.strip().split(".")
+        source = f"--set {setting}"
+        if not equals or not all(re.fullmatch(r"\w[\w -]*", key) for key in keys):
+            raise InputError(f"{source}: expected KEY=VALUE, such as sweep.seed=[0,1] or fixed.points=5000")
+        root = put(root, keys, _parse(text, source, lines=False), source)
+    return root
+
+
+def put(node: Node, keys: Sequence[str], new: Node, source: str) -> Node:
+    """The tree with a node put under a key path; `source` is named if there is no place for it.
+
+    Raises:
+        InputError: the key path leads through something that holds no keys.
+    """
+    if not keys:
+        return _moved(new, node.path)
+    if node.value is None:
+        node = Node(value={}, place=source, path=node.path)
+    if isinstance(node.value, list):
+        return _put_in_list(node, keys, new, source)
+    if not isinstance(node.value, dict):
+        raise InputError(f"{source}: {node.path} is {node.value!r}, it holds no key {keys[0]!r}")
+    path = f"{node.path}.{keys[0]}" if node.path else keys[0]
+    old = node.value.get(keys[0], Node(value=None, place=source, path=path))
+    return Node(value=node.value | {keys[0]: put(old, keys[1:], new, source)}, place=node.place, path=node.path)
+
+
+def _put_in_list(node: Node, keys: Sequence[str], new: Node, source: str) -> Node:
+    chosen = [int(keys[0])] if keys[0].isdigit() else range(len(node.value))
+    if keys[0].isdigit():
+        keys = keys[1:]
+        if chosen[0] >= len(node.value):
+            raise InputError(f"{source}: {node.path} has {len(node.value)} entries, numbered from 0")
+    items = [put(item, keys, new, source) if i in chosen else item for i, item in enumerate(node.value)]
+    return Node(value=items, place=node.place, path=node.path)
+
+
+def _moved(node: Node, path: str) -> Node:
+    """The tree with another key path at its root."""
+    value = node.value
+    if isinstance(value, dict):
+        value = {key: _moved(inner, f"{path}.{key}") for key, inner in value.items()}
+    elif isinstance(value, list):
+        value = [_moved(inner, f"{path}[{i}]") for i, inner in enumerate(value)]
+    return Node(value=value, place=node.place, path=path)

@@ -1,0 +1,170 @@
+"""From a config to the cases that are to be run, each checked before anything is."""
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import MISSING, asdict, dataclass, fields
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from symrefine.errors import InputError
+from symrefine.study.document import Node, override, put, read_document
+from symrefine.study.experiment import Experiment, Row, find_root, load_experiment
+from symrefine.study.schema import NOTHING, Study
+from symrefine.study.typed import mapping, scalar, typed
+
+_MANY = 100_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """A study ready to run.
+
+    Attributes:
+        study: the config, with what the command line put in.
+        experiment: the module.
+        cases: instances of its `Case`, in the order of the sweep.
+        config_hash: of the experiment's name and all cases: what decides the rows.
+        changed: whether the quick version or the command line changed the config.
+    """
+
+    study: Study
+    experiment: Experiment
+    cases: Sequence[Any]
+    config_hash: str
+    changed: bool
+
+
+def make_plan(path: Path, settings: Sequence[str] = (), *, quick: bool = False) -> Plan:
+    """Read a config, put in its quick version and what the command line sets, and list the cases.
+
+    Args:
+        path: of the YAML file.
+        settings: `KEY.KEY=VALUE`, applied after the quick version.
+        quick: whether the config's `quick` section is applied.
+
+    Raises:
+        InputError: whatever is wrong, with file, line and key path.
+    """
+    root = read_document(path)
+    if quick:
+        root = _quick(root)
+    root = override(root, settings)
+    study: Study = typed(root, Study)
+    name = root.at("experiment")
+    if not all(part.isidentifier() for part in study.experiment.split(".")):
+        raise name.error(f"expected the name of a Python module such as experiments.planes, got {study.experiment!r}")
+    try:
+        experiment = load_experiment(study.experiment, find_root(study.experiment, path.parent))
+    except InputError as error:
+        raise name.error(str(error)) from None
+    cases = list(_cases(study, experiment))
+    return Plan(
+        study=study,
+        experiment=experiment,
+        cases=cases,
+        config_hash=_digest([experiment.name, [asdict(case) for case in cases]]),
+        changed=bool(settings) or (quick and bool(study.quick)),
+    )
+
+
+def _quick(root: Node) -> Node:
+    section = root.value.get("quick", NOTHING) if isinstance(root.value, dict) else NOTHING
+    for key, node in mapping(section).items():
+        root = put(root, key.split("."), node, f"{node.place}: {node.path}")
+    return root
+
+
+def _digest(content: Any) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:12]
+
+
+def _cases(study: Study, experiment: Experiment) -> Iterator[Any]:
+    """Every case of the sweep, checked."""
+    seen = set()
+    for nodes in _choices(study):
+        case = _case(nodes, study.node, experiment)
+        key = tuple(asdict(case).items())
+        if key in seen:
+            raise study.sweep.error(f"the same case twice: {', '.join(f'{k}={v}' for k, v in key)}")
+        seen.add(key)
+        if len(seen) > _MANY:
+            raise study.sweep.error(f"more than {_MANY:,} runs")
+        yield case
+
+
+def _choices(study: Study) -> Iterator[Mapping[str, Node]]:
+    """A node for every field that a case sets: the fixed ones and the product of each block of the sweep."""
+    fixed = mapping(study.fixed)
+    for block in study.sweep.value if isinstance(study.sweep.value, list) else [study.sweep]:
+        swept = {key: spread(node) for key, node in mapping(block).items()}
+        if both := sorted(set(fixed) & set(swept)):
+            raise fixed[both[0]].error(f"is in `sweep` too ({swept[both[0]][0].place}); set it in one place")
+        for combination in product(*swept.values()):
+            yield {**fixed, **dict(zip(swept, combination, strict=True))}
+
+
+def spread(node: Node) -> list[Node]:
+    """The values that a node of a sweep or a selection stands for: a list, `{range: 5}`, `{range: [2, 5]}`, or one.
+
+    Raises:
+        InputError: none at all, or a range that is not one.
+    """
+    if isinstance(node.value, dict):
+        values = [Node(value=i, place=node.place, path=node.path) for i in _range(node)]
+    else:
+        values = node.value if isinstance(node.value, list) else [node]
+    if not values:
+        raise node.error("expected at least one value, got none")
+    return values
+
+
+def _range(node: Node) -> range:
+    for key, inner in node.value.items():
+        if key != "range":
+            raise inner.error("unknown key; expected a value, a list, {range: 5} or {range: [2, 5]}")
+    bounds = node.plain().get("range")
+    bounds = bounds if isinstance(bounds, list) else [0, bounds]
+    if len(bounds) != 2 or not all(type(b) is int for b in bounds) or bounds[1] - bounds[0] > _MANY:
+        raise node.error(f"expected a value, a list, {{range: 5}} or {{range: [2, 5]}}, got {node.plain()!r}")
+    return range(*bounds)
+
+
+def _case(nodes: Mapping[str, Node], root: Node, experiment: Experiment) -> Any:
+    """The case that the nodes describe; wrong names, types and impossible values are told where they stand."""
+    hints = experiment.hints
+    for name, node in nodes.items():
+        if name not in hints:
+            raise node.error(f"{experiment.name} has no field {name!r}; expected one of {sorted(hints)}")
+    needed = [f.name for f in fields(experiment.case) if f.default is MISSING and f.default_factory is MISSING]
+    if missing := [name for name in needed if name not in nodes]:
+        raise root.error(f"neither `fixed` nor `sweep` sets {', '.join(missing)}")
+    values = {name: scalar(node, hints[name]) for name, node in nodes.items()}
+    try:
+        case = experiment.case(**values)
+        if experiment.check is not None:
+            experiment.check(case)
+    except InputError as error:
+        name, _, rest = str(error).partition(": ")
+        raise (nodes[name].error(rest) if name in nodes else root.at("sweep").error(str(error))) from None
+    return case
+
+
+def select(where: Node, experiment: Experiment) -> Mapping[str, frozenset[Any]]:
+    """Which values of which fields a `where` picks.
+
+    Raises:
+        InputError: an unknown field, a value of the wrong type.
+    """
+    picked = {}
+    for name, node in mapping(where).items():
+        if name not in experiment.hints:
+            raise node.error(f"{experiment.name} has no field {name!r}; expected one of {sorted(experiment.hints)}")
+        picked[name] = frozenset(scalar(inner, experiment.hints[name]) for inner in spread(node))
+    return picked
+
+
+def matches(row: Row, picked: Mapping[str, frozenset[Any]]) -> bool:
+    """Whether a row, or the fields of a case, is among those picked."""
+    return all(row[name] in values for name, values in picked.items())

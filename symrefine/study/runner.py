@@ -1,0 +1,229 @@
+"""A study from its config to rows, tables, figures and recordings; a killed run goes on where it ended."""
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from symrefine.errors import InputError
+from symrefine.export.files import replacing
+from symrefine.study.claims import Verdict, check_claims, claims_table, judge, verdict_rows
+from symrefine.study.experiment import Row
+from symrefine.study.figures import check_figures, draw, wants_trace
+from symrefine.study.journal import Entry, Stamp, opened
+from symrefine.study.plan import Plan, matches, select
+from symrefine.study.schema import Figure
+from symrefine.study.summary import Measure, check_columns
+from symrefine.study.tables import check_tables, csv_text, markdown
+from symrefine.study.versions import code_version, library_versions
+from symrefine.study.work import finish
+
+JOURNAL = "journal.jsonl"
+# (text, steps in all, steps done before) to a context that gives a function to call after each step.
+Progress = Callable[[str, int, int], AbstractContextManager[Callable[[], None]]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What a study came to.
+
+    Attributes:
+        folder: where everything was written.
+        rows: of the finished runs, in the order of the sweep.
+        verdicts: of the claims.
+        tables: Markdown, as in tables.md.
+        figures: titles and files.
+        resumed: how many of the runs had been done before.
+        failed: how many of the runs have an error.
+    """
+
+    folder: Path
+    rows: Sequence[Row]
+    verdicts: Sequence[Verdict]
+    tables: str
+    figures: Mapping[str, Path]
+    resumed: int
+    failed: int
+
+
+def no_progress(_text: str, _total: int, _done: int) -> AbstractContextManager[Callable[[], None]]:
+    """Nobody looks on."""
+    return nullcontext(lambda: None)
+
+
+def run_study(
+    plan: Plan,
+    folder: Path,
+    *,
+    workers: int = 1,
+    limit: int | None = None,
+    replace: bool = False,
+    progress: Progress = no_progress,
+) -> Outcome:
+    """Run what is not done yet and write what the config asks for.
+
+    Args:
+        plan: from `make_plan`.
+        folder: to write to; made if it is not there.
+        workers: processes.
+        limit: the first so many runs of the sweep only.
+        replace: whether rows of another config or code version in the folder are dropped instead of refused.
+        progress: a sign of life.
+
+    Raises:
+        InputError: something in the config does not fit, or the folder holds other rows.
+    """
+    measures = _check(plan)
+    stamp = _stamp(plan)
+    _make(folder)
+    wanted = range(len(plan.cases) if limit is None else min(limit, len(plan.cases)))
+    with opened(folder / JOURNAL, stamp, replace=replace) as (entries, journal):
+        before = sum(index in entries for index in wanted)
+        jobs = [(index, plan.cases[index]) for index in wanted if index not in entries]
+        with progress("running", len(wanted), before) as advance:
+            for entry in finish(plan.experiment, jobs, workers):
+                journal.append(entry)
+                entries[entry.index] = entry
+                advance()
+        done = [entries[index] for index in sorted(entries)]
+        return _write(plan, folder, stamp, done, measures, before, progress)
+
+
+def _check(plan: Plan) -> list[Measure]:
+    """The measures of everything that is made of the rows, after a look at the names in the config."""
+    study, experiment = plan.study, plan.experiment
+    measures = [check(study, experiment) for check in (check_tables, check_figures, check_claims)]
+    if study.record and experiment.record is None:
+        raise study.record[0].error(f"{experiment.name} has no `record`")
+    selections = [*study.record, *(table.where for table in study.tables), *(figure.where for figure in study.figures)]
+    for where in selections:
+        picked = select(where, experiment)
+        if not plan.changed and not any(matches(asdict(case), picked) for case in plan.cases):
+            raise where.error("picks no run of the sweep")
+    slugs = [_slug(figure.title) for figure in study.figures]
+    for figure, slug in zip(study.figures, slugs, strict=True):
+        if not slug or slugs.count(slug) > 1:
+            raise figure.node.at("title").error("names the file: expected a title of its own")
+    return [measure for some in measures for measure in some]
+
+
+def _stamp(plan: Plan) -> Stamp:
+    module = (plan.experiment.root / Path(*plan.experiment.name.split("."))).with_suffix(".py")
+    return Stamp(config=plan.config_hash, code=code_version(module), libraries=library_versions())
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise InputError(f"{folder}: cannot be made a directory: a file is in the way") from None
+
+
+def _write(
+    plan: Plan,
+    folder: Path,
+    stamp: Stamp,
+    done: Sequence[Entry],
+    measures: Sequence[Measure],
+    before: int,
+    progress: Progress,
+) -> Outcome:
+    """Write rows first, then what is made of them."""
+    cases = [asdict(plan.cases[entry.index]) for entry in done]
+    about = {"config": stamp.config, "code": stamp.code, **stamp.libraries}
+    rows = [{**case, **about, "error": e.error, **e.results} for case, e in zip(cases, done, strict=True)]
+    _text(folder / "rows.csv", csv_text(rows))
+    _text(folder / "timings.csv", csv_text([{**case, **e.timings} for case, e in zip(cases, done, strict=True)]))
+    full = [{**row, **e.timings} for row, e in zip(rows, done, strict=True)]
+    check_columns(measures, full)
+    study, experiment = plan.study, plan.experiment
+    verdicts = [judge(claim, full, experiment) for claim in study.claims]
+    tables = [markdown(table, full, experiment) for table in study.tables]
+    if verdicts:
+        tables.append(f"## Claims\n\n{claims_table(verdicts)}")
+        _text(folder / "claims.csv", csv_text(verdict_rows(verdicts)))
+    if tables:
+        _text(folder / "tables.md", "\n".join([f"# {study.title or study.experiment}\n", *tables]))
+    chosen = [plan.cases[entry.index] for entry in done if entry.error is None]
+    figures = _figures(plan, folder, full, chosen, progress)
+    _record(plan, folder, chosen, progress)
+    return Outcome(
+        folder=folder,
+        rows=full,
+        verdicts=verdicts,
+        tables="\n".join(tables),
+        figures=figures,
+        resumed=before,
+        failed=sum(entry.error is not None for entry in done),
+    )
+
+
+def _figures(
+    plan: Plan, folder: Path, rows: Sequence[Row], chosen: Sequence[Any], progress: Progress
+) -> dict[str, Path]:
+    iterations = _trace(plan, chosen, progress)
+    if iterations:
+        _text(folder / "traces.csv", csv_text(iterations))
+    written = {}
+    for figure in plan.study.figures:
+        path = folder / f"{_slug(figure.title)}.png"
+        source = iterations if figure.kind == "convergence" else rows
+        _check_trace(figure, source)
+        with replacing(path) as draft:
+            draw(figure, source, plan.experiment, draft)
+        written[figure.title] = path
+    return written
+
+
+def _trace(plan: Plan, chosen: Sequence[Any], progress: Progress) -> list[Row]:
+    """A row for each iteration of each run that a figure shows."""
+    trace = plan.experiment.trace
+    picks = [p for figure in plan.study.figures if (p := wants_trace(figure, plan.experiment)) is not None]
+    cases = [case for case in chosen if any(matches(asdict(case), picked) for picked in picks)]
+    if trace is None or not cases:
+        return []
+    rows: list[Row] = []
+    with progress("following iterations", len(cases), 0) as advance:
+        for run, case in enumerate(cases):
+            rows += [{"run": run, **asdict(case), "error": None, **step} for step in trace(case)]
+            advance()
+    return rows
+
+
+def _check_trace(figure: Figure, rows: Sequence[Row]) -> None:
+    known = {name: None for row in rows for name in row}
+    for key in ("x", "y") if figure.kind == "convergence" and rows else ():
+        if getattr(figure, key) not in known:
+            raise figure.node.at(key).error(f"no iteration has {getattr(figure, key)!r}; there are {' '.join(known)}")
+
+
+def _record(plan: Plan, folder: Path, chosen: Sequence[Any], progress: Progress) -> None:
+    record = plan.experiment.record
+    picks = [select(where, plan.experiment) for where in plan.study.record]
+    cases = [case for case in chosen if any(matches(asdict(case), picked) for picked in picks)]
+    if record is None or not cases:
+        return
+    _make(folder / "recordings")
+    with progress("recording", len(cases), 0) as advance:
+        for case in cases:
+            with replacing(folder / "recordings" / f"{_name(case, plan.cases)}.rrd") as draft:
+                record(case, draft)
+            advance()
+
+
+def _name(case: Any, cases: Iterable[Any]) -> str:
+    """The fields in which the cases of the sweep differ, as a file name."""
+    rows = [asdict(c) for c in cases]
+    varying = [name for name in rows[0] if len({row[name] for row in rows}) > 1]
+    return _slug("-".join(str(asdict(case)[name]) for name in varying), keep=".") or "run"
+
+
+def _slug(text: str, keep: str = "") -> str:
+    return re.sub(rf"[^a-z0-9{re.escape(keep)}]+", "-", text.lower()).strip("-")
+
+
+def _text(path: Path, text: str) -> None:
+    with replacing(path) as draft:
+        draft.write_text(text, encoding="utf-8", newline="")

@@ -1,0 +1,76 @@
+"""Rows as CSV and as Markdown tables."""
+
+import csv
+import io
+from collections.abc import Sequence
+from itertools import groupby
+
+from symrefine.study.experiment import Experiment, Row
+from symrefine.study.plan import matches, select
+from symrefine.study.schema import Study, Table
+from symrefine.study.summary import Measure, read_measure, short, summarise
+from symrefine.study.typed import Scalar
+
+
+def csv_text(rows: Sequence[Row]) -> str:
+    """Rows as CSV: every column that any row has, in order of appearance; no value is an empty field."""
+    columns = list({name: None for row in rows for name in row})
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([_field(row.get(name)) for name in columns] for row in rows)
+    return stream.getvalue()
+
+
+def _field(value: object) -> str:
+    """Text that reads back as the same value."""
+    if value is None:
+        return ""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def check_tables(study: Study, experiment: Experiment) -> list[Measure]:
+    """The measures of all tables.
+
+    Raises:
+        InputError: fields or aggregates that do not exist.
+    """
+    for table in study.tables:
+        select(table.where, experiment)
+        for i, name in enumerate(table.groups):
+            if name not in experiment.hints:
+                raise table.node.at("groups", i).error(
+                    f"{experiment.name} has no field {name!r}; expected one of {sorted(experiment.hints)}"
+                )
+    return [measure for table in study.tables for measure in _measures(table).values()]
+
+
+def _measures(table: Table) -> dict[str, Measure]:
+    return {head: read_measure(table.node.at("values", head), text) for head, text in table.values.items()}
+
+
+def markdown(table: Table, rows: Sequence[Row], experiment: Experiment) -> str:
+    """A table under its title, with the number of runs that failed."""
+    picked = select(table.where, experiment)
+    chosen = [row for row in rows if matches(row, picked)]
+    measures = _measures(table)
+    lines = []
+    # Groups in the order in which the sweep came upon them.
+    order = {key: i for i, key in enumerate(dict.fromkeys(_key(row, table.groups) for row in chosen))}
+    chosen = sorted(chosen, key=lambda row: order[_key(row, table.groups)])
+    for key, group in groupby(chosen, key=lambda row: _key(row, table.groups)):
+        members = list(group)
+        lines.append([*map(short, key), *(summarise(members, m).text for m in measures.values()), str(len(members))])
+    failed = sum(row["error"] is not None for row in chosen)
+    note = f"\n{failed} of {len(chosen)} runs failed and are left out of the figures.\n" if failed else ""
+    return f"## {table.title}\n\n{grid([*table.groups, *measures, 'runs'], lines)}{note}"
+
+
+def _key(row: Row, groups: Sequence[str]) -> tuple[Scalar | None, ...]:
+    return tuple(row[name] for name in groups)
+
+
+def grid(head: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    """A Markdown table."""
+    rows = [head, ["---"] * len(head), *lines]
+    return "".join("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |\n" for row in rows)
