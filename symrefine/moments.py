@@ -223,37 +223,62 @@ def _jackknife(points: Array, weights: Array, order: int, parts: int) -> tuple[A
 
     Interleaving after a fixed shuffle keeps the parts alike even where the file orders its points.
     """
-    deal = np.random.default_rng(0).permutation(len(points)) % parts
-    sums = np.stack([raw_moments(points[deal == k], weights[deal == k], order) for k in range(parts)])
+    sums = _raw_moments_of_parts(points, weights, order, _deal(len(points), parts))
     total = sums.sum(axis=0)
     rest = total - sums
-    return total, np.stack([recentred(m / m[0], points.shape[1], order) for m in rest])
+    return total, recentred(rest / rest[:, :1], points.shape[1], order)
+
+
+@lru_cache(maxsize=4)
+def _deal(count: int, parts: int) -> NDArray[np.int64]:
+    """Indices [parts, M] of points dealt in turn after a fixed shuffle; -1 where a part has one point less."""
+    dealt = np.full(-(-count // parts) * parts, -1)
+    dealt[np.random.default_rng(0).permutation(count)] = np.arange(count)
+    dealt.flags.writeable = False
+    return dealt.reshape(-1, parts).T
+
+
+def _raw_moments_of_parts(points: Array, weights: Array, order: int, dealt: NDArray[np.int64]) -> Array:
+    """Raw moments [parts, K] of several parts of the points at once."""
+    a, b, _, lead = _split(points.shape[1], order)
+    parts, size = dealt.shape
+    total = np.zeros((parts, a.max() + 1, b.max() + 1))
+    step = max(1, BLOCK // parts)
+    for start in range(0, size, step):
+        index = dealt[:, start : start + step]
+        block = points[index.ravel()]
+        left = monomials(block[:, :lead], order).reshape(-1, *index.shape)
+        left *= np.where(index < 0, 0.0, weights[index])
+        right = monomials(block[:, lead:], order).reshape(-1, *index.shape)
+        total += left.transpose(1, 0, 2) @ right.transpose(1, 2, 0)
+    return total[:, a, b]
 
 
 @lru_cache(maxsize=16)
 def _binomials(dim: int, order: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], Array]:
-    """Terms of `prod (x_j - t_j)^p_j`: row of p, row of the kept factor, row of the power of t, signed coefficient."""
+    """Terms of `prod (x_j - t_j)^p_j` for all p: where those of each p start, and for each term the row of the factor
+    kept, the row of the power of t, and the signed coefficient.
+    """
     from math import comb, prod
 
     table = [tuple(e) for e in exponents(dim, order).tolist()]
     position = {e: i for i, e in enumerate(table)}
-    rows, kept, shifts, coefficients = [], [], [], []
-    for i, e in enumerate(table):
+    starts, kept, shifts, coefficients = [], [], [], []
+    for e in table:
+        starts.append(len(kept))
         for k in product(*(range(v + 1) for v in e)):
             rest = tuple(a - b for a, b in zip(e, k, strict=True))
-            rows.append(i)
             kept.append(position[k])
             shifts.append(position[rest])
             coefficients.append((-1.0) ** sum(rest) * prod(comb(a, b) for a, b in zip(e, k, strict=True)))
-    return np.array(rows), np.array(kept), np.array(shifts), np.array(coefficients)
+    return np.array(starts), np.array(kept), np.array(shifts), np.array(coefficients)
 
 
 def recentred(values: Array, dim: int, order: int) -> Array:
-    """Moments [K] of unit mass about their own mean instead of the origin."""
-    rows, kept, shifts, coefficients = _binomials(dim, order)
-    powers = monomials(values[None, 1 : dim + 1], order)[:, 0]
-    terms = coefficients * values[kept] * powers[shifts]
-    return np.bincount(rows, terms, minlength=len(values)).astype(np.float64)
+    """Moments [..., K] of unit mass, each set about its own mean instead of the origin."""
+    starts, kept, shifts, coefficients = _binomials(dim, order)
+    powers = monomials(values[..., 1 : dim + 1].reshape(-1, dim), order).T.reshape(values.shape)
+    return np.asarray(np.add.reduceat(coefficients * values[..., kept] * powers[..., shifts], starts, axis=-1))
 
 
 def transformed(moments: Moments, matrix: Array) -> Moments:

@@ -397,7 +397,7 @@ def test_harmonics_turn_as_the_points_do(seed: int) -> None:
     for l in (1, 2, 6):
         expected = np.stack([evaluate(l, points @ m.T) for m in matrices])
         scale = np.linalg.norm(points, axis=1).max() ** l
-        np.testing.assert_allclose(turner(evaluate(l, points)), expected, atol=1e-13 * scale)
+        np.testing.assert_allclose(turner(evaluate(l, points), (l,)), expected, atol=1e-13 * scale)
 
 
 def test_euler_angles_give_the_rotation_back_at_the_poles_too() -> None:

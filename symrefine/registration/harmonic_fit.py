@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from symrefine.geometry import Array, read_only
 from symrefine.harmonics import generators, harmonic_moments, turn
 from symrefine.moments import Moments
+from symrefine.shape import Index
 from symrefine.spectrum import whitened
 
 # Rotations of the grid: 11 degrees to the nearest one at worst, against hills 30 degrees wide at degree 6.
@@ -36,43 +37,92 @@ STEP = 0.3
 SETTLED, STANDSTILL = 1e-7, 1e-5
 
 
+# Degree l of each row of coefficients, in their order along a flat array: rows of 2l+1, m = -l..l in each.
+Rows = tuple[int, ...]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class HarmonicPair:
-    """Coefficients of both objects that D_l(R) should map onto each other.
+    """Coefficients of both objects that D(R) should map onto each other, all degrees side by side.
 
     Attributes:
-        source: {l: [1 + B, P, 2l+1]}, the whole first, then its jackknife replicates.
-        target: {l: [1 + C, P, 2l+1]}.
-        weights: {l: [P]} inverse variances of the difference of the two.
+        source: [1 + B, C], the whole first, then its jackknife replicates.
+        target: [1 + B', C].
+        weights: [C] inverse variances of the difference of the two, alike along a row.
+        rows: degree of each row.
     """
 
-    source: dict[int, Array]
-    target: dict[int, Array]
-    weights: dict[int, Array]
+    source: Array
+    target: Array
+    weights: Array
+    rows: Rows
 
     @property
     def size(self) -> int:
         """Number of coefficients compared."""
-        return sum(c[0].size for c in self.source.values())
+        return len(self.weights)
+
+    def of_degree(self, l: int) -> slice:
+        """Where the coefficients of a degree stand."""
+        start = sum(2 * k + 1 for k in self.rows if k < l)
+        return slice(start, start + (2 * l + 1) * self.rows.count(l))
 
 
 def harmonic_pair(source: Moments, target: Moments) -> HarmonicPair:
     """All harmonic moments of both objects, weighted by the jackknife variances of both sides."""
-    a, b = harmonic_moments(source), harmonic_moments(target)
-    return HarmonicPair(source=a, target=b, weights={l: 1.0 / (_variance(a[l]) + _variance(b[l]) + FLOOR) for l in a})
+    by_degree = harmonic_moments(source), harmonic_moments(target)
+    a, b = (np.concatenate([c.reshape(len(c), -1) for c in side.values()], axis=1) for side in by_degree)
+    rows = tuple(l for l, c in by_degree[0].items() for _ in range(c.shape[1]))
+    return HarmonicPair(source=a, target=b, weights=1.0 / (_variance(a, rows) + _variance(b, rows) + FLOOR), rows=rows)
 
 
-def _variance(c: Array) -> Array:
-    """Sampling variance [P] of a component of each row of coefficients; zero where the moments are exact."""
+def _variance(c: Array, rows: Rows) -> Array:
+    """Sampling variance [C] of a component of each row of coefficients; zero where the moments are exact."""
     parts = len(c) - 1
     if parts == 0:
         return np.zeros(c.shape[1])
-    return np.asarray((parts - 1) * c[1:].var(axis=0).mean(axis=1))
+    lengths = 2 * np.array(rows) + 1
+    sums = np.add.reduceat((parts - 1) * c[1:].var(axis=0), np.cumsum(lengths) - lengths)
+    return np.repeat(sums / lengths, lengths)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Layout:
+    """Flat coefficients: |m| and l of each, where its partner -m stands, and the sign with which a turn mixes it in.
+
+    `tip` [C, C] is D of the quarter turn about x, transposed, between which R_y(b) is R_z(b); `generators` [C, 3C] are
+    the three of them side by side. Both multiply rows from the right.
+    """
+
+    m: Index
+    l: Index
+    partner: Index
+    sign: Array
+    tip: Array
+    generators: Array
+
+
+@lru_cache(maxsize=32)
+def _layout(rows: Rows) -> _Layout:
+    from scipy.linalg import block_diag
+
+    m = np.concatenate([np.arange(-l, l + 1) for l in rows])
+    l = np.repeat(rows, [2 * l + 1 for l in rows])
+    return _Layout(
+        m=np.abs(m),
+        l=l,
+        partner=np.arange(len(m)) - 2 * m,
+        sign=-np.sign(m).astype(np.float64),
+        tip=read_only(block_diag(*(turn(l, 0, np.array(np.pi / 2)).T for l in rows))),
+        generators=read_only(
+            np.concatenate([block_diag(*(generators(l)[k].T for l in rows)) for k in range(3)], axis=1)
+        ),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Turner:
-    """D_l of K orthogonal matrices, applied to coefficients without ever being formed.
+    """D(R) of K orthogonal matrices, applied to coefficients without ever being formed.
 
     R = det(R) R_z(a) R_y(b) R_z(c): a turn about z mixes m with -m only, and a constant quarter turn takes y to z.
     """
@@ -84,40 +134,22 @@ class Turner:
     def of(cls, matrices: Array, degree: int) -> "Turner":
         """For orthogonal matrices [K, 3, 3] and all l <= `degree`."""
         signs = np.sign(np.linalg.det(matrices))
-        m = np.arange(1, degree + 1)
+        m = np.arange(degree + 1)
         angles = [np.multiply.outer(angle, m) for angle in euler_zyz(matrices * signs[:, None, None])]
-        return cls(signs=signs, phases=tuple((np.cos(a)[:, None], np.sin(a)[:, None]) for a in angles))
+        return cls(signs=signs, phases=tuple((np.cos(a), np.sin(a)) for a in angles))
 
-    def __call__(self, c: Array) -> Array:
-        """D_l(R) c, [K, P, 2l+1], for coefficients [P, 2l+1]."""
-        l = c.shape[-1] // 2
-        first, second, third = self.phases
-        out = _spin(_spin(_spin(c[None], third) @ _tip(l).T, second) @ _tip(l), first)
-        return np.asarray(out * (self.signs**l)[:, None, None])
-
-
-def _spin(c: Array, phase: tuple[Array, Array]) -> Array:
-    """D_l of turns about z by K angles, given as cos and sin of m times each [K, 1, degree], on c [K or 1, P, 2l+1]."""
-    l = c.shape[-1] // 2
-    cosine, sine = phase[0][..., :l], phase[1][..., :l]
-    up, down = c[..., l + 1 :], c[..., :l][..., ::-1]
-    out = np.empty((len(cosine), *c.shape[1:]))
-    out[..., l] = c[..., l]
-    out[..., l + 1 :] = cosine * up - sine * down
-    out[..., :l] = (sine * up + cosine * down)[..., ::-1]
-    return out
+    def __call__(self, c: Array, rows: Rows) -> Array:
+        """D(R) c, [K, P, C], for flat coefficients [P, C] whose rows have these degrees."""
+        layout, (first, second, third) = _layout(rows), self.phases
+        out = _spin(_spin(_spin(c, third, layout) @ layout.tip, second, layout) @ layout.tip.T, first, layout)
+        parity = np.where(layout.l % 2, self.signs[:, None], 1.0)
+        return np.asarray(out * parity[:, None])
 
 
-@lru_cache(maxsize=32)
-def _tip(l: int) -> Array:
-    """D_l of the quarter turn about x, between which R_y(b) is R_z(b)."""
-    return read_only(turn(l, 0, np.array(np.pi / 2)))
-
-
-@lru_cache(maxsize=32)
-def _stacked_generators(l: int) -> Array:
-    """The three generators side by side, [2l+1, 3 (2l+1)], to multiply rows of coefficients from the right."""
-    return read_only(np.concatenate([j.T for j in generators(l)], axis=1))
+def _spin(c: Array, phase: tuple[Array, Array], layout: _Layout) -> Array:
+    """D of turns about z by K angles, given as cos and sin of m times each [K, degree + 1], on c [P or K, P, C]."""
+    cosine, sine = (values[:, None, layout.m] for values in phase)
+    return np.asarray(cosine * c + (layout.sign * sine) * c[..., layout.partner])
 
 
 def euler_zyz(rotations: Array) -> tuple[Array, Array, Array]:
@@ -148,8 +180,8 @@ def grid_rotations() -> Array:
 @lru_cache(maxsize=GRID_DEGREE)
 def _grid_table(l: int) -> "np.ndarray[tuple[int, int], np.dtype[np.float32]]":
     """D_l over the grid, [GRID, (2l+1)^2], transposed and in single precision: it only ranks."""
-    rows = Turner.of(grid_rotations(), l)(np.eye(2 * l + 1))
-    return rows.reshape(GRID, -1).astype(np.float32)
+    turned = Turner.of(grid_rotations(), l)(np.eye(2 * l + 1), (l,))
+    return turned.reshape(GRID, -1).astype(np.float32)
 
 
 def landscape(source: Moments, target: Moments, pair: HarmonicPair) -> tuple[Array, Array]:
@@ -161,9 +193,10 @@ def landscape(source: Moments, target: Moments, pair: HarmonicPair) -> tuple[Arr
     white_a, white_b = harmonic_moments(whitened(source)), harmonic_moments(whitened(target))
     even, odd = np.zeros(GRID), np.zeros(GRID)
     for l in range(1, min(GRID_DEGREE, source.order) + 1):
-        a, b, noise = white_a[l][0], white_b[l][0], (2 * l + 1) / pair.weights[l]
+        here = pair.of_degree(l)
+        a, b, noise = white_a[l][0], white_b[l][0], (2 * l + 1) / pair.weights[here][:: 2 * l + 1]
         if l == 2:  # whitening has emptied the first row
-            a[0], b[0] = pair.source[2][0, 0], pair.target[2][0, 0]
+            a[0], b[0] = pair.source[0, here][:5], pair.target[0, here][:5]
         strength = np.sqrt((a**2).sum(axis=1) * (b**2).sum(axis=1))
         kernel = (a / (strength + noise + WEAK)[:, None]).T @ b
         (odd if l % 2 else even)[:] += _grid_table(l) @ kernel.ravel().astype(np.float32)
@@ -224,15 +257,10 @@ def fit(pair: HarmonicPair, starts: Array, *, steps: int = 10) -> HarmonicFit:
 
 def _linearised(pair: HarmonicPair, matrices: Array) -> tuple[Array, Array, Array]:
     """Costs [K], gradients [K, 3] and Gauss-Newton matrices [K, 3, 3]."""
-    count, turner = len(matrices), Turner.of(matrices, max(pair.source))
-    residuals, jacobians = [], []
-    for l, a in pair.source.items():
-        root = np.sqrt(pair.weights[l])[:, None]
-        here = turner(a[0]) * root
-        residuals.append((here - pair.target[l][0] * root).reshape(count, -1))
-        moved = (here @ _stacked_generators(l)).reshape(count, len(a[0]), 3, 2 * l + 1)
-        jacobians.append(moved.transpose(0, 2, 1, 3).reshape(count, 3, -1))
-    r, j = np.concatenate(residuals, axis=1), np.concatenate(jacobians, axis=2)
+    root = np.sqrt(pair.weights)
+    here = (Turner.of(matrices, max(pair.rows))(pair.source[:1], pair.rows) * root)[:, 0]
+    r = here - pair.target[0] * root
+    j = (here @ _layout(pair.rows).generators).reshape(len(matrices), 3, -1)
     return np.einsum("ki,ki->k", r, r), (j @ r[:, :, None])[:, :, 0], j @ j.transpose(0, 2, 1)
 
 
@@ -247,9 +275,8 @@ def _rotations(vectors: Array) -> Array:
 
 def mismatch(pair: HarmonicPair, matrices: Array) -> Array:
     """Largest difference [K] between any coefficient of the target and of the source, moved: rounding, or not."""
-    turner = Turner.of(matrices, max(pair.source))
-    worst = [np.abs(turner(a[0]) - pair.target[l][0]).max(axis=(1, 2)) for l, a in pair.source.items()]
-    return np.asarray(np.max(worst, axis=0))
+    turned = Turner.of(matrices, max(pair.rows))(pair.source[:1], pair.rows)[:, 0]
+    return np.asarray(np.abs(turned - pair.target[0]).max(axis=1))
 
 
 def rotation_covariance(pair: HarmonicPair, matrix: Array, hessian: Array) -> Array:
@@ -258,46 +285,40 @@ def rotation_covariance(pair: HarmonicPair, matrix: Array, hessian: Array) -> Ar
     The coefficients of one object share their points, so their errors are correlated and the inverse of the
     Gauss-Newton matrix is too small by up to a factor of fifty; re-fitting the replicates, by one step, is not.
     """
-    turner = Turner.of(matrix[None], max(pair.source))
+    turner = Turner.of(matrix[None], max(pair.rows))
     inverse = np.linalg.pinv(hessian, rcond=1e-12, hermitian=True)
-    moved = {}
-    for l, c in pair.source.items():
-        here = turner(c[0])[0] * pair.weights[l][:, None]
-        moved[l] = (here @ _stacked_generators(l)).reshape(len(here), 3, 2 * l + 1)
+    here = turner(pair.source[:1], pair.rows)[0, 0] * pair.weights
+    moved = (here @ _layout(pair.rows).generators).reshape(3, -1)
     return inverse @ _projected_covariance(pair, turner, moved) @ inverse
 
 
-def _projected_covariance(pair: HarmonicPair, turner: Turner, directions: dict[int, Array]) -> Array:
-    """Jackknife covariance [A, A] of the residual `D_l(R) a - b` along directions {l: [P, A, 2l+1]}."""
-    count = next(iter(directions.values())).shape[1]
-    total: Array = np.zeros((count, count))
+def _projected_covariance(pair: HarmonicPair, turner: Turner, directions: Array) -> Array:
+    """Jackknife covariance [A, A] of the residual `D(R) a - b` along directions [A, C]."""
+    total: Array = np.zeros((len(directions), len(directions)))
     for side in (pair.source, pair.target):
-        parts = len(side[1]) - 1
-        along: Array = np.zeros((parts, count))
-        for l, c in side.items():
-            spread = c[1:] - c[1:].mean(axis=0) if parts else c[1:]
-            if side is pair.source:
-                spread = turner(spread.reshape(-1, 2 * l + 1))[0].reshape(spread.shape)
-            along += np.einsum("pam,bpm->ba", directions[l], spread)
-        total += (parts - 1) / max(parts, 1) * along.T @ along
+        parts = len(side) - 1
+        if not parts:
+            continue
+        spread = side[1:] - side[1:].mean(axis=0)
+        if side is pair.source:
+            spread = turner(spread, pair.rows)[0]
+        along = spread @ directions.T
+        total += (parts - 1) / parts * along.T @ along
     return total
 
 
 def preference(pair: HarmonicPair, better: Array, other: Array) -> float:
     """By how many standard deviations of sampling noise the moments prefer one matrix [3, 3] to another.
 
-    With d = D_l(R) a - D_l(R') a the difference of the costs is linear in the residual r = D_l(R) a - b, namely
+    With d = D(R) a - D(R') a the difference of the costs is linear in the residual r = D(R) a - b, namely
     `|d|^2 - 2 d.r`; its noise is that of 2 d.r. Unlike the costs themselves, whose many coefficients err together, this
     tells chiral objects (3.6 and more on 10,000 points) from mirror-symmetric ones (below 2.5, nearly symmetric ones
     below 4.2).
     """
-    turner, turner_other = (Turner.of(m[None], max(pair.source)) for m in (better, other))
-    directions, difference, model = {}, 0.0, 0.0
-    for l, c in pair.source.items():
-        weights = pair.weights[l][:, None]
-        here, there = turner(c[0])[0], turner_other(c[0])[0]
-        directions[l] = (weights * (here - there))[:, None]
-        difference += float(np.sum(weights * ((there - pair.target[l][0]) ** 2 - (here - pair.target[l][0]) ** 2)))
-        model += FLOOR * float(np.sum(directions[l] ** 2))
-    variance = float(_projected_covariance(pair, turner, directions)[0, 0]) + model
+    both = Turner.of(np.stack([better, other]), max(pair.rows))(pair.source[:1], pair.rows)[:, 0]
+    here, there = both
+    direction = pair.weights * (here - there)
+    difference = float(pair.weights @ ((there - pair.target[0]) ** 2 - (here - pair.target[0]) ** 2))
+    turner = Turner.of(better[None], max(pair.rows))
+    variance = float(_projected_covariance(pair, turner, direction[None])[0, 0] + FLOOR * direction @ direction)
     return difference / (2.0 * float(np.sqrt(variance)) + 1e-300)
