@@ -93,7 +93,7 @@ def claims_table(verdicts: Sequence[Verdict], *, source: bool = True) -> str:
 def _line(verdict: Verdict, peers: Sequence[str], *, source: bool) -> list[str]:
     claim = verdict.claim
     figures = [verdict.peers[name].text if name in verdict.peers else "" for name in peers]
-    word = {True: "yes", False: "**no**", None: ""}[verdict.met] + (f" ({claim.expect})" if claim.expect else "")
+    word = "" if verdict.met is None else f"{'yes' if verdict.met else '**no**'} ({claim.expect})"
     unit = f" {claim.unit}" if claim.unit else ""
     shown = [text + unit if text not in ("", EMPTY) else text for text in (verdict.ours.text, *figures)]
     paper = claim.paper if isinstance(claim.paper, str) else short(claim.paper) + unit
