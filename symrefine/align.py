@@ -131,7 +131,7 @@ def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: boo
     evidence, motion, covariance = choice.evidence, choice.motion, choice.covariance
     if polish and not choice.exact and evidence.has_points:
         with clock("planes"):
-            _ = evidence.surfaces
+            _ = evidence.probes
         with clock("polish"):
             known = information(evidence, covariance)
             done = polished(evidence, motion, error=start_error(covariance), known=known)

@@ -7,19 +7,22 @@ import numpy as np
 
 from symrefine.axis import azimuthal_spectrum
 from symrefine.geometry import Array
-from symrefine.matching import LocalPlanes, isolated_points, local_planes
 from symrefine.moments import Moments, central_moments
 from symrefine.ntuples.contract import ntuples
 from symrefine.quadrature import sample_surface
 from symrefine.registration.harmonic_fit import HarmonicPair, harmonic_pair
-from symrefine.registration.polish import Surfaces
+from symrefine.registration.polish import Probes, probes
 from symrefine.registration.procrustes import Procrustes, procrustes
+from symrefine.registration.skin import Skin, isolated, patches, skin
+from symrefine.registration.surfaces import Surfaces
 from symrefine.shape import Shape
 
 # Local planes of the source and of the target, and points below which local planes say nothing.
 SOURCE_PLANES, TARGET_PLANES, FEWEST = 1000, 2000, 60
-# Points of a cloud that local planes are fitted to at most.
-DENSE = 40000
+# Points of the source that are moved by a polish: so many suffice without noise, and under noise.
+CLEAN, NOISY = 600, 1000
+# Points of a cloud that planes are fitted to at most, and points that a mesh is sampled at.
+DENSE, SAMPLES = 40000, 10000
 # Where neither side has more points than this they stand for themselves (atoms), not for a surface.
 FEW = 250
 # Neighbours whose distance tells the density at a point, and the bound of what is made of it, over the median.
@@ -53,15 +56,20 @@ class Side:
         moments = central_moments(points, weights, self.moments.order, parts=parts)
         return Side(shape=self.shape, moments=moments, weights=weights / weights.sum())
 
-    def planes(self, count: int, unit: float, rng: np.random.Generator) -> LocalPlanes:
-        """`count` local planes about the centre, in units of `unit`."""
+    def skin(self, unit: float, rng: np.random.Generator) -> Skin:
+        """The surface about the centre, in units of `unit`."""
+        points, normals = self._points(unit, rng)
+        return skin(points, normals, rng, exact=self.is_mesh)
+
+    def _points(self, unit: float, rng: np.random.Generator) -> tuple[Array, Array | None]:
+        """Points about the centre, and normals if they are known: of the cloud, or samples of the mesh."""
         points, normals = self.shape.points, self.shape.normals
         if self.is_mesh:
-            points, normals, _ = sample_surface(self.shape, 2 * count, rng)
+            points, normals, _ = sample_surface(self.shape, SAMPLES, rng)
         elif len(points) > DENSE:
             some = rng.choice(len(points), DENSE, replace=False)
             points, normals = points[some], None if normals is None else normals[some]
-        return local_planes((points - self.moments.center) / unit, count, rng, normals=normals, exact=self.is_mesh)
+        return (points - self.moments.center) / unit, normals
 
     def azimuths(self, frame: Array) -> Array:
         """Azimuthal coefficients [K, 4] about the frame's third axis, scaled by what random azimuths would give."""
@@ -96,17 +104,32 @@ class Evidence:
         return harmonic_pair(self.source.moments, self.target.moments)
 
     @cached_property
-    def surfaces(self) -> Surfaces:
-        """Local planes of both sides in units of the target."""
-        a, b = self.source.moments, self.target.moments
-        unit = a.scale if self.scale else b.scale
+    def skins(self) -> tuple[Skin, Skin]:
+        """Source and target as the points show them, each about its own centre, in units of the target."""
+        sides, unit = (self.source, self.target), self.target.moments.scale
+        units = (self.source.moments.scale if self.scale else unit, unit)
         if few(self.source.shape, self.target.shape):
-            source = isolated_points((self.source.shape.points - a.center) / unit)
-            target = isolated_points((self.target.shape.points - b.center) / b.scale)
-        else:
-            source = self.source.planes(SOURCE_PLANES, unit, np.random.default_rng(self.seed))
-            target = self.target.planes(TARGET_PLANES, b.scale, np.random.default_rng(self.seed))
-        return Surfaces(source=source, target=target, tolerance=self.tolerance)
+            atoms = [(s.shape.points - s.moments.center) / u for s, u in zip(sides, units, strict=True)]
+            return isolated(atoms[0]), isolated(atoms[1])
+        return self.source.skin(units[0], self._rng()), self.target.skin(units[1], self._rng())
+
+    @cached_property
+    def probes(self) -> Probes:
+        """Points of the source that a polish moves."""
+        return probes(self.skins[0], NOISY if self.skins[0].is_noisy else CLEAN, self._rng())
+
+    @cached_property
+    def surfaces(self) -> Surfaces:
+        """Local planes of both sides, for the judgement."""
+        source, target = self.skins
+        return Surfaces(
+            source=patches(source, SOURCE_PLANES, self._rng()),
+            target=patches(target, TARGET_PLANES, self._rng()),
+            tolerance=self.tolerance,
+        )
+
+    def _rng(self) -> np.random.Generator:
+        return np.random.default_rng(self.seed)
 
     @property
     def has_points(self) -> bool:

@@ -219,10 +219,9 @@ def _phases(evidence: Evidence, matrix: Array, rivals: HarmonicFit) -> Iterator[
 def polished(
     evidence: Evidence, start: Similarity, *, error: float, known: Array, queries: int = 10**9, outer: int = 12
 ) -> Polished:
-    """Polish on the surfaces of the evidence."""
-    return polish(
-        evidence.surfaces, start, error=error, known=known, scale=evidence.scale, queries=queries, outer=outer
-    )
+    """Polish on the points of the evidence."""
+    source = evidence.probes.some(queries)
+    return polish(source, evidence.skins[1], start, error=error, known=known, scale=evidence.scale, outer=outer)
 
 
 def information(evidence: Evidence, covariance: Array) -> Array:
