@@ -55,7 +55,8 @@ class Package:
 class Model:
     """A mesh in a package, and its symmetry as judged by eye: group, normals of its mirrors, direction of its axis.
 
-    `normals` are those in the frame of the file, to a degree or so; of a surface of revolution there are none.
+    `normals` are those in the frame of the file, to a degree or so; of a surface of revolution there are none. `up` is
+    where its upper side is in that frame, for pictures.
     """
 
     package: Package
@@ -63,6 +64,7 @@ class Model:
     group: str
     normals: tuple[Normal, ...] = ()
     axis: Normal | None = None
+    up: Normal = (0.0, 0.0, 1.0)
 
     @property
     def stored(self) -> PurePosixPath:
@@ -89,20 +91,20 @@ PYVISTA = Package(
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 _SIN = 3**0.5 / 2
 MODELS: dict[str, Model] = {
-    "mug": Model(package=VEDO, member="mug.ply", group="Cs", normals=(Z,)),
-    "porsche": Model(package=VEDO, member="porsche.ply", group="Cs", normals=(Z,)),
+    "mug": Model(package=VEDO, member="mug.ply", group="Cs", normals=(Z,), up=Y),
+    "porsche": Model(package=VEDO, member="porsche.ply", group="Cs", normals=(Z,), up=Y),
     "cessna": Model(package=VEDO, member="cessna.vtk", group="Cs", normals=(Y,)),
     "shuttle": Model(package=VEDO, member="shuttle.obj", group="Cs", normals=(Y,)),
     "spider": Model(package=VEDO, member="spider.ply", group="Cs", normals=((0.343, -0.939, 0.0),)),
     "teapot": Model(package=VEDO, member="teapot.vtk", group="Cs", normals=(Y,)),
     "airplane": Model(package=PYVISTA, member="airplane.ply", group="Cs", normals=(X,)),
     # Its legs are posed: the mirror holds to 0.5 % of the diagonal in the mean.
-    "ant": Model(package=PYVISTA, member="ant.ply", group="Cs", normals=(X,)),
+    "ant": Model(package=PYVISTA, member="ant.ply", group="Cs", normals=(X,), up=Y),
     "apple": Model(package=VEDO, member="apple.ply", group="Cinfv", axis=Z),
     "streetlamp": Model(
         package=VEDO, member="lamp.vtk", group="C3v", normals=(Y, (_SIN, 0.5, 0.0), (_SIN, -0.5, 0.0)), axis=Z
     ),
-    "shark": Model(package=VEDO, member="shark.ply", group="C1"),
+    "shark": Model(package=VEDO, member="shark.ply", group="C1", up=Y),
     "teddy": Model(package=VEDO, member="teddy.vtk", group="C1"),
     "magnolia": Model(package=VEDO, member="magnolia.vtk", group="C1"),
     "panther": Model(package=VEDO, member="panther.stl", group="C1"),
