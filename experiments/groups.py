@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from time import perf_counter
-from typing import Literal
 
 import numpy as np
 
@@ -35,13 +34,23 @@ QUICK = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """One detection."""
+    """One detection.
+
+    Attributes:
+        shape: its name in `group_shapes`.
+        sibling: whether its detail is out of place.
+        noise_rel: standard deviation of the noise, a fraction of the bounding-box diagonal.
+        points: how many, for a sample.
+        form: "mesh" or "sample".
+        tolerance: as a fraction of the diagonal.
+        seed: of pose, sample and noise.
+    """
 
     shape: str
     sibling: bool = False
     noise_rel: float = 0.0
     points: int = 20000
-    form: Literal["mesh", "sample"] = "sample"
+    form: str = "sample"
     tolerance: float = TOLERANCE
     seed: int = 0
 

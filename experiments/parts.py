@@ -170,7 +170,11 @@ def exact_group(parts: Sequence[Part]) -> str:
 
 def placed_group(parts: Sequence[Part]) -> tuple[PointGroup, Array]:
     """The same in place, and the centre [3] that its operations leave where it is."""
-    marks = np.concatenate([p.marks for p in parts])
+    return marked_group(np.concatenate([p.marks for p in parts]))
+
+
+def marked_group(marks: Array) -> tuple[PointGroup, Array]:
+    """The group of labelled points [K, 4] in place, and its centre [3]."""
     marks = marks[np.unique(marks.round(6) + 0.0, axis=0, return_index=True)[1]]
     center = marks[:, :3].mean(axis=0)
     marks[:, :3] -= center

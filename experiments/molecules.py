@@ -1,0 +1,145 @@
+"""Point groups of molecules, and pymatgen beside us: `python -m experiments.molecules [--seeds N] [--tolerances ...]`.
+
+The molecules of `molecule_sets` in random poses, with their elements as labels; as they are, and with Gaussian noise of
+1 % of the mean bond length on every coordinate.
+"""
+
+import argparse
+from collections import Counter
+from dataclasses import dataclass
+from importlib.util import find_spec
+from time import perf_counter
+
+import numpy as np
+
+from experiments.molecule_sets import MOLECULES, Molecule, molecule
+from experiments.peers import point_group_pymatgen
+from symrefine.detect import detect
+from symrefine.errors import InputError
+from symrefine.geometry import Array, random_orthogonal
+from symrefine.verify import TOLERANCE
+
+NOISE_BOND = 0.01
+TOLERANCES = (TOLERANCE, 0.04, 0.06)
+# In angstroms: its default, and two smaller ones.
+PYMATGEN_TOLERANCES = (0.3, 0.1, 0.03)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """One molecule once.
+
+    Attributes:
+        molecule: its name in `molecule_sets`.
+        noise_bond: standard deviation of every coordinate as a fraction of the mean bond length.
+        method: who is asked, "symrefine" or "pymatgen".
+        tolerance: symrefine's as a fraction of the diagonal; pymatgen's in angstroms.
+        seed: of the pose and the noise.
+    """
+
+    molecule: str
+    noise_bond: float = 0.0
+    method: str = "symrefine"
+    tolerance: float = TOLERANCE
+    seed: int = 0
+
+
+def check(case: Case) -> None:
+    """Whether such a case can be run.
+
+    Raises:  InputError: it cannot.
+    """
+    if case.molecule not in MOLECULES:
+        raise InputError(f"molecule: value is {case.molecule!r}, expected one of {', '.join(MOLECULES)}")
+    if not 0 <= case.noise_bond <= 0.5:
+        raise InputError(f"noise_bond: value is {case.noise_bond}, expected a fraction of the bond length in [0, 0.5]")
+    if case.method not in ("symrefine", "pymatgen"):
+        raise InputError(f"method: value is {case.method!r}, expected 'symrefine' or 'pymatgen'")
+    if case.method == "pymatgen" and not has_pymatgen():
+        raise InputError("method: value is 'pymatgen', which is not installed; expected 'symrefine', or install it")
+    most = 0.2 if case.method == "symrefine" else 2.0
+    if not 0 < case.tolerance <= most:
+        raise InputError(f"tolerance: value is {case.tolerance}, expected a number in (0, {most:g}]")
+
+
+def run(case: Case) -> dict[str, int | float | str | bool | None]:
+    """The group of one molecule in a random pose, compared with the truth."""
+    check(case)
+    given = molecule(case.molecule)
+    points = posed(given, case)
+    start = perf_counter()
+    group, doubt = _asked(given, points, case)
+    return {
+        "truth": MOLECULES[case.molecule][0],
+        "group": group,
+        "right": group == MOLECULES[case.molecule][0],
+        "atoms": len(given.symbols),
+        "undetermined": doubt,
+        "detect_s": perf_counter() - start,
+    }
+
+
+def posed(given: Molecule, case: Case) -> Array:
+    """The atoms [N, 3] in a random pose, moved by the noise."""
+    rng = np.random.default_rng([case.seed, list(MOLECULES).index(case.molecule)])
+    turn, shift = random_orthogonal(rng), rng.uniform(-5, 5, 3)
+    noise = rng.normal(scale=case.noise_bond * given.mean_bond, size=given.positions.shape)
+    return (given.positions + noise) @ turn.T + shift
+
+
+def _asked(given: Molecule, points: Array, case: Case) -> tuple[str, bool]:
+    """The answer, and whether it was called undetermined."""
+    if case.method == "pymatgen":
+        try:
+            return point_group_pymatgen(given.symbols, points, case.tolerance), False
+        except (ValueError, ArithmeticError, IndexError, np.linalg.LinAlgError) as error:
+            return f"error: {error}", False
+    found = detect(points, labels=given.numbers, tolerance=case.tolerance)
+    return found.point_group, bool(found.undetermined)
+
+
+def has_pymatgen() -> bool:
+    """Whether pymatgen is installed here."""
+    return find_spec("pymatgen") is not None
+
+
+def main() -> None:
+    """Print how many groups are right, by method, tolerance and noise, and every miss."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=10, help="poses and noises of each molecule")
+    parser.add_argument("--tolerances", type=float, nargs="*", default=TOLERANCES, help="fractions of the diagonal")
+    options = parser.parse_args()
+    groups = len({group for group, _ in MOLECULES.values()})
+    print(f"{len(MOLECULES)} molecules of {groups} groups; {options.seeds} seeds where there is noise")
+    asked: list[tuple[str, float]] = [("symrefine", t) for t in options.tolerances]
+    if has_pymatgen():
+        asked += [("pymatgen", t) for t in PYMATGEN_TOLERANCES]
+    else:
+        print("pymatgen is not installed: pip install pymatgen, to see it beside us")
+    for method, tolerance in asked:
+        for noise, seeds in ((0.0, 1), (NOISE_BOND, options.seeds)):
+            report(method, tolerance, noise, seeds)
+
+
+def report(method: str, tolerance: float, noise: float, seeds: int) -> None:
+    """Print one line, and the molecules that came out wrong."""
+    rows = []
+    for name in MOLECULES:
+        for seed in range(seeds):
+            case = Case(molecule=name, noise_bond=noise, method=method, tolerance=tolerance, seed=seed)
+            rows.append((name, run(case)))
+    right = sum(bool(row["right"]) for _, row in rows)
+    scale = "of the diagonal" if method == "symrefine" else "angstrom"
+    seconds = np.median([float(row["detect_s"] or 0) for _, row in rows])
+    print(
+        f"\n{method}, tolerance {tolerance:g} {scale}, noise {noise:.0%} of the bond: right {right} of {len(rows)} "
+        f"({right / len(rows):.1%}), median {1000 * seconds:.0f} ms",
+        flush=True,
+    )
+    wrong = Counter((name, str(row["truth"]), str(row["group"])) for name, row in rows if not row["right"])
+    for (name, truth, group), count in sorted(wrong.items()):
+        print(f"  {name}: {truth} -> {group}, {count} of {seeds}")
+
+
+if __name__ == "__main__":
+    main()
