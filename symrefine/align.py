@@ -21,7 +21,7 @@ from symrefine.registration.moment_fit import moment_fit
 from symrefine.registration.pair import Evidence, Side, few
 from symrefine.registration.polish import Similarity
 from symrefine.registration.procrustes import procrustes
-from symrefine.registration.rivals import MISFIT, ROUNDING, choose, information, polished, start_error
+from symrefine.registration.rivals import MISFIT, ROUNDING, choose, polished
 from symrefine.shape import Shape
 from symrefine.verify import TOLERANCE
 
@@ -133,8 +133,7 @@ def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: boo
         with clock("planes"):
             _ = evidence.probes
         with clock("polish"):
-            known = information(evidence, covariance)
-            done = polished(evidence, motion, error=start_error(covariance), known=known)
+            done = polished(evidence, motion, covariance)
             motion, covariance = done.motion, done.covariance[:3, :3]
     matrix, translation, factor = _in_input_units(evidence, motion, scale)
 

@@ -11,16 +11,16 @@ from symrefine.moments import Moments, central_moments
 from symrefine.ntuples.contract import ntuples
 from symrefine.quadrature import sample_surface
 from symrefine.registration.harmonic_fit import HarmonicPair, harmonic_pair
-from symrefine.registration.polish import Probes, probes
+from symrefine.registration.polish import Probes, probes, probes_of
 from symrefine.registration.procrustes import Procrustes, procrustes
-from symrefine.registration.skin import Skin, isolated, patches, skin
+from symrefine.registration.skin import Skin, isolated, patches, skin, skin_of
 from symrefine.registration.surfaces import Surfaces
 from symrefine.shape import Shape
 
 # Local planes of the source and of the target, and points below which local planes say nothing.
 SOURCE_PLANES, TARGET_PLANES, FEWEST = 1000, 2000, 60
-# Points of the source that are moved by a polish: so many suffice without noise, and under noise.
-CLEAN, NOISY = 600, 1000
+# Points of the source that are moved by a polish: without noise, under noise, and for a look.
+CLEAN, NOISY, LOOK = 600, 1000, 400
 # Points of a cloud that planes are fitted to at most, and points that a mesh is sampled at.
 DENSE, SAMPLES = 40000, 10000
 # Where neither side has more points than this they stand for themselves (atoms), not for a surface.
@@ -127,6 +127,11 @@ class Evidence:
             target=patches(target, TARGET_PLANES, self._rng()),
             tolerance=self.tolerance,
         )
+
+    @cached_property
+    def coarse(self) -> tuple[Probes, Skin]:
+        """What a quick polish moves and meets: the local planes of the judgement."""
+        return probes_of(self.surfaces.source, LOOK), skin_of(self.surfaces.target)
 
     def _rng(self) -> np.random.Generator:
         return np.random.default_rng(self.seed)

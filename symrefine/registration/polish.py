@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, cross_matrix, read_only, rotation
-from symrefine.matching import ROBUST, WORTH
+from symrefine.matching import ROBUST, WORTH, LocalPlanes
 from symrefine.registration.skin import Skin, denoised
 from symrefine.residual import SIZE, design_rows, gram
 
@@ -86,12 +86,6 @@ class Probes:
     worth: Array
     redundancy: float
 
-    def some(self, count: int) -> "Probes":
-        """About `count` of them, or all."""
-        stride = max(1, len(self.points) // count)
-        points, normals, worth = (a[::stride] for a in (self.points, self.normals, self.worth))
-        return Probes(points=points, normals=normals, worth=worth, redundancy=max(1.0, self.redundancy / stride))
-
 
 def probes(skin: Skin, count: int, rng: np.random.Generator) -> Probes:
     """`count` points of a skin, each moved onto the plane of its neighbours; all, as they are, if they are isolated."""
@@ -101,6 +95,14 @@ def probes(skin: Skin, count: int, rng: np.random.Generator) -> Probes:
     points, planes = denoised(skin, count, rng)
     worth, redundancy = _worth(planes.flatness), skin.redundancy(len(points))
     return Probes(points=points, normals=planes.normals, worth=worth, redundancy=redundancy)
+
+
+def probes_of(planes: LocalPlanes, count: int) -> Probes:
+    """About `count` of the local planes of a source, or all."""
+    some = slice(None, None, max(1, len(planes.points) // count))
+    worth = _worth(planes.flatness[some])
+    redundancy = max(1.0, planes.redundancy * len(worth) / len(planes.points))
+    return Probes(points=planes.points[some], normals=planes.normals[some], worth=worth, redundancy=redundancy)
 
 
 def _worth(flatness: Array) -> Array:
@@ -170,7 +172,8 @@ class _Met:
         if len(errors) == 0:
             return errors
         error2 = (errors**2).reshape(-1, self.each).sum(axis=1)
-        scale2 = max(ROBUST * float(np.sqrt(np.median(error2))), floor, reach) ** 2
+        middle = len(error2) // 2
+        scale2 = max(ROBUST * float(np.sqrt(np.partition(error2, middle)[middle])), floor, reach) ** 2
         return np.repeat(self.worth * (scale2 / (scale2 + error2)) ** 2, self.each)
 
 

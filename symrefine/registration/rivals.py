@@ -22,7 +22,8 @@ from symrefine.registration.harmonic_fit import (
     rotation_covariance,
 )
 from symrefine.registration.pair import Evidence, few
-from symrefine.registration.polish import Polished, Similarity, polish
+from symrefine.registration.polish import MAX_OUTER, Polished, Probes, Similarity, polish
+from symrefine.registration.skin import Skin
 
 # Hills of the landscape that are climbed, for each determinant: a few steps for all, the rest for those in sight.
 HILLS = 8
@@ -45,9 +46,9 @@ GOOD = 0.35
 # The proper map is as good if its miss is below this many times that of the improper one: 1.2 at most for exact mirror
 # symmetry; 2.5 and more for a propeller, a camera, a posed ant.
 AS_GOOD = 2.0
-# Rivals judged for each determinant, planes and iterations spent on each; fewer where the other determinant has a good
+# Rivals judged for each determinant, and matchings spent on each; fewer where the other determinant has a good
 # one already, and no search for phases where they are hopeless.
-JUDGED, LOOK, LOOK_OUTER = 4, 400, 4
+JUDGED, LOOK_OUTER = 4, 4
 LAST_CHANCE, HOPELESS = 2, 2.0
 # Bounds of what the start of a polish may be off, radians; the moments' own estimate lies between.
 START_ERROR = (0.01, 0.3)
@@ -151,7 +152,7 @@ def _covariance(evidence: Evidence, fitted: HarmonicFit, misfit: float) -> Array
     return misfit * (rotation_covariance(evidence.harmonics, fitted.matrices[0], fitted.hessians[0]) + inverse)
 
 
-def start_error(covariance: Array) -> float:
+def _start_error(covariance: Array) -> float:
     """Three standard deviations of the rotation, within bounds: how far a start may be off."""
     return float(np.clip(3.0 * np.sqrt(np.trace(covariance)), *START_ERROR))
 
@@ -188,10 +189,9 @@ def _by_cost(matrices: Array) -> list[int]:
 def _first_good(evidence: Evidence, matrices: Iterator[Array], covariance: Array) -> list[_Judged]:
     """Polish and judge one after the other until one is good."""
     found: list[_Judged] = []
-    error, known = start_error(covariance), information(evidence, covariance)
     for m in matrices:
         start = Similarity(matrix=m, shift=np.zeros(3))
-        motion = polished(evidence, start, error=error, known=known, queries=LOOK, outer=LOOK_OUTER).motion
+        motion = _polish(evidence, evidence.coarse, start, covariance, LOOK_OUTER).motion
         found.append(_Judged(motion=motion, excess=evidence.surfaces.excess(motion)))
         if found[-1].excess <= GOOD:
             break
@@ -216,15 +216,19 @@ def _phases(evidence: Evidence, matrix: Array, rivals: HarmonicFit) -> Iterator[
         score[window] = -np.inf
 
 
-def polished(
-    evidence: Evidence, start: Similarity, *, error: float, known: Array, queries: int = 10**9, outer: int = 12
+def polished(evidence: Evidence, start: Similarity, covariance: Array) -> Polished:
+    """Polish on the points of the evidence from a start whose rotation the moments know with this covariance [3, 3]."""
+    return _polish(evidence, (evidence.probes, evidence.skins[1]), start, covariance, MAX_OUTER)
+
+
+def _polish(
+    evidence: Evidence, points: tuple[Probes, Skin], start: Similarity, covariance: Array, outer: int
 ) -> Polished:
-    """Polish on the points of the evidence."""
-    source = evidence.probes.some(queries)
-    return polish(source, evidence.skins[1], start, error=error, known=known, scale=evidence.scale, outer=outer)
+    error, known = _start_error(covariance), _information(evidence, covariance)
+    return polish(*points, start, error=error, known=known, scale=evidence.scale, outer=outer)
 
 
-def information(evidence: Evidence, covariance: Array) -> Array:
+def _information(evidence: Evidence, covariance: Array) -> Array:
     """Inverse covariance [6, 6] of rotation and shift (RMS radii) that the moments carry."""
     known: Array = np.zeros((6, 6))
     known[:3, :3] = np.linalg.inv(covariance + TRUST**2 * np.eye(3))

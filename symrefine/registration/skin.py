@@ -1,6 +1,6 @@
 """A surface known by its points: for any query near it, the plane that the points around the query lie on."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,8 @@ from symrefine.matching import NEIGHBOURS, LocalPlanes, choose_neighbours, isola
 
 # Points that settle how large a neighbourhood is.
 PROBES = 40
+# Median flatness at which the smallest neighbourhood will do without a look at larger ones; a blob of 12 has 0.7.
+AT_ONCE = 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -130,15 +132,33 @@ def skin(points: Array, normals: Array | None, rng: np.random.Generator, *, exac
     from scipy.spatial import cKDTree
 
     tree = cKDTree(points, balanced_tree=False, compact_nodes=False)
-    neighbours = 1 if exact else choose_neighbours(points, tree, rng, probes=PROBES)
-    width = _width(points, tree, neighbours, rng)
-    return Skin(points=points, normals=normals, neighbours=neighbours, width=width, tree=tree)
+    least = 1 if exact else min(NEIGHBOURS[0], len(points))
+    smallest = Skin(points=points, normals=normals, neighbours=least, width=_width(points, tree, least), tree=tree)
+    if exact or float(np.median(smallest.near(_some(points)).flatness)) < AT_ONCE:
+        return smallest
+    size = choose_neighbours(points, tree, rng, probes=PROBES)
+    return replace(smallest, neighbours=size, width=_width(points, tree, size))
 
 
-def _width(points: Array, tree: Any, neighbours: int, rng: np.random.Generator) -> float:
+def _some(points: Array) -> Array:
+    return points[:: max(1, len(points) // PROBES)]
+
+
+def _width(points: Array, tree: Any, neighbours: int) -> float:
     """Median distance to the farthest of the neighbours, or to the nearest other point if there is but one."""
-    pick = rng.choice(len(points), min(PROBES, len(points)), replace=False)
-    return float(np.median(tree.query(points[pick], k=[max(neighbours, 2)])[0]))
+    return float(np.median(tree.query(_some(points), k=[max(neighbours, 2)])[0]))
+
+
+def skin_of(planes: LocalPlanes) -> Skin:
+    """The surface that local planes make, coarse and quick: each stands for its surroundings as it is."""
+    return Skin(
+        points=planes.points,
+        normals=None if planes.isolated else planes.normals,
+        neighbours=1,
+        width=planes.spacing,
+        tree=planes.tree,
+        isolated=planes.isolated,
+    )
 
 
 def isolated(points: Array) -> Skin:
@@ -146,5 +166,5 @@ def isolated(points: Array) -> Skin:
     from scipy.spatial import cKDTree
 
     tree = cKDTree(points)
-    width = _width(points, tree, 1, np.random.default_rng(0))
+    width = _width(points, tree, 1)
     return Skin(points=points, normals=None, neighbours=1, width=width, tree=tree, isolated=True)
