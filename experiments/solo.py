@@ -102,8 +102,9 @@ def run(case: Case) -> dict[str, Result]:
         "right": here.right and there.right,
         "tuples": image.tuples.kind,
         "sigma1": float(sigma[0]),
-        "sigma12": ratio(sigma, 1),
-        "sigma13": ratio(sigma, 2),
+        "sigma12": ratio(sigma, 0, 1),
+        "sigma13": ratio(sigma, 0, 2),
+        "sigma23": ratio(sigma, 1, 2),
         "sigma_change": float(np.abs(sigma - sigma_image).max() / sigma[0]),
         "worst_deg": there.worst_deg,
         "offset_rel": there.offset_rel,
@@ -115,9 +116,9 @@ def run(case: Case) -> dict[str, Result]:
     }
 
 
-def ratio(sigma: Array, k: int) -> float:
-    """sigma_1 over another singular value; rounding alone bounds it where the object is exact."""
-    return float(sigma[0] / max(sigma[k], np.finfo(float).eps * sigma[0]))
+def ratio(sigma: Array, a: int, b: int) -> float:
+    """One singular value over another, which counts as no less than the rounding of the largest."""
+    return float(sigma[a] / max(sigma[b], np.finfo(float).eps * sigma[0]))
 
 
 def carried_deg(found: Detection, image: Detection, turn: Array) -> float:

@@ -204,6 +204,7 @@ def test_mug_in_two_poses():
     assert row["map_entry"] < 1e-9
     assert row["det_right"]
     assert row["sigma13"] > 100 > row["sigma12"] > 1
+    assert row["sigma23"] == pytest.approx(row["sigma13"] / row["sigma12"])
     assert row["carried_deg"] < 0.1
 
 
