@@ -9,7 +9,7 @@ with weights from the sampling noise of both sides. The second form is linear in
 grid of rotations gives the whole landscape, both determinants at once, in one matrix product.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from symrefine.geometry import Array, read_only
 from symrefine.harmonics import generators, harmonic_moments, turn
-from symrefine.moments import Moments
+from symrefine.moments import Moments, exponents
 from symrefine.shape import Index
 from symrefine.spectrum import whitened
 
@@ -184,17 +184,25 @@ def _grid_table(l: int) -> "np.ndarray[tuple[int, int], np.dtype[np.float32]]":
     return turned.reshape(GRID, -1).astype(np.float32)
 
 
+def _up_to(moments: Moments, order: int) -> Moments:
+    """The moments of the lower orders; replicates are left behind."""
+    count = len(exponents(moments.dim, order))
+    return replace(moments, order=order, values=moments.values[:count], replicates=np.empty((0, count)))
+
+
 def landscape(source: Moments, target: Moments, pair: HarmonicPair) -> tuple[Array, Array]:
     """Correlation of the two objects under every rotation R of the grid, and under -R: [GRID] each.
 
     The objects are whitened first (`spectrum.whitened`): every orthogonal map between them maps their whitened forms as
     well, and what lies around a long axis counts as much as the axis. The covariance joins as one more row of l = 2.
     """
-    white_a, white_b = harmonic_moments(whitened(source)), harmonic_moments(whitened(target))
+    low_a, low_b = (_up_to(m, min(GRID_DEGREE, m.order)) for m in (source, target))
+    white_a, white_b = harmonic_moments(whitened(low_a)), harmonic_moments(whitened(low_b))
     even, odd = np.zeros(GRID), np.zeros(GRID)
     for l in range(1, min(GRID_DEGREE, source.order) + 1):
         here = pair.of_degree(l)
-        a, b, noise = white_a[l][0], white_b[l][0], (2 * l + 1) / pair.weights[here][:: 2 * l + 1]
+        a, b = white_a[l][0], white_b[l][0]
+        noise = (2 * l + 1) / pair.weights[here][:: 2 * l + 1][: len(a)]
         if l == 2:  # whitening has emptied the first row
             a[0], b[0] = pair.source[0, here][:5], pair.target[0, here][:5]
         strength = np.sqrt((a**2).sum(axis=1) * (b**2).sum(axis=1))
