@@ -13,7 +13,7 @@ LOG := .make/setup.log
 SHELL := /bin/sh
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test bench lint lock clean
+.PHONY: help setup demo test bench reproduce lint lock clean
 
 help: ## what each target does
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -29,6 +29,9 @@ test: lint ## lint, then the test suite
 
 bench: $(READY) ## measure against the stored baseline
 	@$(PY) -m benchmarks.run
+
+reproduce: $(READY) ## the paper's experiments beside the baseline, in minutes; the report, the README's table
+	@$(PY) -m experiments.reproduce
 
 # Runs a command in silence; says what it said if it fails.
 check = printf '%-26s' "$(1)"; if out=$$($(2) 2>&1); then echo ok; else echo FAILED; echo "$$out"; exit 1; fi
