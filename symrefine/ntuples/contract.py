@@ -25,7 +25,8 @@ class NTuples:
     Attributes:
         vectors: [T, n] tuples, each divided by a bound of it, so |v| <= 1: radial moments of the even orders around
             each factor's, or where the moments end at an odd order, what they themselves say (`_Traces.bound`).
-        replicates: [B, T, n] jackknife replicates; B = 0 where the moments are exact.
+        replicates: [B, T, n] jackknife replicates, each divided by a bound of its own; B = 0 where the moments are
+            exact.
         labels: [T] orders and ranks each tuple was made from.
     """
 
@@ -40,11 +41,50 @@ class NTuples:
     @property
     def noise(self) -> Array:
         """Standard deviation [T] of each tuple's components from the sampling of the points (jackknife)."""
+        return np.asarray(np.sqrt((self._deviations() ** 2).sum(axis=0).mean(axis=-1)))
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance [T, n, n] of each tuple's components from the sampling of the points; zero for exact moments.
+
+        Delete-a-group jackknife (Kott 2001) of B parts: `(B - 1) / B sum_b (v_b - v)(v_b - v)'`. It has B - 1 degrees
+        of freedom: entries scatter by `sqrt(2 / (B - 1))` of their size (a third for B = 16), and with B <= n it is
+        singular. It turns with the object: R C R'.
+        """
+        spread = self._deviations()
+        return np.asarray(np.einsum("bti,btj->tij", spread, spread))
+
+    @property
+    def joint_covariance(self) -> Array:
+        """Covariance [T n, T n] of all components of all tuples, which share their points and so their errors.
+
+        Of rank B - 1 at most.
+        """
+        flat = self._deviations().reshape(len(self.replicates), self.vectors.size)
+        return flat.T @ flat
+
+    def whitened(self) -> Array:
+        """Tuples [T, n] in standard deviations: each multiplied by the inverse root of its covariance.
+
+        For B > n; then `|row|^2 (B - n) / (n (B - 1))` is distributed as F(n, B - n) where the true tuple vanishes
+        (Hotelling), so a threshold on it decides whether a tuple says anything.
+
+        Raises:
+            InputError: too few replicates; exact moments have none.
+        """
+        parts, dim = len(self.replicates), self.vectors.shape[-1]
+        if parts <= dim:
+            raise InputError(f"{parts} replicates; whitening {dim} components takes at least {dim + 1}")
+        values, axes = np.linalg.eigh(self.covariance)
+        root = np.sqrt(np.maximum(values, np.finfo(float).tiny))
+        return np.asarray(np.einsum("tij,tj,tkj,tk->ti", axes, 1.0 / root, axes, self.vectors))
+
+    def _deviations(self) -> Array:
+        """Replicates [B, T, n] less their mean, scaled so that their squares add up to variances."""
         parts = len(self.replicates)
-        if parts == 0:
-            return np.zeros(len(self.vectors))
-        spread = self.replicates - self.replicates.mean(axis=0)
-        return np.sqrt((parts - 1) / parts * (spread**2).sum(axis=0).mean(axis=-1))
+        if not parts:
+            return self.replicates
+        return np.asarray(np.sqrt((parts - 1) / parts) * (self.replicates - self.replicates.mean(axis=0)))
 
 
 def ntuples(moments: Moments, orders: Sequence[Sequence[int]] = PAPER_ORDERS) -> NTuples:
@@ -93,8 +133,8 @@ class _Traces:
                 self._known[key] = np.trace(self(degree, rank + 2), axis1=-2, axis2=-1)
         return self._known[key]
 
-    def bound(self, degree: int) -> float:
-        """At least the Frobenius norm of T_degree traced to any rank, which is at most `int r^degree`.
+    def bound(self, degree: int) -> Array:
+        """[B] at least the Frobenius norm of T_degree traced to any rank, which is at most `int r^degree`.
 
         By Cauchy and Schwarz that integral is below the geometric mean of the even orders around. Without the upper one
         no bound of it is known; then the bound is the largest of those norms, or `(int r^low)^(degree/low)`, which is
@@ -102,18 +142,19 @@ class _Traces:
         """
         low, high = degree - degree % 2, degree + degree % 2
         if high <= self.order:
-            return float(np.sqrt(self(low, 0)[0] * self(high, 0)[0]))
-        norms = [float(np.linalg.norm(self(degree, rank)[0])) for rank in range(1, degree + 1, 2)]
-        return max(float(self(low, 0)[0]) ** (degree / max(low, 1)), *norms)
+            return np.asarray(np.sqrt(self(low, 0) * self(high, 0)))
+        batch = len(self.values)
+        norms = [np.linalg.norm(self(degree, rank).reshape(batch, -1), axis=1) for rank in range(1, degree + 1, 2)]
+        return np.max([self(low, 0) ** (degree / max(low, 1)), *norms], axis=0)
 
 
 def _contractions(traced: _Traces, orders: Sequence[Sequence[int]]) -> Iterator[tuple[str, Array]]:
     for term in orders:
         if len(term) == 1:
-            yield f"({term[0]})", traced(term[0], 1) / traced.bound(term[0])
+            yield f"({term[0]})", traced(term[0], 1) / traced.bound(term[0])[:, None]
             continue
         even, odd = sorted(term, key=lambda p: p % 2)
-        bound = traced.bound(even) * traced.bound(odd)
+        bound = (traced.bound(even) * traced.bound(odd))[:, None]
         for low in range(even, -1, -2):
             for high in (low - 1, low + 1):
                 if 1 <= high <= odd:

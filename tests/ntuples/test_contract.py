@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.stats import f as f_distribution
 
 from experiments.shapes import asymmetric, box, join
 from symrefine.errors import InputError
@@ -139,6 +140,72 @@ def test_noise_is_the_spread_over_independent_samples(shape):
     promised = np.sqrt(np.mean([t.noise**2 for t in several], axis=0))
     # 150 samples give the spread to 6 %; the delete-a-group jackknife is known to promise some per cent too much.
     np.testing.assert_allclose(promised, spread, rtol=0.15)
+
+
+def skewed(rng, count, dim):
+    """Independent points of a body with nothing symmetric about it."""
+    points = rng.random((count, dim)) ** np.linspace(1.5, 4.0, dim) * np.linspace(1.0, 2.0, dim)
+    return points @ (np.eye(dim) + 0.4 * np.triu(np.ones((dim, dim)), 1))
+
+
+@pytest.mark.parametrize("dim", [2, 3, 4])
+def test_covariance_is_that_of_independent_samples(dim):
+    rng = np.random.default_rng(dim)
+    count, orders = 1500, ((3,), (2, 3), (4, 3))
+    several = [
+        ntuples(central_moments(skewed(rng, count, dim), np.ones(count), 4, parts=16), orders) for _ in range(200)
+    ]
+    drawn = np.stack([t.vectors for t in several])
+    true = np.einsum("sti,stj->tij", drawn - drawn.mean(axis=0), drawn - drawn.mean(axis=0)) / (len(drawn) - 1)
+    promised = np.mean([t.covariance for t in several], axis=0)
+    # In the axes in which the true covariance is I. 200 samples scatter its eigenvalues by sqrt(n / 200) and more; the
+    # jackknife is known to promise some per cent too much.
+    for mine, theirs in zip(promised, true, strict=True):
+        root = np.linalg.inv(np.linalg.cholesky(theirs))
+        np.testing.assert_allclose(np.linalg.eigvalsh(root @ mine @ root.T), 1.0, atol=0.45)
+    size = np.trace(promised, axis1=1, axis2=2) / np.trace(true, axis1=1, axis2=2)
+    np.testing.assert_allclose(size, 1.0, atol=0.25)
+    correlated = np.mean([t.joint_covariance for t in several], axis=0)
+    centred = (drawn - drawn.mean(axis=0)).reshape(len(drawn), -1)
+    scale = np.sqrt(np.diag(correlated))
+    true_joint = centred.T @ centred / (len(drawn) - 1)
+    np.testing.assert_allclose(correlated / np.outer(scale, scale), true_joint / np.outer(scale, scale), atol=0.3)
+
+
+@pytest.mark.parametrize("dim", [2, 3, 4])
+def test_covariance_turns_with_the_object_and_holds_the_noise(dim):
+    rng = np.random.default_rng(10 + dim)
+    points, matrix = skewed(rng, 500, dim), random_orthogonal(rng, dim, -1)
+    once, turned = (ntuples(central_moments(p, np.ones(500), 6, parts=8)) for p in (points, points @ matrix.T))
+    np.testing.assert_allclose(turned.covariance, matrix @ once.covariance @ matrix.T, rtol=1e-7, atol=1e-15)
+    np.testing.assert_allclose(np.trace(once.covariance, axis1=1, axis2=2) / dim, once.noise**2)
+    blocks = once.joint_covariance.reshape(len(once.labels), dim, len(once.labels), dim)
+    np.testing.assert_allclose(np.einsum("titj->tij", blocks), once.covariance, atol=1e-18)
+
+
+def test_exact_moments_have_no_covariance():
+    found = ntuples(shape_moments(asymmetric(), 6))
+    np.testing.assert_array_equal(found.covariance, np.zeros((17, 3, 3)))
+    np.testing.assert_array_equal(found.joint_covariance, np.zeros((51, 51)))
+    with pytest.raises(InputError, match="0 replicates; whitening 3 components takes at least 4"):
+        found.whitened()
+
+
+@pytest.mark.parametrize("dim", [2, 3, 4])
+def test_whitened_tuples_of_a_symmetric_body_follow_hotelling(dim):
+    # All tuples of a box vanish; 32 parts, so that the threshold is near that of chi-squared.
+    rng, parts = np.random.default_rng(20 + dim), 32
+    statistic = []
+    for _ in range(150):
+        cloud = rng.uniform(-1, 1, (800, dim)) * np.linspace(1.0, 2.0, dim)
+        found = ntuples(central_moments(cloud, np.ones(800), 4, parts=parts), ((3,), (2, 3)))
+        length = np.einsum("ti,ti->t", found.whitened(), found.whitened())
+        direct = np.einsum("ti,tij,tj->t", found.vectors, np.linalg.inv(found.covariance), found.vectors)
+        np.testing.assert_allclose(length, direct, rtol=1e-6)
+        statistic.append(length * (parts - dim) / (dim * (parts - 1)))
+    beyond = np.mean(np.array(statistic) > f_distribution.ppf(0.95, dim, parts - dim), axis=0)
+    assert (beyond < 0.13).all()
+    assert (beyond > 0.005).all()
 
 
 def test_labels_name_each_tuple_once():
