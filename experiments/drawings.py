@@ -1,22 +1,19 @@
-"""Plane objects of known symmetry, drawn as polygons painted one over the other, and pictures of them in any pose."""
+"""Plane objects of known symmetry, drawn as polygons painted one over the other."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
-from PIL import Image, ImageDraw
 
 from symrefine.geometry import Array
 
 # A polygon and the grey it is painted with: 1 for object, 0 for background.
 Layer = tuple[Array, float]
-# Each pixel is the mean of so many by so many.
-FINER = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawing:
-    """An object: its layers, its point group in the plane, and the direction of one mirror line.
+    """An object: its layers, its point group about the origin, and the direction of one mirror line.
 
     `rough` is how far the drawing is from that symmetry on purpose, for the reader.
     """
@@ -28,64 +25,16 @@ class Drawing:
     rough: str = ""
 
     @property
+    def fold(self) -> int:
+        """Order of the turns; 0 where every turn is one."""
+        return 0 if self.group == "O(2)" else int(self.group[1:])
+
+    @property
     def line_angles(self) -> Array:
         """Directions [n] of all mirror lines, radians."""
         if not self.group.startswith("D"):
             return np.zeros(0)
-        fold = int(self.group[1:])
-        return self.angle_rad + np.pi * np.arange(fold) / fold
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Pose:
-    """Turn, size of the object's radius in pixels, and shift of its middle, in a picture `side` pixels wide."""
-
-    angle_rad: float = 0.0
-    radius: float = 100.0
-    shift: Array = field(default_factory=lambda: np.zeros(2))
-    side: int = 256
-
-    def apply(self, points: Array) -> Array:
-        """Points of the drawing in pixels, y up."""
-        c, s = np.cos(self.angle_rad), np.sin(self.angle_rad)
-        return self.radius * points @ np.array([[c, s], [-s, c]]) + 0.5 * self.side + self.shift
-
-
-def random_pose(rng: np.random.Generator, side: int = 256) -> Pose:
-    """Any angle, a radius between 30 and 40 % of the picture, and a shift that keeps the object inside."""
-    radius = side * rng.uniform(0.30, 0.40)
-    return Pose(angle_rad=rng.uniform(0, 2 * np.pi), radius=radius, shift=rng.uniform(-0.08, 0.08, 2) * side, side=side)
-
-
-def coverage(drawing: Drawing, pose: Pose) -> Array:
-    """Share of each pixel [side, side] that the object covers, first row on top."""
-    size = pose.side * FINER
-    image = Image.new("L", (size, size), 0)
-    pen = ImageDraw.Draw(image)
-    for points, grey in _fitted(drawing.layers):
-        x, y = FINER * pose.apply(points).T
-        pen.polygon(list(zip(x - 0.5, size - y - 0.5, strict=True)), fill=round(255 * grey))
-    fine = np.asarray(image, dtype=np.float64) / 255.0
-    return fine.reshape(pose.side, FINER, pose.side, FINER).mean(axis=(1, 3))
-
-
-def _fitted(layers: Sequence[Layer]) -> list[Layer]:
-    """The layers in the unit circle about the middle of their box."""
-    everything = np.concatenate([points for points, _ in layers])
-    middle = 0.5 * (everything.min(axis=0) + everything.max(axis=0))
-    reach = np.linalg.norm(everything - middle, axis=1).max()
-    return [((points - middle) / reach, grey) for points, grey in layers]
-
-
-def photograph(share: Array, rng: np.random.Generator) -> Image.Image:
-    """A colour picture of the object: teal on cream, blurred light, grain."""
-    from scipy.ndimage import gaussian_filter
-
-    ink, paper = np.array([24.0, 86.0, 98.0]), np.array([244.0, 238.0, 224.0])
-    soft = gaussian_filter(share, 0.8)[:, :, None]
-    light = 1.0 - 0.08 * np.linspace(0.0, 1.0, share.shape[1])[None, :, None]
-    pixels = (soft * ink + (1.0 - soft) * paper) * light + rng.normal(0.0, 4.0, (*share.shape, 3))
-    return Image.fromarray(np.clip(pixels, 0, 255).round().astype(np.uint8))
+        return self.angle_rad + np.pi * np.arange(self.fold) / self.fold
 
 
 # --- parts ------------------------------------------------------------------------------------------------------------
@@ -133,7 +82,8 @@ def letter(text: str) -> tuple[Layer, ...]:
     outline = TextPath((0, 0), text, size=400.0, prop=FontProperties(family="DejaVu Sans", weight="bold"))
     parts = sorted((np.asarray(p) for p in outline.to_polygons()), key=lambda p: -abs(_area(p)))
     sign = np.sign(_area(parts[0]))
-    return tuple((p, float(np.sign(_area(p)) == sign)) for p in parts)
+    middle = 0.5 * (parts[0].min(axis=0) + parts[0].max(axis=0))
+    return tuple((p - middle, float(np.sign(_area(p)) == sign)) for p in parts)
 
 
 def _area(points: Array) -> float:
@@ -263,3 +213,5 @@ GALLERY = (
     Drawing(name="octagon", layers=((star(4, 1.0), 1.0),), group="D8"),
     Drawing(name="ring", layers=((ellipse(0, 0, 1.0), 1.0), (ellipse(0, 0, 0.55), 0.0)), group="O(2)"),
 )
+
+DRAWINGS = {d.name: d for d in (*CASE_STUDY, *GALLERY)}

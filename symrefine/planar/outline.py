@@ -73,7 +73,7 @@ def _of_raster(raster: Raster, pixels: int, tolerance: float, rng: np.random.Gen
     by = fine.pitch / raster.pitch
     lines = _telling(fine)
     diagonal = smallest_diagonal(np.concatenate(lines))
-    judges = [line_judge(_local_lines(p, rng), diagonal, tolerance, pixel=fine.pitch) for p in lines]
+    judges = [line_judge(_local_lines(p, rng), diagonal, tolerance, pixel=fine.pitch, crossings=len(p)) for p in lines]
     cells, masses = coarser(raster, COARSE).cells()
     return Outlines(
         judges=tuple(judges),

@@ -117,8 +117,8 @@ def _style() -> Any:
 def _object(axes: Any, trial: Shown, title: str, crop: float = 0.0) -> None:
     """A picture in its own pixels, y up, with lines, centre and turns over it."""
     height, width = trial.picture.shape[:2]
-    binary = bool(np.isin(trial.picture, (0, 255)).all())
-    picture = np.where(trial.picture < 128, _rgb(OBJECT), _rgb("#f4f6f9")) if binary else trial.picture
+    grey = trial.picture.ndim == 2
+    picture = np.where(trial.picture[:, :, None] < 128, _rgb(OBJECT), _rgb("#f4f6f9")) if grey else trial.picture
     axes.imshow(picture, extent=(0, width, 0, height), interpolation="lanczos")
     found = trial.detection
     for line in found.lines:
