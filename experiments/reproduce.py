@@ -67,6 +67,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     from symrefine.study.typed import read_config
 
     config = read_config(options.config, Config)
+    fetch_models()
     parts = []
     for name in config.configs:
         part = run_part(options.config.parent / name, options.out, full=options.full, workers=options.workers)
@@ -77,6 +78,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     missed = sum(verdict.met is False for verdict in _verdicts(parts))
     print(f"{sum(p.seconds for p in parts):.0f} s, {missed} misses; written to {options.out / 'report.md'}")
     return int(any(part.error for part in parts))
+
+
+def fetch_models() -> None:
+    """Bring the real meshes into the cache if they are not there; without a network the rest runs."""
+    from experiments.models import cache_folder, download_package, fetch
+
+    try:
+        fetch(cache_folder(), download_package)
+    except InputError as error:
+        print(f"no real meshes: {error}", file=sys.stderr)
 
 
 def run_part(path: Path, out: Path, *, full: bool, workers: int) -> Part:

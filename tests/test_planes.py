@@ -1,5 +1,6 @@
 """The comparison of methods: truth and scores, every method on one scan, and the report that is made of it."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -8,11 +9,13 @@ import pytest
 
 from experiments import reproduce
 from experiments.methods import METHODS, generated
+from experiments.models import Package
 from experiments.planes import SHAPES, Case, check, make, run, score, trace
 from symrefine.cli import invoke
 from symrefine.errors import InputError
 from symrefine.geometry import Plane, rotation
 from symrefine.study.plan import make_plan
+from symrefine.study.typed import read_config
 from symrefine.verify import miss_distances
 
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -151,6 +154,10 @@ def test_the_table_experiment_runs_and_records(tmp_path: Path, capsys: pytest.Ca
     assert len(list(out.glob("*.png"))) == 3
 
 
+def no_network(_: Package) -> bytes:
+    raise InputError("no network")
+
+
 def test_reproduce_sets_side_by_side_and_names_misses(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -158,6 +165,8 @@ def test_reproduce_sets_side_by_side_and_names_misses(
     (home / "configs").mkdir(parents=True)
     (home / "README.md").write_text(f"before\n{reproduce.BEGIN}\nold\n{reproduce.END}\nafter\n")
     monkeypatch.syspath_prepend(str(home))
+    monkeypatch.setattr("experiments.models.download_package", no_network)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "empty"))
     (home / "halves.py").write_text(
         "from dataclasses import dataclass\n@dataclass(frozen=True)\nclass Case:\n    seed: int\n"
         "def run(case):\n    return {'half': case.seed / 2}\ndef trace(case):\n    return []\n"
@@ -178,8 +187,9 @@ def test_reproduce_sets_side_by_side_and_names_misses(
     out = tmp_path / "out"
     arguments = ["--config", str(config), "--out", str(out), "--docs", str(home), "--workers", "1"]
     assert reproduce.main(arguments) == 1
-    printed = capsys.readouterr().out
-    assert "Halves: 3 runs in 0 s, 2 claims, 1 missed" in printed
+    printed, err = capsys.readouterr()
+    assert err == "no real meshes: no network\n"
+    assert re.search(r"^Halves: 3 runs in \d+ s, 2 claims, 1 missed$", printed, re.MULTILINE)
     assert "gone: could not be run:" in printed
     report = (out / "report.md").read_text()
     assert "| halves | 0.5 m | **0.5 m** | two 1 m |" in report
@@ -200,3 +210,12 @@ def test_reproduce_sets_side_by_side_and_names_misses(
 def test_markers_must_stand_once_and_in_order(text: str) -> None:
     with pytest.raises(InputError, match=r"README.md: expected the markers"):
         reproduce.between_markers(text, "x", "README.md")
+
+
+def test_every_study_of_the_report_is_there() -> None:
+    config = read_config(reproduce.CONFIG, reproduce.Config)
+    for name in config.configs:
+        assert make_plan(CONFIGS / name, quick=True).study.claims
+    figures = make_plan(CONFIGS / config.picture.config).study.figures
+    assert config.picture.config in config.configs
+    assert config.picture.figure in [figure.title for figure in figures]
