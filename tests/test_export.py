@@ -3,7 +3,7 @@
 import json
 import math
 import os
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -204,7 +204,7 @@ def test_a_record_says_what_was_found(box: tuple[Shape, Detection]) -> None:
 
 
 def test_planes_and_axes_keep_their_place_when_their_sign_is_chosen(box: tuple[Shape, Detection]) -> None:
-    miss = Deviation(mean=0.0, p95=0.0, p99=0.0, p995=0.0, max=0.0)
+    miss = Deviation(**{field.name: 0.0 for field in fields(Deviation)})
     plane = Plane(normal=np.array([1e-9, -0.6, 0.8]), offset=2.0)
     axis = Axis(point=CENTER, direction=np.array([0.0, 0.0, -1.0]))
     changed = replace(

@@ -2,35 +2,48 @@
 
 import argparse
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from symrefine.cli import journal
-from symrefine.cli.outputs import check_outputs, console, progress
-from symrefine.cli.values import add_detection_options, count
+from symrefine.cli.outputs import check_outputs, console, note, progress, text_writer, write_all
+from symrefine.cli.values import add_detection_options, count, positive
 from symrefine.errors import InputError, SymrefineError
 
 if TYPE_CHECKING:
     from multiprocessing.process import BaseProcess
+
+    from symrefine.detect import Detection
+    from symrefine.planar import PlanarDetection
+    from symrefine.shape import Shape
 
 NAME = "batch"
 HELP = "detect the symmetries of every file in a directory"
 DESCRIPTION = (
     "Detect the symmetries of every mesh and cloud in DIR and print a line for each. With --out, also append a JSON "
     "row for each file as soon as it is done; run again, files whose content and options have a row are not done "
-    "again. A file that cannot be used gives a row with its error, the others go on, and the exit status is 1."
+    "again. A file that cannot be used gives a row with its error, the others go on, and the exit status is 1. With "
+    "--bop, DIR is a folder of models as BOP names them, obj_000001.ply for object 1, and one models_info.json holds "
+    "all of them."
 )
 
 Row = dict[str, Any]
-# Directory, path of the file in it, options of `detect`.
-Job = tuple[str, str, dict[str, Any]]
+# Directory, path of the file in it, options of `detect`, millimetres in a unit if its entry of BOP is wanted.
+Job = tuple[str, str, dict[str, Any], float | None]
+# Object 1 of BOP is obj_000001.ply.
+_BOP_NAME = re.compile(r"obj_([0-9]{1,9})")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("dir", metavar="DIR", help="directory of meshes and clouds")
     parser.add_argument("--out", metavar="FILE.jsonl", help="append the rows to this file (default: print only)")
+    parser.add_argument("--bop", metavar="FILE", help="put the symmetries of all into this models_info.json of BOP")
+    parser.add_argument(
+        "--bop-scale", type=positive, default=1.0, metavar="X", help="millimetres in one unit of the files (default: 1)"
+    )
     parser.add_argument("--recursive", action="store_true", help="directories inside DIR too")
     parser.add_argument(
         "--workers", type=count, default=1, metavar="N", help="files done at the same time (default: %(default)s)"
@@ -41,10 +54,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Detect in every file, print the table, tell whether all went well."""
     files = _files(Path(args.dir), recursive=args.recursive)
-    check_outputs({"--out": args.out}, [Path(args.dir, name) for name in files])
+    check_outputs({"--out": args.out, "--bop": args.bop}, [Path(args.dir, name) for name in files])
+    scale = _check_bop(args, files)
     options = {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed}
     rows = journal.finished(Path(args.out), Path(args.dir), files, options) if args.out else {}
-    jobs = [(args.dir, name, options) for name in files if name not in rows]
+    rows = {name: row for name, row in rows.items() if _serves_bop(row, scale)}
+    jobs = [(args.dir, name, options, scale) for name in files if name not in rows]
     with progress("detecting", len(files), len(rows)) as advance:
         for row in _rows(jobs, args.workers):
             if args.out:
@@ -52,7 +67,53 @@ def run(args: argparse.Namespace) -> int:
             rows[row["file"]] = row
             advance()
     _print([rows[name] for name in files], len(files) - len(jobs))
-    return int(any(row["error"] is not None for row in rows.values()))
+    left_out = _write_bop(args.bop, rows) if args.bop else 0
+    return int(left_out > 0 or any(row["error"] is not None for row in rows.values()))
+
+
+def _check_bop(args: argparse.Namespace, files: list[str]) -> float | None:
+    """The scale, if entries of BOP are wanted.
+
+    Raises:
+        InputError: a file whose name tells no object, two of one object, or a file that is no `models_info.json`.
+    """
+    if args.bop is None:
+        return None
+    from symrefine.export.bop import read_models_info
+
+    read_models_info(Path(args.bop))
+    owners: dict[int, str] = {}
+    for name in files:
+        match = _BOP_NAME.fullmatch(Path(name).stem)
+        if match is None:
+            raise InputError(f"{Path(args.dir, name)}: --bop takes the number of an object from names: obj_000001.ply")
+        other = owners.setdefault(int(match[1]), name)
+        if other != name:
+            raise InputError(f"{Path(args.dir, name)}: is object {int(match[1])}, and so is {other}; --bop takes one")
+    return float(args.bop_scale)
+
+
+def _serves_bop(row: Row, scale: float | None) -> bool:
+    """Whether a row done before holds the entry of BOP, if one is wanted and can be had."""
+    return scale is None or row["error"] is not None or row.get("bop", {}).get("scale") == scale
+
+
+def _write_bop(name: str, rows: dict[str, Row]) -> int:
+    """Write the entries of all rows that have one; tells of the others, and how many they are."""
+    from symrefine.export.bop import bop_texts
+
+    entries, left_out = {}, 0
+    for file, row in sorted(rows.items()):
+        found = row.get("bop", {"note": row["error"]})
+        if found.get("note"):
+            note(found["note"])
+        if "entry" in found:
+            entries[int(_BOP_NAME.fullmatch(Path(file).stem)[1])] = found["entry"]  # type: ignore[index]
+        else:
+            left_out += 1
+    write_all({name: text_writer(bop_texts(Path(name), dict(sorted(entries.items()))))})
+    console().print(f"wrote {name}: {len(entries)} of {len(rows)} objects", soft_wrap=True)
+    return left_out
 
 
 def _files(folder: Path, *, recursive: bool) -> list[str]:
@@ -113,19 +174,35 @@ def examine_file(job: Job) -> Row:
     """The row of one file: its record, or what was wrong with it."""
     from symrefine.cli.detect import examine
 
-    folder, name, options = job
+    folder, name, options, scale = job
     path = Path(folder, name)
     row = journal.head(path, name, options)
     if row["error"] is not None:
         return row
     try:
-        return row | examine(str(path), **options)[2]
+        shape, detection, record = examine(str(path), **options)
+        return row | record | ({} if scale is None else {"bop": _bop(detection, shape, scale)})
     except (SymrefineError, OSError) as error:
         return row | {"error": " ".join(str(error).split())}
     except MemoryError:
         return row | {"error": f"{path}: out of memory"}
     except Exception as error:  # noqa: BLE001 - one file must not end the others
         return row | {"error": f"{path}: internal error: {type(error).__name__}: {error}"}
+
+
+def _bop(found: "Detection | PlanarDetection", shape: "Shape", scale: float) -> Row:
+    """The entry of BOP with its scale and what it cannot hold, or why there is none."""
+    from symrefine.export.bop import bop_entry, bop_limits
+
+    if shape.dim != 3:
+        return {"scale": scale, "note": f"{shape.source}: lies in the plane; BOP is for objects in space"}
+    detection = cast("Detection", found)
+    try:
+        entry = bop_entry(detection, shape, scale=scale)
+    except InputError as error:
+        return {"scale": scale, "note": str(error)}
+    limits = bop_limits(detection)
+    return {"scale": scale, "entry": entry, "note": f"{shape.source}: {limits}" if limits else None}
 
 
 def _print(rows: list[Row], kept: int) -> None:

@@ -11,6 +11,7 @@ which `bop_toolkit` samples a continuous symmetry.
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -49,12 +50,21 @@ def bop_entry(detection: Detection, shape: Shape, *, scale: float = 1.0) -> Entr
         raise InputError(f"scale is {scale}; expected millimetres in one unit of the file, such as 1 or 1000")
     if detection.undetermined:
         raise InputError(f"{shape.source}: no symmetries to export: {detection.undetermined}")
-    low, high = shape.points.min(axis=0) * scale, shape.points.max(axis=0) * scale
-    size = diameter(shape.points) * scale
+    return placed_entry(detection.group, detection.center * scale, shape.points * scale)
+
+
+def placed_entry(group: PointGroup, center: Array, points: Array) -> Entry:
+    """The entry of an object with a group about a centre.
+
+    Args:
+        points: [N, 3] vertices, millimetres.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = diameter(points)
     entry: Entry = {"diameter": size}
     entry |= {f"min_{k}": float(v) for k, v in zip("xyz", low, strict=True)}
     entry |= {f"size_{k}": float(v) for k, v in zip("xyz", high - low, strict=True)}
-    placed = _Placed(group=_snapped(detection.group.proper_subgroup()), center=detection.center * scale, size=size)
+    placed = _Placed(group=_snapped(group.proper_subgroup()), center=center, size=size)
     discrete, continuous = placed.discrete(), placed.continuous()
     entry |= {"symmetries_discrete": discrete} if discrete else {}
     entry |= {"symmetries_continuous": continuous} if continuous else {}
@@ -78,9 +88,19 @@ def bop_text(path: Path, number: int, entry: Entry) -> str:
     Raises:
         InputError: the number is negative, or the file is not a `models_info.json`.
     """
-    if number < 0:
-        raise InputError(f"object id is {number}; expected an integer from 0")
-    return json_text(read_models_info(path) | {str(number): entry})
+    return bop_texts(path, {number: entry})
+
+
+def bop_texts(path: Path, entries: Mapping[int, Entry]) -> str:
+    """Content of `path` with the entries of several objects put in or replaced, all others as they are.
+
+    Raises:
+        InputError: a number is negative, or the file is not a `models_info.json`.
+    """
+    for number in entries:
+        if number < 0:
+            raise InputError(f"object id is {number}; expected an integer from 0")
+    return json_text(read_models_info(path) | {str(number): entry for number, entry in entries.items()})
 
 
 def write_bop(path: Path, number: int, entry: Entry) -> None:

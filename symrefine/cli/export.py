@@ -1,0 +1,165 @@
+"""`symrefine export`: the symmetries of a file as other programs read them."""
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from symrefine.cli.outputs import console, note, waiting, write_all
+from symrefine.cli.values import add_detection_options, count, natural, positive
+from symrefine.errors import InputError
+
+if TYPE_CHECKING:
+    from symrefine.detect import Detection
+    from symrefine.export.packages import Package
+    from symrefine.shape import Shape
+
+NAME = "export"
+HELP = "write the symmetries as BOP, FoundationPose, MegaPose, DOPE or Isaac read them, or a canonical model"
+DESCRIPTION = (
+    "Find the symmetries of the mesh or cloud in PATH and write them for another program. bop: an entry in "
+    "models_info.json, in the frame of PATH. npz: all rotations as N x 4 x 4 matrices, in the frame of PATH. "
+    "canonical: the model with its axis on z through the origin, and the transform. foundationpose, megapose, dope, "
+    "isaac: a folder with a canonical model and the file that this program reads beside it. What the program cannot "
+    "express is told."
+)
+# Formats and the options that they alone take.
+_OPTIONS: dict[str, tuple[str, ...]] = {
+    "bop": ("id", "scale"),
+    "foundationpose": ("id", "scale"),
+    "megapose": ("id", "scale"),
+    "dope": ("scale",),
+    "isaac": ("scale",),
+    "npz": ("improper", "steps"),
+    "canonical": ("transform",),
+}
+_FOLDERS = ("foundationpose", "megapose", "dope", "isaac")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", metavar="PATH", help="mesh or point cloud")
+    parser.add_argument("--to", required=True, choices=tuple(_OPTIONS), help="what to write")
+    parser.add_argument("--out", required=True, metavar="OUT", help="file, or folder for " + ", ".join(_FOLDERS))
+    parser.add_argument("--id", type=natural, metavar="N", help="number of the object in models_info.json (default: 1)")
+    parser.add_argument(
+        "--scale",
+        type=positive,
+        metavar="X",
+        help="millimetres in one unit of PATH: 1000 for metres (default: 1)",
+    )
+    parser.add_argument("--improper", action="store_true", default=None, help="npz: mirrors and the like too")
+    parser.add_argument("--steps", type=count, metavar="N", help="npz: turns for a continuous axis (default: 72)")
+    parser.add_argument(
+        "--transform",
+        metavar="FILE",
+        help="canonical: where the 4 x 4 transform goes, .json or .npz (default: OUT_transform.json)",
+    )
+    add_detection_options(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Detect, write the files of the format, tell what they cannot express."""
+    _check(args)
+    with waiting("detecting"):
+        shape, detection = detected(args)
+        package = _package(args, shape, detection)
+        with _folder(args):
+            write_all({str(path): partial(_write, data=data) for path, data in package.files.items()})
+    out = console()
+    out.print(f"{args.path}: {detection.point_group}", soft_wrap=True)
+    for path in package.files:
+        out.print(f"wrote {path}", soft_wrap=True)
+    for text in package.notes:
+        note(text)
+    return 0
+
+
+def detected(args: argparse.Namespace) -> tuple["Shape", "Detection"]:
+    """The shape in a file and its symmetries.
+
+    Raises:
+        InputError: a picture, or points with two coordinates.
+    """
+    from symrefine.detect import detect
+    from symrefine.load import load
+
+    shape = load(args.path, measure=args.measure)
+    return shape, detect(shape, tolerance=args.tolerance, seed=args.seed)
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Refuse, before any work, options of other formats and outputs that cannot be written."""
+    for option in ("id", "scale", "improper", "steps", "transform"):
+        if getattr(args, option) is not None and option not in _OPTIONS[args.to]:
+            users = ", ".join(name for name, options in _OPTIONS.items() if option in options)
+            raise InputError(f"--{option}: does not apply to --to {args.to}; it is for {users}")
+    from symrefine.export.bop import read_models_info
+    from symrefine.export.files import check_target
+    from symrefine.export.models import check_suffix
+
+    out = Path(args.out)
+    if args.to in _FOLDERS:
+        _check_folder(out)
+        return
+    targets = [out, _transform(args)] if args.to == "canonical" else [out]
+    for target in targets:
+        check_target(target)
+        if target.resolve() == Path(args.path).resolve():
+            raise InputError(f"--out {target}: is the same file as the input; name another one")
+    if args.to == "bop":
+        read_models_info(out)
+    elif args.to == "npz" and out.suffix.lower() != ".npz":
+        raise InputError(f"--out {out}: expected a name that ends in .npz")
+    elif args.to == "canonical":
+        check_suffix(out)
+        if _transform(args).suffix.lower() not in (".json", ".npz"):
+            raise InputError(f"--transform {args.transform}: expected a name that ends in .json or .npz")
+
+
+def _check_folder(out: Path) -> None:
+    if out.exists() and not out.is_dir():
+        raise InputError(f"--out {out}: is a file; expected a folder")
+    if not out.parent.is_dir():
+        raise InputError(f"--out {out}: cannot be made: there is no directory {out.parent}")
+
+
+def _transform(args: argparse.Namespace) -> Path:
+    out = Path(args.out)
+    return out.with_name(f"{out.stem}_transform.json") if args.transform is None else Path(args.transform)
+
+
+def _package(args: argparse.Namespace, shape: "Shape", detection: "Detection") -> "Package":
+    from symrefine.export import packages
+    from symrefine.export.operations import STEPS
+
+    out, number, scale = Path(args.out), 1 if args.id is None else args.id, args.scale or 1.0
+    if args.to == "bop":
+        return packages.bop_package(out, detection, shape, number=number, scale=scale)
+    if args.to == "npz":
+        options: dict[str, Any] = {"improper": bool(args.improper), "steps": args.steps or STEPS}
+        return packages.npz_package(out, detection, shape, **options)
+    if args.to == "canonical":
+        return packages.canonical_package(out, detection, shape, transform=_transform(args))
+    return packages.consumer_package(args.to, out, detection, shape, number=number, scale=scale)
+
+
+@contextmanager
+def _folder(args: argparse.Namespace) -> Iterator[None]:
+    """The folder of a consumer, made if need be, gone again after an error."""
+    out = Path(args.out)
+    fresh = args.to in _FOLDERS and not out.exists()
+    if fresh:
+        out.mkdir()
+    try:
+        yield
+    except BaseException:
+        if fresh:
+            out.rmdir()
+        raise
+
+
+def _write(path: Path, data: bytes) -> None:
+    path.write_bytes(data)

@@ -1,0 +1,125 @@
+"""`symrefine symmetrize`: the nearest exactly symmetric mesh or cloud."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from symrefine.cli.export import detected
+from symrefine.cli.outputs import STDOUT, check_outputs, console, note, say, text_writer, waiting, write_all
+from symrefine.cli.values import add_detection_options
+from symrefine.errors import InputError
+
+if TYPE_CHECKING:
+    from symrefine.detect import Detection
+    from symrefine.shape import Shape
+    from symrefine.symmetrize import Symmetrized
+
+NAME = "symmetrize"
+HELP = "write the nearest exactly symmetric mesh or cloud"
+DESCRIPTION = (
+    "Find the symmetry of the mesh or cloud in PATH and write the nearest shape that has it exactly: points that "
+    "correspond become the means of their orbits; otherwise each point moves to where the symmetric surface is, and of "
+    "a cloud one sector is copied to the others. A continuous axis becomes an axis of a finite order, which is told."
+)
+_METHODS = {
+    "vertices": "every point has its counterparts; points are means over their orbits",
+    "orbits": "points without exact counterparts: one sector moved onto the symmetric surface, and its copies",
+    "surface": "vertices without exact counterparts lie on the symmetric surface; the triangles are as they were",
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", metavar="PATH", help="mesh or point cloud")
+    parser.add_argument(
+        "-o", "--out", required=True, metavar="OUT", help="file to write: .ply .obj .off .xyz .npy .npz"
+    )
+    parser.add_argument("--group", metavar="NAME", help="make only this subgroup of what was found exact, such as Cs")
+    parser.add_argument("--json", metavar="FILE|-", help="write the figures as JSON; - is stdout, with no table")
+    add_detection_options(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Detect, make symmetric, write, print by how much points moved."""
+    from symrefine.export.models import check_suffix, model_bytes
+
+    check_outputs({"--out": args.out, "--json": args.json}, [Path(args.path)])
+    check_suffix(Path(args.out))
+    with waiting("detecting"):
+        shape, detection = detected(args)
+        made = _symmetrize(args, shape, detection)
+        data = model_bytes(Path(args.out), made.shape)
+        record = _record(args, shape, detection, made)
+        from symrefine.export.files import json_text
+
+        writers = {args.out: lambda path: _write(path, data)}
+        if args.json not in (None, STDOUT):
+            writers[args.json] = text_writer(json_text(record))
+        write_all(writers)
+    if args.json == STDOUT:
+        say(json_text(record))
+    else:
+        _print(record, list(writers))
+    if not detection.group.is_finite and args.group is None:
+        note(f"{detection.point_group} is continuous, no finite set of points has it: {made.group.name} was made exact")
+    return 0
+
+
+def _symmetrize(args: argparse.Namespace, shape: "Shape", detection: "Detection") -> "Symmetrized":
+    from symrefine.symmetrize import placed_subgroup, symmetrize
+
+    if detection.undetermined:
+        raise InputError(f"{args.path}: no symmetry to make exact: {detection.undetermined}")
+    if detection.point_group == "C1":
+        raise InputError(f"{args.path}: is C1, nothing to make symmetric{_nearest_miss(detection)}")
+    group = detection.group if args.group is None else placed_subgroup(detection.group, args.group)
+    return symmetrize(shape, group, detection.center, tolerance=args.tolerance, seed=args.seed)
+
+
+def _nearest_miss(detection: "Detection") -> str:
+    if not detection.near_misses:
+        return ""
+    miss = detection.near_misses[0]
+    return (
+        f"; the nearest, a {miss.kind}, misses by {miss.residual.p95:.1%} of the diagonal at the 95th percentile: "
+        "choose a larger --tolerance if that counts as symmetric"
+    )
+
+
+def _record(args: argparse.Namespace, shape: "Shape", detection: "Detection", made: "Symmetrized") -> dict[str, Any]:
+    from symrefine.export.records import number
+
+    scale = made.diagonal
+    return {
+        "schema": "symrefine.symmetrized/1",
+        "source": shape.source,
+        "options": {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed, "group": args.group},
+        "found": detection.point_group,
+        "point_group": made.group.name,
+        "center": [number(v, scale) for v in made.center],
+        "frame": [[number(v, 1.0) for v in row] for row in made.group.frame],
+        "method": made.method,
+        "paired": number(made.paired),
+        "points": len(made.shape.points),
+        "largest": number(made.largest, 1.0),
+        "rms": number(made.rms, 1.0),
+        "residual": number(made.residual),
+        "diagonal": number(made.diagonal),
+    }
+
+
+def _print(record: dict[str, Any], written: list[str]) -> None:
+    out = console()
+    out.print(f"{record['source']}: {record['found']}; made exact: {record['point_group']}", soft_wrap=True)
+    out.print(f"{_METHODS[record['method']]} ({record['paired']:.1%} paired)", soft_wrap=True)
+    out.print(
+        f"moved by {record['largest']:.3%} of the diagonal at most, {record['rms']:.3%} RMS; "
+        f"the result misses itself by {record['residual']:.1e} of the diagonal",
+        soft_wrap=True,
+    )
+    for name in written:
+        out.print(f"wrote {name}", soft_wrap=True)
+
+
+def _write(path: Path, data: bytes) -> None:
+    path.write_bytes(data)

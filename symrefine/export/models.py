@@ -1,0 +1,187 @@
+"""Models as files: meshes and clouds written anew, and files whose coordinates alone are changed.
+
+`moved` keeps everything of a PLY or OBJ file that is not a position or a normal: colours, texture coordinates,
+materials, polygons, comments, the order of everything. `model_bytes` writes what a shape holds.
+"""
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from symrefine.errors import InputError
+from symrefine.geometry import Array
+from symrefine.load.ply_header import Element, Header, parse_header
+from symrefine.shape import Shape
+
+_POSITION, _NORMAL = ("x", "y", "z"), ("nx", "ny", "nz")
+
+
+def check_suffix(path: Path, shape: Shape | None = None) -> None:
+    """Refuse a name whose format is unknown, or cannot hold the shape.
+
+    Raises:
+        InputError: with the formats that can.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in _WRITERS:
+        raise InputError(f"{path}: cannot write {suffix or 'a file without suffix'}; known are {' '.join(_WRITERS)}")
+    if shape is None:
+        return
+    if shape.faces is not None and suffix in (".xyz", ".npy"):
+        raise InputError(f"{path}: {suffix} holds no faces; write a mesh as .ply, .obj, .off or .npz")
+    if shape.weights is not None and shape.faces is None and suffix != ".npz":
+        raise InputError(f"{path}: {suffix} holds no weights, which {shape.source} has; write .npz")
+    if shape.normals is not None and suffix in (".npy", ".off"):
+        raise InputError(f"{path}: {suffix} holds no normals, which {shape.source} has; write .ply, .obj, .xyz or .npz")
+
+
+def model_bytes(path: Path, shape: Shape) -> bytes:
+    """A mesh or cloud in the format of the suffix of `path`, coordinates in full precision.
+
+    Raises:
+        InputError: as `check_suffix`.
+    """
+    check_suffix(path, shape)
+    return _WRITERS[path.suffix.lower()](shape)
+
+
+def moved(data: bytes, suffix: str, matrix: Array, source: str) -> bytes | None:
+    """A PLY or OBJ file with its positions moved by `matrix` [4, 4] and its normals turned, all else as it was.
+
+    Returns:
+        None for another format, or for a file whose vertices cannot be reached row by row.
+    """
+    if suffix == ".obj":
+        return None if b"\\\n" in data or b"\\\r" in data else _moved_obj(data, matrix)
+    return _moved_ply(data, matrix, source) if suffix == ".ply" else None
+
+
+def _directions(matrix: Array) -> Array:
+    """The rotation alone of a rotation with a scale."""
+    return np.asarray(matrix[:3, :3] / np.cbrt(np.linalg.det(matrix[:3, :3])))
+
+
+def _moved_obj(data: bytes, matrix: Array) -> bytes:
+    turn = _directions(matrix)
+    lines = data.split(b"\n")
+    for k, line in enumerate(lines):
+        words = line.split()
+        if len(words) < 4 or words[0] not in (b"v", b"vn") or b"#" in line:
+            continue
+        given = np.array([float(word) for word in words[1:4]])
+        new = matrix[:3, :3] @ given + matrix[:3, 3] if words[0] == b"v" else turn @ given
+        ending = b"\r" if line.endswith(b"\r") else b""
+        lines[k] = b" ".join([words[0], *(repr(float(v)).encode() for v in new), *words[4:]]) + ending
+    return b"\n".join(lines)
+
+
+def _moved_ply(data: bytes, matrix: Array, source: str) -> bytes | None:
+    header = parse_header(data, source)
+    vertex = header.elements[0] if header.elements else Element(name="", count=0)
+    whole = [p.name for p in vertex.properties if p.name in (*_POSITION, *_NORMAL) and not p.type.startswith("f")]
+    if vertex.name != "vertex" or vertex.has_lists or whole:
+        return None
+    return (_moved_ply_binary if header.byte_order else _moved_ply_text)(data, header, vertex, matrix)
+
+
+def _moved_ply_binary(data: bytes, header: Header, vertex: Element, matrix: Array) -> bytes:
+    rows = np.dtype([(p.name, header.byte_order + p.type) for p in vertex.properties])
+    table = np.frombuffer(data, rows, count=vertex.count, offset=header.size).copy()
+    assert table.dtype.names is not None
+    for names in (_POSITION, _NORMAL):
+        if set(names) <= set(table.dtype.names):
+            new = _transformed(np.stack([table[n] for n in names], axis=1).astype(np.float64), names, matrix)
+            for name, column in zip(names, new.T, strict=True):
+                table[name] = column
+    return data[: header.size] + table.tobytes() + data[header.size + table.nbytes :]
+
+
+def _moved_ply_text(data: bytes, header: Header, vertex: Element, matrix: Array) -> bytes | None:
+    lines = data[header.size :].splitlines(keepends=True)
+    rows = lines[: vertex.count]
+    table = [row.split() for row in rows]
+    columns = [p.name for p in vertex.properties]
+    if any(len(row) != len(columns) for row in table):
+        return None  # blank lines between rows
+    short = {p.name: p.type == "f4" for p in vertex.properties}
+    for names in (_POSITION, _NORMAL):
+        if not set(names) <= set(columns):
+            continue
+        where = [columns.index(n) for n in names]
+        new = _transformed(np.array([[float(row[w]) for w in where] for row in table]), names, matrix)
+        for row, values in zip(table, new, strict=True):
+            for w, name, value in zip(where, names, values, strict=True):
+                row[w] = (f"{value:.9g}" if short[name] else repr(float(value))).encode()
+    ends = [row[len(row.rstrip(b"\r\n")) :] for row in rows]
+    return data[: header.size] + b"".join(
+        [b" ".join(r) + e for r, e in zip(table, ends, strict=True)] + lines[len(rows) :]
+    )
+
+
+def _transformed(values: Array, names: tuple[str, ...], matrix: Array) -> Array:
+    if names == _NORMAL:
+        return np.asarray(values @ _directions(matrix).T)
+    return np.asarray(values @ matrix[:3, :3].T + matrix[:3, 3])
+
+
+def _ply(shape: Shape) -> bytes:
+    columns = [*_POSITION, *(_NORMAL if shape.normals is not None else ())]
+    faces = 0 if shape.faces is None else len(shape.faces)
+    head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(shape.points)}"]
+    head += [f"property double {name}" for name in columns]
+    head += [f"element face {faces}", "property list uchar int vertex_indices"] if faces else []
+    rows = shape.points if shape.normals is None else np.column_stack([shape.points, shape.normals])
+    body = np.ascontiguousarray(rows, dtype="<f8").tobytes()
+    if shape.faces is not None:
+        table = np.zeros(faces, dtype=[("count", "u1"), ("corners", "<i4", (3,))])
+        table["count"], table["corners"] = 3, shape.faces
+        body += table.tobytes()
+    return "\n".join([*head, "end_header", ""]).encode("ascii") + body
+
+
+def _rows(values: Array, before: str = "") -> list[str]:
+    return [before + " ".join(map(repr, row)) for row in values.tolist()]
+
+
+def _obj(shape: Shape) -> bytes:
+    lines = _rows(shape.points, "v ")
+    lines += [] if shape.normals is None else _rows(shape.normals, "vn ")
+    lines += [] if shape.faces is None else [f"f {a} {b} {c}" for a, b, c in (shape.faces + 1).tolist()]
+    return "\n".join([*lines, ""]).encode("ascii")
+
+
+def _off(shape: Shape) -> bytes:
+    faces = [] if shape.faces is None else [f"3 {a} {b} {c}" for a, b, c in shape.faces.tolist()]
+    lines = ["OFF", f"{len(shape.points)} {len(faces)} 0", *_rows(shape.points), *faces]
+    return "\n".join([*lines, ""]).encode("ascii")
+
+
+def _xyz(shape: Shape) -> bytes:
+    rows = shape.points if shape.normals is None else np.column_stack([shape.points, shape.normals])
+    return "\n".join([*_rows(rows), ""]).encode("ascii")
+
+
+def _npy(shape: Shape) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, shape.points)
+    return stream.getvalue()
+
+
+def _npz(shape: Shape) -> bytes:
+    arrays = {"points": shape.points, "normals": shape.normals, "faces": shape.faces}
+    arrays |= {"weights": shape.weights} if shape.faces is None else {}
+    stream = io.BytesIO()
+    np.savez(stream, **{name: array for name, array in arrays.items() if array is not None})  # type: ignore[arg-type]
+    return stream.getvalue()
+
+
+_WRITERS: dict[str, Callable[[Shape], bytes]] = {
+    ".npy": _npy,
+    ".npz": _npz,
+    ".obj": _obj,
+    ".off": _off,
+    ".ply": _ply,
+    ".xyz": _xyz,
+}

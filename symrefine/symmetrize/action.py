@@ -1,0 +1,81 @@
+"""How a finite group permutes points: counterparts that agree with one another, so that orbits close exactly."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from symrefine.geometry import Array
+from symrefine.shape import Index
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Action:
+    """Counterparts `images` [K, N] of points under operations [K, 3, 3], and where they are an action of the group.
+
+    `closed` [N] marks the points on whose orbits g h has the counterpart that g has of that of h: there each operation
+    permutes the points. `miss` [N] is the largest distance of an image to its counterpart.
+    """
+
+    images: Index
+    closed: Mask
+    miss: Array
+
+    def mean(self, points: Array, operations: Array) -> Array:
+        """Means [N, 3] over the group of g^-1 (counterpart of g p)."""
+        total = np.zeros_like(points)
+        for g, image in zip(operations, self.images, strict=True):
+            total += points[image] @ g
+        return total / len(operations)
+
+
+def act(points: Array, operations: Array, labels: Index | None, reach: float) -> Action:
+    """The nearest point of the same label as counterpart of each image, up to `reach`."""
+    tree, shifted = _labelled(points, labels)
+    images, miss = np.empty((len(operations), len(points)), dtype=np.intp), np.zeros(len(points))
+    for k, g in enumerate(operations):
+        distance, images[k] = tree.query(np.column_stack([points @ g.T, shifted]))
+        miss = np.maximum(miss, distance)
+    closed = miss <= reach
+    for h, table in generators(operations):
+        closed &= (images[table] == images[:, images[h]]).all(axis=0)
+    for image in images:
+        closed &= closed[image]
+    return Action(images=images, closed=_whole(images, closed), miss=miss)
+
+
+def _labelled(points: Array, labels: Index | None) -> tuple[cKDTree, Array]:
+    """A kd-tree in which other labels are far away, and the coordinate that makes them so."""
+    size = 0.0 if labels is None else 4.0 * float(np.abs(points).max())
+    shifted = np.zeros(len(points)) if labels is None else np.unique(labels, return_inverse=True)[1] * size
+    return cKDTree(np.column_stack([points, shifted])), shifted
+
+
+def _whole(images: Index, closed: Mask) -> Mask:
+    """Only the points all of whose orbit is closed."""
+    while True:
+        smaller = closed & closed[images].all(axis=0)
+        if (smaller == closed).all():
+            return closed
+        closed = smaller
+
+
+def generators(operations: Array) -> list[tuple[int, Index]]:
+    """Few operations that generate all [K, 3, 3], the identity first: each h with the table of g h for every g."""
+    tree = cKDTree(operations.reshape(len(operations), 9))
+    known = np.zeros(len(operations), dtype=bool)
+    known[0] = True
+    found: list[tuple[int, Index]] = []
+    for h in range(1, len(operations)):
+        if known[h]:
+            continue
+        found.append((h, tree.query((operations @ operations[h]).reshape(-1, 9))[1]))
+        count = 0
+        while count < known.sum():
+            count = int(known.sum())
+            for _, table in found:
+                known[table[known]] = True
+    return found

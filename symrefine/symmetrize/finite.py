@@ -1,0 +1,92 @@
+"""Which finite group is made exact: subgroups in their place, and a fold in place of a continuous axis."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from symrefine.errors import InputError
+from symrefine.geometry import Array, rotation, unit
+from symrefine.groups import PointGroup, is_subgroup, point_group
+
+# Turns that stand for a continuous axis where the points themselves show no fold, and the fewest of them.
+TURNS, FEWEST_TURNS = 64, 8
+# A copied sector keeps at least so many points.
+SECTOR = 30
+# Folds tried on the rings of a lathed mesh, on so many of its points; how near they must come, in spacings, and a
+# larger fold is taken although it misses by more, up to ALIKE times more, or LAX times where that is next to nothing.
+LARGEST_FOLD, PROBES, NEAR, ALIKE, LAX, CLEAN = 360, 200, 0.25, 1.3, 3.0, 0.2
+_ALONG = 1e-6
+
+
+def placed_subgroup(group: PointGroup, name: str) -> PointGroup:
+    """The first subgroup called `name` of a group where it stands: on its axes and mirrors in their order.
+
+    Raises:
+        InputError: there is none.
+    """
+    wanted = point_group(name)
+    for frame in _frames(group):
+        candidate = PointGroup(name=wanted.name, frame=frame)
+        if is_subgroup(candidate, group):
+            return candidate
+    raise InputError(f"{wanted.name} is no subgroup of {group.name}, which the object has; name one of its subgroups")
+
+
+def _frames(group: PointGroup) -> Iterator[Array]:
+    """Frames on pairs of perpendicular directions that the group singles out, its own frame first."""
+    yield group.frame
+    axes = [u for u, _ in (*group.rotation_axes(), *group.improper_axes())]
+    directions = np.array([*axes, *group.mirrors(), *group.frame])
+    crosses = np.cross(directions[:, None], directions[None]).reshape(-1, 3)
+    every = np.concatenate([directions, unit(crosses[np.linalg.norm(crosses, axis=1) > _ALONG])])
+    for z in directions:
+        for x in every[np.abs(every @ z) < _ALONG]:
+            yield np.stack([x, np.cross(z, x), z])
+
+
+def finite_group(group: PointGroup, points: Array) -> PointGroup:
+    """The group itself, or a finite part of a continuous one: the fold of the rings, else `TURNS`; Ih for a sphere.
+
+    Args:
+        points: [N, 3] distinct points relative to the centre.
+    """
+    if group.is_finite:
+        return group
+    if group.symbol.family in ("K", "Kh"):
+        return group.sampled(1)
+    fold = _ring_fold(points, group.frame[2])
+    if fold:
+        group = PointGroup(name=group.name, frame=_on_rings(points, group.frame, fold))
+    else:
+        sectors = len(group.sampled(1).operations())
+        fold = min(TURNS, max(FEWEST_TURNS, len(points) // (SECTOR * sectors) // 2 * 2))
+    return group.sampled(fold)
+
+
+def _ring_fold(points: Array, axis: Array) -> int:
+    """Largest k for which turns by 2 pi / k about the axis map points on other points; 0 if there is none."""
+    off = points[np.linalg.norm(np.cross(points, axis), axis=1) > _ALONG * np.abs(points).max()]
+    if len(off) < 3:
+        return 0
+    tree = cKDTree(off)
+    near = NEAR * float(np.median(tree.query(off, k=2)[0][:, 1]))
+    index = np.arange(0, len(off), max(1, len(off) // PROBES))
+    misses = {}
+    for fold in range(3, min(LARGEST_FOLD, len(off)) + 1):
+        # One step tells a fold from few, many steps tell it from the next one.
+        steps = (1, next(m for m in range(round(0.382 * fold), 0, -1) if math.gcd(m, fold) == 1))
+        found = [tree.query(off[index] @ rotation(axis, 2.0 * math.pi * m / fold).T) for m in steps]
+        if all(np.mean(near_rows != index) > 0.5 for _, near_rows in found):
+            misses[fold] = max(float(np.median(distance)) for distance, _ in found)
+    best = min(misses.values(), default=math.inf)
+    limit = max(ALIKE * best, min(CLEAN * near, LAX * best)) + _ALONG * near
+    return max((fold for fold, miss in misses.items() if miss <= limit), default=0) if best < near else 0
+
+
+def _on_rings(points: Array, frame: Array, fold: int) -> Array:
+    """The frame turned about z so that mirrors of a k-fold group, pi / k apart, go through the points or between."""
+    x, y, _ = (points @ frame.T).T
+    phase = np.angle(np.hypot(x, y) @ np.exp(2j * fold * np.arctan2(y, x))) / (2.0 * fold)
+    return np.asarray(rotation([0.0, 0.0, 1.0], -float(phase)) @ frame)

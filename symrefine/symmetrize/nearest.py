@@ -1,0 +1,335 @@
+"""The nearest exactly symmetric shape: each point becomes the mean of what the group says about its place.
+
+For a point p and an operation g about the centre, the shape has a counterpart c(g p) to the image g p: the point that
+corresponds to it, or else the closest point of the surface. The mean over the group of g^-1 c(g p) is where p belongs
+(the least-squares answer where points correspond). This map of space commutes with the group, so that orbits stay
+orbits: what it makes of them is symmetric to rounding, not to a tolerance.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from symrefine.errors import DegenerateShapeError, InputError
+from symrefine.geometry import Array, read_only, tight_diagonal, unit
+from symrefine.groups import PointGroup
+from symrefine.shape import Index, Shape
+from symrefine.symmetrize.action import Action, act, generators
+from symrefine.symmetrize.finite import finite_group
+from symrefine.symmetrize.leftover import with_leftovers
+from symrefine.symmetrize.surface import Closest, closest_on
+
+# Up to so many points stand for themselves (atoms), as in `detect.FEW`.
+FEW = 250
+# Counterparts are looked for up to so many tolerances away. Where points are many they must miss by no more than so
+# much of the usual distance between points (RMS), and in a mesh some of whose vertices have none each by no more than
+# so much of the distance to the next vertex: chance finds a nearest vertex for everything.
+REACH, SPACED, OWN = 3.0, 0.5, 0.25
+# Times that counterparts are looked for, each about a better place, as long as that many have one.
+MATCHINGS, FEWEST = 4, 4
+# Rounds that fit the group's place to the points, and how many points that takes on a surface.
+ROUNDS, FITTED = 30, 2000
+_STILL = 1e-15
+# Copies of a point this near (of the diagonal) are one point.
+_SAME = 1e-9
+# No operation of any group fixes this direction: it marks the sector that is copied.
+_GENERIC = (0.8123, 0.2877, 0.5072)
+
+Method = Literal["vertices", "orbits", "surface"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Symmetrized:
+    """A shape made symmetric.
+
+    Attributes:
+        shape: the result, in the units of the input.
+        group: the finite group it has: a part of the continuous one where that was asked for.
+        center: [3] where the operations meet.
+        method: "vertices": each operation permutes the points, none is added or lost. "orbits": a cloud without such
+            counterparts; the points of one sector, moved onto the symmetric surface, and their copies. "surface": a
+            mesh some of whose vertices have no counterpart; vertices lie where the symmetric surface is, the triangles
+            between them are as they were.
+        paired: fraction of the points that have exact counterparts.
+        largest: largest distance a point was moved by, as a fraction of the diagonal.
+        rms: root mean square of it, as a fraction of the diagonal.
+        residual: by how much the result misses itself, as a fraction of the diagonal: distance of images to the
+            nearest point, or to the surface for "surface".
+        diagonal: of the smallest bounding box over all orientations, input units.
+    """
+
+    shape: Shape
+    group: PointGroup
+    center: Array
+    method: Method
+    paired: float
+    largest: float
+    rms: float
+    residual: float
+    diagonal: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", read_only(self.center))
+
+
+def symmetrize(
+    shape: Shape, group: PointGroup, center: Array, *, tolerance: float = 0.02, seed: int = 0
+) -> Symmetrized:
+    """The symmetric shape nearest to a shape that nearly has a group about a centre.
+
+    The group's place is fitted once more, so that what is symmetric already stays where it is.
+
+    Args:
+        shape: a mesh or cloud in 3-space; colours, texture and the like are not part of it.
+        group: where `detect` found it; the placement may be off by the tolerance.
+        center: [3] the point that the operations leave in place.
+        tolerance: by what fraction of the diagonal the shape may miss the symmetry.
+        seed: of the random samples of a surface.
+
+    Raises:
+        InputError: not a 3-D shape, or the trivial group.
+        DegenerateShapeError: a few points, of which some have no counterpart.
+    """
+    if shape.dim != 3:
+        raise InputError(f"{shape.source}: symmetrize takes 3-D shapes; these points have {shape.dim} coordinates")
+    if group.name == "C1":
+        raise InputError(f"{shape.source}: C1 has no operation but the identity: there is nothing to make symmetric")
+    diagonal = tight_diagonal(shape.points)
+    local = (shape.points - center) / diagonal
+    rows, back = _distinct(local, shape)
+    finite = finite_group(group, local[rows])
+    labels = None if shape.labels is None or shape.faces is not None else shape.labels[rows]
+    place, action = _counterparts(local[rows], finite, labels, REACH * tolerance)
+    work = _Work(shape=shape, points=local[rows], rows=rows, back=back, place=place, rng=np.random.default_rng(seed))
+    few = len(rows) <= FEW and shape.faces is None
+    if _corresponds(local[rows], action, few):
+        made = work.by_vertices(action)
+    elif few:
+        raise DegenerateShapeError(
+            f"{shape.source}: {int((~action.closed).sum())} of {len(rows)} points have no counterpart under "
+            f"{finite.name}; so few points stand for themselves, not for a surface: choose a subgroup (--group)"
+        )
+    else:
+        made = work.by_orbits() if shape.faces is None else work.by_surface(action)
+    moved = np.linalg.norm(made.moved, axis=1)
+    return Symmetrized(
+        shape=replace(made.shape, points=center + diagonal * made.shape.points),
+        group=made.group,
+        center=center + diagonal * made.center,
+        method=made.method,
+        paired=made.paired,
+        largest=float(moved.max()),
+        rms=float(np.sqrt(np.mean(moved**2))),
+        residual=made.residual,
+        diagonal=diagonal,
+    )
+
+
+def _corresponds(points: Array, action: Action, few: bool) -> bool:
+    """Whether every point has its counterparts, and not by chance."""
+    if few or not action.closed.all():
+        return bool(action.closed.all())
+    spacing = float(np.median(cKDTree(points).query(points, k=2)[0][:, 1]))
+    return float(np.sqrt(np.mean(action.miss**2))) <= SPACED * spacing
+
+
+def _distinct(local: Array, shape: Shape) -> tuple[Index, Index]:
+    """Rows of the distinct points (and labels), and which of them each point is."""
+    key = local
+    if shape.labels is not None and shape.faces is None:
+        key = np.column_stack([local, shape.labels])
+    _, rows, back = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    return rows, back.reshape(-1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Made:
+    """A result in units of the diagonal about the given centre; `moved` [N, 3] is by what each point moved."""
+
+    shape: Shape
+    group: PointGroup
+    center: Array
+    method: Method
+    paired: float
+    moved: Array
+    residual: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Place:
+    """Where the group stands: operations x -> center + g (x - center)."""
+
+    group: PointGroup
+    center: Array
+
+    def towards(self, points: Array, wanted: Array) -> tuple["_Place", float]:
+        """The place to which the best rigid motion from `points` to `wanted` [N, 3] belongs, and how far it turns."""
+        a, b = points.mean(axis=0), wanted.mean(axis=0)
+        u, _, vt = np.linalg.svd((wanted - b).T @ (points - a))
+        turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+        center = a + turn.T @ (self.center - b)
+        step = float(np.abs(turn - np.eye(3)).max() + np.abs(center - self.center).max())
+        return _Place(group=PointGroup(name=self.group.name, frame=self.group.frame @ turn), center=center), step
+
+
+def _counterparts(points: Array, group: PointGroup, labels: Index | None, reach: float) -> tuple[_Place, Action]:
+    """Counterparts about the place that those found so far point to, since a misplaced group pairs fewer points."""
+    place = _Place(group=group, center=np.zeros(3))
+    for _ in range(MATCHINGS):
+        operations = place.group.operations()
+        action = act(points - place.center, operations, labels, reach)
+        if action.closed.all() or action.closed.sum() < FEWEST:
+            break
+        wanted = place.center + action.mean(points - place.center, operations)
+        place, _ = place.towards(points[action.closed], wanted[action.closed])
+    return place, with_leftovers(points - place.center, place.group.operations(), action, labels, reach)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Work:
+    """What every method starts from: distinct points in units of the diagonal about the given centre."""
+
+    shape: Shape
+    points: Array
+    rows: Index
+    back: Index
+    place: _Place
+    rng: np.random.Generator
+
+    def by_vertices(self, action: Action) -> _Made:
+        """Points that correspond: means over orbits, about the place that moves them least."""
+        place = self.place
+        for _ in range(ROUNDS):
+            wanted = self._means(action, place)
+            nearer, step = place.towards(self.points, wanted)
+            if step < _STILL:
+                break
+            place = nearer
+        wanted = self._means(action, place)
+        made = replace(self._with_points(wanted[self.back]), weights=self._even_weights(action))
+        residual = _miss_of_points(wanted, place)
+        return self._made(
+            self._with_normals(made, action, place), place, "vertices", 1.0, wanted - self.points, residual
+        )
+
+    def by_orbits(self) -> _Made:
+        """A cloud of a surface: its points on the symmetric surface, of which one sector is copied to the others."""
+        closest = closest_on(self._with_points(self.points[self.back]), self.rng)
+        place = self._fitted(closest)
+        wanted = _on_symmetric_surface(self.points, place, closest)
+        rows = _sector(wanted - place.center, place.group)
+        copies = np.einsum("kij,nj->kni", place.group.operations(), wanted[rows] - place.center).reshape(-1, 3)
+        count = place.group.operations().shape[0]
+        keep = _once(copies, np.tile(self.rows[rows], count) if self.shape.labels is not None else None)
+        made = Shape(
+            points=place.center + copies[keep],
+            weights=None if self.shape.weights is None else np.tile(self.shape.weights[self.rows[rows]], count)[keep],
+            normals=self._copied_normals(rows, place, keep),
+            labels=None if self.shape.labels is None else np.tile(self.shape.labels[self.rows[rows]], count)[keep],
+            source=self.shape.source,
+        )
+        return self._made(made, place, "orbits", 0.0, wanted - self.points, _miss_of_points(made.points, place))
+
+    def by_surface(self, action: Action) -> _Made:
+        """A mesh: vertices with counterparts go to their means, the others onto the symmetric surface."""
+        closest = closest_on(self._with_points(self.points[self.back]), self.rng)
+        place = self._fitted(closest)
+        wanted = _on_symmetric_surface(self.points, place, closest)
+        own = action.miss < OWN * cKDTree(self.points).query(self.points, k=2)[0][:, 1]
+        paired = action.closed & own & own[action.images].all(axis=0)
+        wanted[paired] = self._means(action, place)[paired]
+        made = self._with_points(wanted[self.back])
+        residual = _miss_of_surface(wanted, place, closest_on(made, self.rng))
+        return self._made(made, place, "surface", float(paired[self.back].mean()), wanted - self.points, residual)
+
+    def _means(self, action: Action, place: _Place) -> Array:
+        return place.center + action.mean(self.points - place.center, place.group.operations())
+
+    def _fitted(self, closest: Closest) -> _Place:
+        """The group's place, fitted to where some of the points belong."""
+        place = self.place
+        some = self.points[:: max(1, len(self.points) // FITTED)]
+        for _ in range(4):
+            place, _ = place.towards(some, _on_symmetric_surface(some, place, closest))
+        return place
+
+    def _with_points(self, points: Array) -> Shape:
+        return replace(self.shape, points=points)
+
+    def _even_weights(self, action: Action) -> Array | None:
+        """Weights that are equal over each orbit, their sum kept; copies of one point share its mean."""
+        if self.shape.weights is None:
+            return None
+        mass = np.bincount(self.back, weights=self.shape.weights, minlength=len(self.rows))
+        even = np.mean([mass[image] for image in action.images], axis=0)
+        return np.asarray((even / np.bincount(self.back))[self.back])
+
+    def _with_normals(self, made: Shape, action: Action, place: _Place) -> Shape:
+        """Normals averaged like the points, each with the sign of the normal that it joins."""
+        if self.shape.normals is None:
+            return made
+        own, total = self.shape.normals[self.rows], np.zeros_like(self.points)
+        for g, image in zip(place.group.operations(), action.images, strict=True):
+            turned = own[image] @ g
+            total += turned * np.where(np.sum(turned * own, axis=1) < 0.0, -1.0, 1.0)[:, None]
+        return replace(made, normals=unit(total)[self.back])
+
+    def _copied_normals(self, rows: Index, place: _Place, keep: Index) -> Array | None:
+        if self.shape.normals is None:
+            return None
+        own = self.shape.normals[self.rows[rows]]
+        return np.asarray(np.einsum("kij,nj->kni", place.group.operations(), own).reshape(-1, 3)[keep])
+
+    def _made(self, shape: Shape, place: _Place, method: Method, paired: float, moved: Array, residual: float) -> _Made:
+        return _Made(
+            shape=shape,
+            group=place.group,
+            center=place.center,
+            method=method,
+            paired=paired,
+            moved=moved,
+            residual=residual,
+        )
+
+
+def _on_symmetric_surface(points: Array, place: _Place, closest: Closest) -> Array:
+    """Means [N, 3] over the group of g^-1 (closest point to g p): a map of space that commutes with the group."""
+    local, operations, total = points - place.center, place.group.operations(), np.zeros_like(points)
+    for g in operations:
+        total += (closest(place.center + local @ g.T) - place.center) @ g
+    return np.asarray(place.center + total / len(operations))
+
+
+def _sector(points: Array, group: PointGroup) -> Index:
+    """Rows of the points that are at least as near to a generic direction as to each of its images."""
+    generic = unit(_GENERIC) @ group.frame
+    images = group.operations() @ generic
+    return np.flatnonzero(points @ generic >= (points @ images.T).max(axis=1) - 1e-12)
+
+
+def _once(points: Array, owners: Index | None) -> Index:
+    """Rows of the points but for later copies of one place (of the same owner if owners are told apart)."""
+    pairs = cKDTree(points).query_pairs(_SAME, output_type="ndarray")
+    if owners is not None and len(pairs):
+        pairs = pairs[owners[pairs[:, 0]] == owners[pairs[:, 1]]]
+    keep = np.ones(len(points), dtype=bool)
+    keep[pairs.max(axis=1) if len(pairs) else pairs.ravel()] = False
+    return np.flatnonzero(keep)
+
+
+def _miss_of_points(points: Array, place: _Place) -> float:
+    """Largest distance of an image under a generator to the nearest point."""
+    local, operations = points - place.center, place.group.operations()
+    tree = cKDTree(local)
+    return max(float(tree.query(local @ operations[h].T)[0].max()) for h, _ in generators(operations))
+
+
+def _miss_of_surface(points: Array, place: _Place, closest: Closest) -> float:
+    """Largest distance of an image under a generator to the surface."""
+    operations, worst = place.group.operations(), 0.0
+    for h, _ in generators(operations):
+        images = place.center + (points - place.center) @ operations[h].T
+        worst = max(worst, float(np.linalg.norm(closest(images) - images, axis=1).max()))
+    return worst
