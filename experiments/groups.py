@@ -124,15 +124,12 @@ def is_mirror(group: PointGroup, normal: Array) -> bool:
 
 
 def cases(names: Sequence[str], seeds: int) -> list[Case]:
-    """Shapes at every noise, and siblings at two tolerances."""
-    found = []
-    for name in names:
-        for seed in range(seeds):
-            shape = Case(shape=name, seed=seed)
-            noisy = [replace(shape, noise_rel=noise) for noise in NOISES]
-            found += [replace(shape, form="mesh"), *noisy]
-            found += [replace(c, sibling=True, tolerance=t) for t in (TOLERANCE, STRICT) for c in noisy]
-    return found
+    """Shapes at every noise, then siblings at two tolerances."""
+    plain = [Case(shape=name, seed=seed) for name in names for seed in range(seeds)]
+    noisy = [replace(c, noise_rel=noise) for c in plain for noise in NOISES]
+    meshes = [replace(c, form="mesh") for c in plain]
+    siblings = [replace(c, sibling=True, tolerance=t) for t in (TOLERANCE, STRICT) for c in noisy]
+    return [*meshes, *noisy, *siblings]
 
 
 def label(case: Case) -> str:
