@@ -159,6 +159,7 @@ def test_contact_sheet_holds_every_tile_and_marks_the_wrong_one():
     for k in range(9):
         x, y = MARGIN + k % 8 * step_x, MARGIN + k // 8 * step_y
         assert abs(sheet[y + TILE_HEIGHT // 2, x + TILE_WIDTH // 2] - 128).max() < 4
+    assert contact_sheet(tiles[:2]) == contact_sheet(tiles[:2])
     red = (sheet[..., 0] > 140) & (sheet[..., 1] < 90) & (sheet[..., 2] < 90)
     assert not red[:step_y].any()
     assert red[step_y:, :step_x].any()
