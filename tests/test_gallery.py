@@ -272,3 +272,8 @@ def test_a_fetched_model_stands_upright_with_its_truth():
     assert thing.mesh.points[:, 2].max() == pytest.approx(3.0)
     reflected = thing.mesh.points @ householder(thing.normals[0])
     assert np.abs(reflected[:, None] - thing.mesh.points[None]).sum(axis=2).min(axis=1).max() < 1e-12
+
+
+def test_a_recording_of_a_run(tmp_path):
+    gallery.record(gallery.Case(name="tower", points=3000), tmp_path / "tower.rrd")
+    assert (tmp_path / "tower.rrd").read_bytes()[:3] == b"RRF"
