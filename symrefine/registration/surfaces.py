@@ -10,9 +10,9 @@ from symrefine.matching import LocalPlanes
 from symrefine.registration.polish import Similarity
 from symrefine.verify import disc_distances
 
-# Two surfaces agree at tolerance t if mean, 95th, 99th and 99.5th percentile of the miss stay below these multiples of t,
-# beyond what sampling explains. Looser than for one surface and its image, as two samplings and densities meet here; the
-# bounds by which `rivals` tells maps apart were measured with them.
+# Two surfaces agree at tolerance t if mean, 95th, 99th and 99.5th percentile of the miss stay below these multiples of
+# t, beyond what sampling explains. Looser than for one surface and its image, as two samplings and densities meet here;
+# the bounds by which `rivals` tells maps apart were measured with them.
 LIMITS = (0.28, 1.0, 1.4, 1.75)
 # Queries that settle what a surface shows against itself.
 FLOOR_QUERIES = 400
