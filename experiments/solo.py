@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.alignment import PRINTED, RANDOM
 from experiments.exhibits import FORMS, Exhibit, Pose, check_exhibit, exhibit, judge, observed, posed
 from symrefine.align import align
 from symrefine.detect import Detection, detect
@@ -21,13 +22,6 @@ from symrefine.shape import Shape
 
 Result = int | float | str | bool | None
 
-# eq. Rcups2, FHANDS and FRHANDS as printed, to four digits; the nearest orthogonal matrices are what is applied.
-PRINTED = {
-    "R": [[-0.3085, 0.2118, 0.9273], [0.8599, -0.3546, 0.3671], [0.4066, 0.9106, -0.0727]],
-    "F": [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]],
-    "R_F": [[-0.3085, 0.2118, 0.9273], [-0.8599, 0.3546, -0.3671], [0.4066, 0.9106, -0.0727]],
-}
-RANDOM = {"rotation": 1, "reflection": -1}
 PAIRS = ("same", "independent")
 
 
