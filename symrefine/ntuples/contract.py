@@ -7,12 +7,15 @@ section 2). `derive` finds the same space exactly; the tests compare the two.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from math import factorial, prod
 
 import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array, read_only
-from symrefine.moments import Moments, tensor_index
+from symrefine.moments import Moments, exponents
+from symrefine.shape import Index
 
 # The 3-D orders of the paper's experiments: 17 triplets from moments to order 5.
 PAPER_ORDERS: tuple[tuple[int, ...], ...] = ((3,), (5,), (2, 3), (2, 5), (4, 3), (4, 5))
@@ -24,7 +27,7 @@ class NTuples:
 
     Attributes:
         vectors: [T, n] tuples, each divided by a bound of it, so |v| <= 1: radial moments of the even orders around
-            each factor's, or where the moments end at an odd order, what they themselves say (`_Traces.bound`).
+            each factor's, or where the moments end at an odd order, what they themselves say (`_Program.bounds`).
         replicates: [B, T, n] jackknife replicates, each divided by a bound of its own; B = 0 where the moments are
             exact.
         labels: [T] orders and ranks each tuple was made from.
@@ -98,14 +101,13 @@ def ntuples(moments: Moments, orders: Sequence[Sequence[int]] = PAPER_ORDERS) ->
         InputError: an order the moments do not reach, or more than two factors.
     """
     _check(orders, moments.order)
+    program = _program(moments.dim, moments.order, tuple(tuple(term) for term in orders))
     stacked = np.concatenate([moments.values[None], moments.replicates])
-    traced = _Traces(stacked, moments.dim, moments.order)
-    vectors, labels = [], []
-    for label, vector in _contractions(traced, orders):
-        vectors.append(vector)
-        labels.append(label)
-    whole = np.stack(vectors, axis=1)
-    return NTuples(vectors=whole[0], replicates=whole[1:], labels=tuple(labels))
+    entries = stacked @ program.traces
+    products = program.factors * entries[:, program.left] * entries[:, program.right]
+    vectors = np.add.reduceat(products, program.starts, axis=1).reshape(len(stacked), -1, moments.dim)
+    vectors /= (program.bounds(entries)[:, program.degrees]).prod(axis=2)[:, :, None]
+    return NTuples(vectors=vectors[0], replicates=vectors[1:], labels=program.labels)
 
 
 def _check(orders: Sequence[Sequence[int]], reach: int) -> None:
@@ -116,53 +118,140 @@ def _check(orders: Sequence[Sequence[int]], reach: int) -> None:
             raise InputError(f"orders {tuple(term)}: the moments reach order {reach} only")
 
 
-class _Traces:
-    """Moment tensors [B, n^l] of each degree p, traced down to rank l; computed once each."""
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Program:
+    """All contractions as tables: a linear map to the entries of the traced tensors, then sums of products of two.
 
-    def __init__(self, values: Array, dim: int, order: int) -> None:
-        self.values, self.dim, self.order = values, dim, order
-        self._known: dict[tuple[int, int], Array] = {}
+    Of each symmetric tensor only the distinct entries occur, with how often they stand in it.
 
-    def __call__(self, degree: int, rank: int) -> Array:
-        """T_degree traced to `rank`, batched over the first index."""
-        key = (degree, rank)
-        if key not in self._known:
-            if rank == degree:
-                self._known[key] = self.values[:, tensor_index(self.dim, degree, self.order)]
-            else:
-                self._known[key] = np.trace(self(degree, rank + 2), axis1=-2, axis2=-1)
-        return self._known[key]
+    Attributes:
+        traces: [K, S] from the moments to the entries of T_p traced to rank l, for every (p, l) that is needed.
+        left: [M] one entry of each product.
+        right: [M] the other one; the mass 1 for a single factor.
+        factors: [M] how often it occurs.
+        starts: [T n] where the products of each component start.
+        labels: [T].
+        degrees: [T, 2] rows of `bounds` that each tuple is divided by.
+        even: for each degree, the two entries whose geometric mean bounds `int r^degree`, or None.
+        ends: for each degree, the entries of its traced tensors and how often they occur, where there is no such bound.
+        ratio: for each degree, itself over the even one below.
+    """
 
-    def bound(self, degree: int) -> Array:
-        """[B] at least the Frobenius norm of T_degree traced to any rank, which is at most `int r^degree`.
+    traces: Array
+    left: Index
+    right: Index
+    factors: Array
+    starts: Index
+    labels: tuple[str, ...]
+    degrees: Index
+    even: tuple[tuple[int, int | None], ...]
+    ends: tuple[tuple[tuple[Index, Array], ...], ...]
+    ratio: tuple[float, ...]
 
-        By Cauchy and Schwarz that integral is below the geometric mean of the even orders around. Without the upper one
-        no bound of it is known; then the bound is the largest of those norms, or `(int r^low)^(degree/low)`, which is
-        never above the integral (Jensen), if that is larger: objects whose odd moments vanish need a scale too.
+    def bounds(self, entries: Array) -> Array:
+        """For entries [B, S] and each degree: [B, D] at least the norm of T_degree traced to any rank.
+
+        That is at most `int r^degree`, by Cauchy and Schwarz below the geometric mean of the even orders around.
+        Without the upper one no bound of the integral is known; then the bound is the largest of those norms, or
+        `(int r^low)^(degree/low)`, which is never above the integral (Jensen), if that is larger: objects whose odd
+        moments vanish need a scale too.
         """
-        low, high = degree - degree % 2, degree + degree % 2
-        if high <= self.order:
-            return np.asarray(np.sqrt(self(low, 0) * self(high, 0)))
-        batch = len(self.values)
-        norms = [np.linalg.norm(self(degree, rank).reshape(batch, -1), axis=1) for rank in range(1, degree + 1, 2)]
-        return np.max([self(low, 0) ** (degree / max(low, 1)), *norms], axis=0)
+        columns = []
+        for (low, high), ends, ratio in zip(self.even, self.ends, self.ratio, strict=True):
+            if high is not None:
+                columns.append(np.sqrt(entries[:, low] * entries[:, high]))
+            else:
+                norms = [np.sqrt(entries[:, at] ** 2 @ often) for at, often in ends]
+                columns.append(np.max([entries[:, low] ** ratio, *norms], axis=0))
+        return np.stack(columns, axis=1)
 
 
-def _contractions(traced: _Traces, orders: Sequence[Sequence[int]]) -> Iterator[tuple[str, Array]]:
+class _Entries:
+    """Where the distinct entries of the traced tensors stand, and how each is made of the moments; filled on demand."""
+
+    def __init__(self, dim: int, order: int) -> None:
+        table = [tuple(e) for e in exponents(dim, order).tolist()]
+        self.dim, self.order, self.table = dim, order, table
+        self.of_degree = {d: [e for e in table if sum(e) == d] for d in range(order + 1)}
+        self.position = {e: i for i, e in enumerate(table)}
+        self.columns: list[Array] = []
+        self.places: dict[tuple[int, int], dict[tuple[int, ...], int]] = {}
+
+    def __call__(self, degree: int, rank: int) -> dict[tuple[int, ...], int]:
+        """Places of the entries of T_degree traced to `rank`, by their exponents."""
+        if (degree, rank) not in self.places:
+            self.places[degree, rank] = {}
+            for e in self.of_degree[rank]:
+                column = np.zeros(len(self.table))
+                for k in self.of_degree[(degree - rank) // 2]:
+                    column[self.position[tuple(a + 2 * b for a, b in zip(e, k, strict=True))]] += occurrences(k)
+                self.places[degree, rank][e] = len(self.columns)
+                self.columns.append(column)
+        return self.places[degree, rank]
+
+    def radial(self, degree: int) -> int:
+        """Place of `int r^degree`, an even degree."""
+        return self(degree, 0)[(0,) * self.dim]
+
+    def norms(self, degree: int) -> tuple[tuple[Index, Array], ...]:
+        """Places and occurrences of the entries of T_degree traced to each rank."""
+        every = [self(degree, rank) for rank in range(1, degree + 1, 2)]
+        return tuple((np.array(list(e.values())), np.array([occurrences(k) for k in e], float)) for e in every)
+
+
+def occurrences(exponent: tuple[int, ...]) -> int:
+    """How often an entry with these exponents stands in a symmetric tensor."""
+    return factorial(sum(exponent)) // prod(factorial(k) for k in exponent)
+
+
+@lru_cache(maxsize=32)
+def _program(dim: int, order: int, orders: tuple[tuple[int, ...], ...]) -> _Program:
+    """The tables for moments to `order` in n = `dim` dimensions."""
+    entries, used = _Entries(dim, order), sorted({p for term in orders for p in (*term, 0)})
+    left: list[int] = []
+    right: list[int] = []
+    factors: list[int] = []
+    starts: list[int] = []
+    labels: list[str] = []
+    degrees: list[tuple[int, int]] = []
+    for label, small, large, term in _contractions(entries, orders):
+        labels.append(label)
+        degrees.append((used.index(term[0]), used.index(term[1])))
+        for step in np.eye(dim, dtype=int).tolist():
+            starts.append(len(left))
+            for e, place in small.items():
+                left.append(place)
+                right.append(large[tuple(a + b for a, b in zip(e, step, strict=True))])
+                factors.append(occurrences(e))
+    low = [p - p % 2 for p in used]
+    high = [p + p % 2 for p in used]
+    return _Program(
+        even=tuple(
+            (entries.radial(a), entries.radial(b) if b <= order else None) for a, b in zip(low, high, strict=True)
+        ),
+        ends=tuple(() if b <= order else entries.norms(p) for p, b in zip(used, high, strict=True)),
+        ratio=tuple(p / max(a, 1) for p, a in zip(used, low, strict=True)),
+        traces=read_only(np.stack(entries.columns, axis=1)),
+        left=np.array(left),
+        right=np.array(right),
+        factors=np.array(factors, dtype=np.float64),
+        starts=np.array(starts),
+        labels=tuple(labels),
+        degrees=np.array(degrees),
+    )
+
+
+def _contractions(
+    entries: _Entries, orders: Sequence[Sequence[int]]
+) -> Iterator[tuple[str, dict[tuple[int, ...], int], dict[tuple[int, ...], int], tuple[int, int]]]:
+    """Label, the tensor of lower rank, the one whose free index is left, and the two degrees."""
     for term in orders:
         if len(term) == 1:
-            yield f"({term[0]})", traced(term[0], 1) / traced.bound(term[0])[:, None]
+            yield f"({term[0]})", entries(0, 0), entries(term[0], 1), (0, term[0])
             continue
         even, odd = sorted(term, key=lambda p: p % 2)
-        bound = (traced.bound(even) * traced.bound(odd))[:, None]
         for low in range(even, -1, -2):
             for high in (low - 1, low + 1):
                 if 1 <= high <= odd:
-                    yield f"({even}->{low},{odd}->{high})", _contract(traced(even, low), traced(odd, high)) / bound
-
-
-def _contract(a: Array, b: Array) -> Array:
-    """Contract all indices of the tensor of lower rank with the other: [B, n^l] x [B, n^(l+1)] -> [B, n]."""
-    small, large = sorted((a, b), key=lambda t: t.ndim)
-    batch, dim = large.shape[0], large.shape[-1]
-    return np.einsum("bi,bij->bj", small.reshape(batch, -1), large.reshape(batch, -1, dim))
+                    small, large = sorted((entries(even, low), entries(odd, high)), key=lambda e: sum(next(iter(e))))
+                    yield f"({even}->{low},{odd}->{high})", small, large, (even, odd)
