@@ -233,3 +233,5 @@ if __name__ == "__main__":
         sys.exit(main())
     except SymrefineError as error:
         sys.exit(f"reproduce: {error}")
+    except KeyboardInterrupt:
+        sys.exit("reproduce: interrupted; finished runs are kept, run it again")

@@ -466,6 +466,7 @@ def summary(how: str, *values: Any) -> Summary:
         ("mean", (), "-"),
         ("mean", (12345.6,), "12346"),
         ("mean", (19.96,), "19.96"),
+        ("max", (7740008392.25,), "7.74e+09"),
         ("", (0.5, 0.5), "0.5"),
         ("", (1, 3), "1 to 3"),
         ("", ("b", "a", "b"), "a, b"),
@@ -497,6 +498,7 @@ def test_expectations(text: str, fits: tuple[Any, ...], does_not: Any) -> None:
 
 def test_short_texts() -> None:
     assert [short(v) for v in (None, True, 0.1 + 0.2, 3.0, 1e-9, "x")] == ["-", "yes", "0.3", "3", "1e-09", "x"]
+    assert [short(v) for v in (1e300, float("inf"), 65536, 1234.5)] == ["1e+300", "inf", "65536", "1234"]
 
 
 def test_measures_name_their_place() -> None:

@@ -1,6 +1,5 @@
 """Many rows summed up in one figure: "max worst_deg", "tally right", or a column that all rows share."""
 
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -96,9 +95,9 @@ def short(value: Scalar | None) -> str:
         return "yes" if value else "no"
     if isinstance(value, str):
         return value
-    if not math.isfinite(value) or value == int(value) or abs(value) >= 1000:
+    if 1e3 <= abs(value) < 1e6 or (abs(value) < 1e12 and value == int(value)):
         return f"{value:.0f}"
-    return f"{value:.4g}" if abs(value) >= 10 else f"{value:.3g}"
+    return f"{value:.4g}" if 10 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
 def check_columns(measures: Sequence[Measure], rows: Sequence[Row]) -> None:
