@@ -39,7 +39,7 @@ def case_study_figure(trials: Sequence[Shown], path: Path) -> None:
         upper = figure.add_gridspec(2, 4, left=0.03, right=0.97, top=0.89, bottom=0.385, hspace=0.06, wspace=0.09)
         lower = figure.add_gridspec(1, 4, left=0.03, right=0.97, top=0.29, bottom=0.03, wspace=0.09)
         _heading(figure, 0.962, "Doublets point where the symmetry is", 17)
-        about = "All 41 doublets of the paper's ten vectors of moments, as arrows from the origin"
+        about = "All 56 doublets of the paper's ten vectors of moments, as arrows from the origin"
         figure.text(0.03, 0.936, f"{about}; dark: low orders, light: high orders.", color=SOFT)
         _heading(figure, 0.352, "The object without symmetry, one vector of moments at a time", 13)
         figure.text(0.03, 0.331, "The smaller the ratio, the farther the doublets are from one line.", color=SOFT)

@@ -13,7 +13,7 @@ from symrefine.groups import PointGroup2D
 from symrefine.moments import shape_moments
 from symrefine.ntuples.contract import NTuples
 from symrefine.planar.doublets import ORDER, DoubletClass, classify_doublets, planar_doublets
-from symrefine.planar.judge import PIXEL, LineDeviation
+from symrefine.planar.judge import LineDeviation
 from symrefine.planar.outline import Outlines, make_outlines
 from symrefine.planar.placed import Placed
 from symrefine.planar.search import Found, search, unclaimed
@@ -23,8 +23,9 @@ from symrefine.verify import TOLERANCE, confidence
 
 PARTS = 32
 NEAR = 8
-# What the outline misses itself by, in tolerances: beyond the first, pixels are too coarse for any decision; below the
-# second, samples are as good as exact; between, a near miss within so many times that of the limit may hold.
+# What the outline may be off by, in tolerances: beyond the first, pixels are too coarse for any decision, and samples
+# beyond 1; below the second, both are as good as exact; between, a near miss may hold: of pixels one that lies within
+# the limit, of samples one that exceeds it by no more than so many times that share.
 COARSE_PIXELS, QUIET, HIDDEN = 2.5, 0.25, 1.5
 
 
@@ -217,22 +218,17 @@ def _doubt(outlines: Outlines, found: Found, tolerance: float) -> str:
     """Why the points support no decision at this tolerance, or nothing if they do."""
     floor = max(j.floor.p95 for j in outlines.judges)
     share = floor / tolerance
-    if not outlines.sampled:
-        if share <= COARSE_PIXELS:
-            return ""
-        across = PIXEL[1] / (COARSE_PIXELS * tolerance)
+    more = "points or less noise" if outlines.sampled else "pixels"
+    if share > (1.0 if outlines.sampled else COARSE_PIXELS):
         return (
-            f"too few pixels: the diagonal of the object is shorter than {across:.0f} at a tolerance of {tolerance:.1%}"
-        )
-    if share > 1.0:
-        return (
-            f"the points do not even agree with one another: 5 % of them miss the rest by {floor:.1%} of the diagonal "
-            f"or more, against a tolerance of {tolerance:.1%}; give more points, less noise, or a larger tolerance"
+            f"the {'noise' if outlines.sampled else 'pixels'} could hide anything: 5 % of the outline may be off by "
+            f"{floor:.1%} of the diagonal or more, against a tolerance of {tolerance:.1%}; give more {more}, or a "
+            "larger tolerance"
         )
     nearest = min((c.verdict.excess for c in found.rejected), default=math.inf)
-    if share <= QUIET or nearest >= 1.0 + HIDDEN * share:
+    if share <= QUIET or nearest >= (1.0 + HIDDEN * share if outlines.sampled else 1.0):
         return ""
     return (
-        f"a near miss (by {nearest:.2f} times the limit) may be a symmetry: 5 % of the points miss the rest by "
-        f"{floor:.1%} of the diagonal or more, against a tolerance of {tolerance:.1%}; give more points or less noise"
+        f"a near miss (by {nearest:.2f} times the limit) may be a symmetry: 5 % of the outline may be off by "
+        f"{floor:.1%} of the diagonal or more, against a tolerance of {tolerance:.1%}; give more {more}"
     )

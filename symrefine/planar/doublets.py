@@ -11,7 +11,7 @@ from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.subspace import FLOOR, SIGNIFICANT, fixed_subspace
 from symrefine.verify import TOLERANCE
 
-# The ten vectors of moments of the paper, 41 doublets in all.
+# The ten vectors of moments of the paper, 56 doublets in all.
 PLANAR_ORDERS = ((2, 3), (2, 5), (4, 3), (4, 5), (6, 3), (6, 5), (6, 7), (6, 9), (8, 7), (8, 9))
 ORDER = 9
 DoubletKind = Literal["centre", "line", "none"]
