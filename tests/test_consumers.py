@@ -566,6 +566,8 @@ def test_the_transform_takes_the_file_to_the_canonical_model(tmp_path: Path) -> 
         ("--to isaac --out no/f", "there is no directory"),
         ("--to bop --out other", "is no models_info.json"),
         ("--to halcon --out f", "--to"),
+        ("--to canonical --out f.json", "cannot write .json"),
+        ("--to canonical --out f.npz --transform f.npz", "is the same file as that of --out"),
     ],
 )
 def test_what_cannot_be_exported_is_one_line(
@@ -579,6 +581,15 @@ def test_what_cannot_be_exported_is_one_line(
     assert words in err
     assert err.count("\n") == 1
     assert sorted(p.name for p in tmp_path.iterdir()) == ["other", "part.ply"]
+
+
+def test_a_model_is_not_written_over_itself(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = placed(tmp_path, prism(5), 1, "obj_000001.ply")
+    before = path.read_bytes()
+    assert invoke(["export", str(path), "--to", "megapose", "--out", str(tmp_path)]) == 2
+    assert "is the input itself" in capsys.readouterr().err
+    assert [p.name for p in tmp_path.iterdir()] == ["obj_000001.ply"]
+    assert path.read_bytes() == before
 
 
 def test_a_folder_of_models_becomes_one_models_info(

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from symrefine.cli.outputs import console, note, waiting, write_all
+from symrefine.cli.outputs import check_outputs, console, note, waiting, write_all
 from symrefine.cli.values import add_detection_options, count, natural, positive
 from symrefine.errors import InputError
 
@@ -66,6 +66,7 @@ def run(args: argparse.Namespace) -> int:
     with waiting("detecting"):
         shape, detection = detected(args)
         package = _package(args, shape, detection)
+        _check_files(args, package)
         with _folder(args):
             write_all({str(path): partial(_write, data=data) for path, data in package.files.items()})
     out = console()
@@ -96,19 +97,20 @@ def _check(args: argparse.Namespace) -> None:
         if getattr(args, option) is not None and option not in _OPTIONS[args.to]:
             users = ", ".join(name for name, options in _OPTIONS.items() if option in options)
             raise InputError(f"--{option}: does not apply to --to {args.to}; it is for {users}")
+    if args.to in _FOLDERS:
+        _check_folder(Path(args.out))
+        return
+    outputs = {"--out": args.out, "--transform": str(_transform(args)) if args.to == "canonical" else None}
+    check_outputs(outputs, [Path(args.path)])
+    _check_names(args)
+
+
+def _check_names(args: argparse.Namespace) -> None:
+    """Refuse files whose names do not fit what will be in them."""
     from symrefine.export.bop import read_models_info
-    from symrefine.export.files import check_target
     from symrefine.export.models import check_suffix
 
     out = Path(args.out)
-    if args.to in _FOLDERS:
-        _check_folder(out)
-        return
-    targets = [out, _transform(args)] if args.to == "canonical" else [out]
-    for target in targets:
-        check_target(target)
-        if target.resolve() == Path(args.path).resolve():
-            raise InputError(f"--out {target}: is the same file as the input; name another one")
     if args.to == "bop":
         read_models_info(out)
     elif args.to == "npz" and out.suffix.lower() != ".npz":
@@ -124,6 +126,17 @@ def _check_folder(out: Path) -> None:
         raise InputError(f"--out {out}: is a file; expected a folder")
     if not out.parent.is_dir():
         raise InputError(f"--out {out}: cannot be made: there is no directory {out.parent}")
+
+
+def _check_files(args: argparse.Namespace, package: "Package") -> None:
+    """Refuse to write over the input, or over what cannot be written."""
+    from symrefine.export.files import check_target
+
+    for path in package.files:
+        if path.resolve() == Path(args.path).resolve():
+            raise InputError(f"--out {args.out}: {path} is the input itself; name another folder")
+        if path.parent.is_dir():
+            check_target(path)
 
 
 def _transform(args: argparse.Namespace) -> Path:

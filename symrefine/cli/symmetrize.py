@@ -60,6 +60,8 @@ def run(args: argparse.Namespace) -> int:
         say(json_text(record))
     else:
         _print(record, list(writers))
+    if shape.labels is not None:
+        note("labels are not written")
     if not detection.group.is_finite and args.group is None:
         note(f"{detection.point_group} is continuous, no finite set of points has it: {made.group.name} was made exact")
     return 0

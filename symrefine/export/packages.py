@@ -110,5 +110,6 @@ def _model(path: Path, shape: Shape, pose: Canonical, scale: float) -> tuple[byt
             has_materials = suffix == ".obj" and b"\nmtllib" in b"\n" + kept
             return kept, ["materials and textures stay where they are: copy them beside the model"] * has_materials
     check_suffix(path, shape)
-    notes = [] if shape.faces is None else ["colours, textures and normals of the mesh are not carried over"]
+    lost = shape.faces is not None or shape.labels is not None
+    notes = ["colours, textures, labels and normals of meshes are not carried over"] if lost else []
     return model_bytes(path, pose.shape(shape, scale)), notes

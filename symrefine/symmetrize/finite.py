@@ -46,11 +46,12 @@ def _frames(group: PointGroup) -> Iterator[Array]:
             yield np.stack([x, np.cross(z, x), z])
 
 
-def finite_group(group: PointGroup, points: Array) -> PointGroup:
+def finite_group(group: PointGroup, points: Array, *, copied: bool) -> PointGroup:
     """The group itself, or a finite part of a continuous one: the fold of the rings, else `TURNS`; Ih for a sphere.
 
     Args:
         points: [N, 3] distinct points relative to the centre.
+        copied: one sector will be copied to all others, so that it should hold some points.
     """
     if group.is_finite:
         return group
@@ -61,7 +62,7 @@ def finite_group(group: PointGroup, points: Array) -> PointGroup:
         group = PointGroup(name=group.name, frame=_on_rings(points, group.frame, fold))
     else:
         sectors = len(group.sampled(1).operations())
-        fold = min(TURNS, max(FEWEST_TURNS, len(points) // (SECTOR * sectors) // 2 * 2))
+        fold = min(TURNS, max(FEWEST_TURNS, len(points) // (SECTOR * sectors) // 2 * 2)) if copied else TURNS
     return group.sampled(fold)
 
 

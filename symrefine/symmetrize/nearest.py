@@ -24,9 +24,9 @@ from symrefine.symmetrize.surface import Closest, closest_on
 # Up to so many points stand for themselves (atoms), as in `detect.FEW`.
 FEW = 250
 # Counterparts are looked for up to so many tolerances away. Where points are many they must miss by no more than so
-# much of the usual distance between points (RMS), and in a mesh some of whose vertices have none each by no more than
-# so much of the distance to the next vertex: chance finds a nearest vertex for everything.
-REACH, SPACED, OWN = 3.0, 0.5, 0.25
+# much of the usual distance between points (RMS, and the worst), and in a mesh some of whose vertices have none each by
+# no more than so much of the distance to the next vertex: chance finds a nearest vertex for everything.
+REACH, SPACED, WORST, OWN = 3.0, 0.5, 1.5, 0.25
 # Times that counterparts are looked for, each about a better place, as long as that many have one.
 MATCHINGS, FEWEST = 4, 4
 # Rounds that fit the group's place to the points, and how many points that takes on a surface.
@@ -99,7 +99,7 @@ def symmetrize(
     diagonal = tight_diagonal(shape.points)
     local = (shape.points - center) / diagonal
     rows, back = _distinct(local, shape)
-    finite = finite_group(group, local[rows])
+    finite = finite_group(group, local[rows], copied=shape.faces is None)
     labels = None if shape.labels is None or shape.faces is not None else shape.labels[rows]
     place, action = _counterparts(local[rows], finite, labels, REACH * tolerance)
     work = _Work(shape=shape, points=local[rows], rows=rows, back=back, place=place, rng=np.random.default_rng(seed))
@@ -132,7 +132,7 @@ def _corresponds(points: Array, action: Action, few: bool) -> bool:
     if few or not action.closed.all():
         return bool(action.closed.all())
     spacing = float(np.median(cKDTree(points).query(points, k=2)[0][:, 1]))
-    return float(np.sqrt(np.mean(action.miss**2))) <= SPACED * spacing
+    return bool(np.sqrt(np.mean(action.miss**2)) <= SPACED * spacing and action.miss.max() <= WORST * spacing)
 
 
 def _distinct(local: Array, shape: Shape) -> tuple[Index, Index]:
