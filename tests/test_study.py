@@ -2,6 +2,8 @@
 
 import csv
 import json
+import shutil
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -99,7 +101,7 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr(sys, "path", list(sys.path))
     for name in ("lab", "lab.toy"):
         monkeypatch.delitem(sys.modules, name, raising=False)
-    monkeypatch.setattr(runner, "code_version", lambda _: "test")
+    monkeypatch.setattr(runner, "code_version", lambda *_: "test")
     return tmp_path
 
 
@@ -220,6 +222,8 @@ def test_configs_that_are_wrong_are_refused(make: Make, old: str, new: str, mess
         ("title: Found", "title: Error", r"figures\[0\].title: names the file"),
         ("seed: 0}]", "seed: 9}]", r"toy.yaml:17: record\[0\]: picks no run of the sweep"),
         ("where: {noise: 0.01}", "where: {noise: x}", r"figures\[2\].where.noise: expected float, got 'x'"),
+        ("ours: {seed: 0}", "ours: {seed: 9}", r"toy.yaml:26: claims\[1\].ours: picks no run of the sweep"),
+        ("{shape: disc}", "{shape: disc, seed: 3}", r"toy.yaml:24: claims\[0\].peers.discs: picks no run of the sweep"),
         ("ours: {shape: square}", "ours: {shap: square}", r"toy.yaml:23: claims\[0\].ours.shap: lab.toy has no field"),
         ('">= 4"', '"=> 4"', r"toy.yaml:25: claims\[0\].expect: expected a comparison"),
         ("experiment: lab.toy", "experiment: lab.bare", "no `trace`"),
@@ -388,7 +392,7 @@ def test_an_interrupt_keeps_what_is_done(make: Make, lab: Path, monkeypatch: pyt
     with pytest.raises(KeyboardInterrupt):
         run_study(plan, lab / "out")
     monkeypatch.undo()
-    monkeypatch.setattr(runner, "code_version", lambda _: "test")
+    monkeypatch.setattr(runner, "code_version", lambda *_: "test")
     assert run_study(plan, lab / "out").resumed == 6
 
 
@@ -398,7 +402,7 @@ def test_rows_of_others_are_refused_or_dropped(make: Make, lab: Path, monkeypatc
     other = make(settings=("sweep.seed={range: 4}",))
     with pytest.raises(InputError, match=r"holds rows of another config .* --replace"):
         run_study(other, lab / "out")
-    monkeypatch.setattr(runner, "code_version", lambda _: "newer")
+    monkeypatch.setattr(runner, "code_version", lambda *_: "newer")
     with pytest.raises(InputError, match=r"holds rows of another code \(test, now newer\)"):
         run_study(make(), lab / "out")
     assert contents(lab / "out") == before
@@ -508,13 +512,45 @@ def test_measures_name_their_place() -> None:
 
 
 def test_code_version_knows_changes(tmp_path: Path) -> None:
-    module = tmp_path / "study.py"
-    module.write_text("x = 1\n")
-    first = versions.code_version(module)
-    assert versions.code_version(module) == first
-    module.write_text("x = 2\n")
-    assert versions.code_version(module) != first
+    (tmp_path / "package").mkdir()
+    for name, file in (("alone", "alone.py"), ("package.study", "package/beside.py")):
+        (tmp_path / file).write_text("x = 1\n")
+        first = versions.code_version(name, tmp_path)
+        assert versions.code_version(name, tmp_path) == first
+        (tmp_path / file).write_text("x = 2\n")
+        assert versions.code_version(name, tmp_path) != first
     assert set(versions.library_versions()) == {"numpy", "scipy", "casadi", "open3d"}
+
+
+def git(folder: Path, *arguments: str) -> str:
+    settings = ["-c", "user.name=x", "-c", "user.email=x@y", "-c", "commit.gpgsign=false"]
+    done = subprocess.run(["git", "-C", str(folder), *settings, *arguments], capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+@pytest.mark.skipif(shutil.which("git") is None, reason="needs git")
+def test_code_version_is_the_commit_with_a_mark_for_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for folder in ("symrefine/study", "experiments"):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "code.py").write_text("x = 1\n")
+    monkeypatch.setattr(versions, "_PACKAGE", tmp_path / "symrefine")
+    monkeypatch.setattr(versions, "__file__", str(tmp_path / "symrefine" / "study" / "code.py"))
+    assert versions.code_version("experiments.code", tmp_path).startswith("symrefine ")
+    git(tmp_path, "init", "--quiet")
+    assert versions.code_version("experiments.code", tmp_path).startswith("symrefine ")  # of a repository around it
+    git(tmp_path, "add", ".")
+    git(tmp_path, "commit", "--quiet", "-m", "all")
+    commit = git(tmp_path, "rev-parse", "--short=10", "HEAD")
+    assert versions.code_version("experiments.code", tmp_path) == commit
+    (tmp_path / "README.md").write_text("no code\n")
+    (tmp_path / "experiments" / "notes.txt").write_text("no code\n")
+    assert versions.code_version("experiments.code", tmp_path) == commit
+    seen = {commit}
+    for name in ("experiments/code.py", "experiments/new.py", "symrefine/study/code.py"):
+        (tmp_path / name).write_text("x = 2\n")
+        seen.add(versions.code_version("experiments.code", tmp_path))
+    assert len(seen) == 4
+    assert all(version == commit or version.startswith(f"{commit}+dirty.") for version in seen)
 
 
 def test_outcome_tells_how_much_is_new(make: Make, lab: Path) -> None:

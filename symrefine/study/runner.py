@@ -10,6 +10,7 @@ from typing import Any
 from symrefine.errors import InputError
 from symrefine.export.files import replacing
 from symrefine.study.claims import Verdict, check_claims, claims_table, judge, verdict_rows
+from symrefine.study.document import Node
 from symrefine.study.experiment import Row
 from symrefine.study.figures import check_figures, draw, wants_trace
 from symrefine.study.journal import Entry, Stamp, opened
@@ -99,9 +100,10 @@ def _check(plan: Plan) -> list[Measure]:
         raise study.record[0].error(f"{experiment.name} has no `record`")
     selections = [*study.record, *(table.where for table in study.tables), *(figure.where for figure in study.figures)]
     for where in selections:
-        picked = select(where, experiment)
-        if not plan.changed and not any(matches(asdict(case), picked) for case in plan.cases):
-            raise where.error("picks no run of the sweep")
+        _must_pick(where, plan)
+    for claim in study.claims:
+        for who in (claim.ours, *claim.peers.values()):
+            _must_pick(who, plan, claim.where)
     slugs = [_slug(figure.title) for figure in study.figures]
     for figure, slug in zip(study.figures, slugs, strict=True):
         if not slug or slugs.count(slug) > 1:
@@ -109,9 +111,16 @@ def _check(plan: Plan) -> list[Measure]:
     return [measure for some in measures for measure in some]
 
 
+def _must_pick(where: Node, plan: Plan, *common: Node) -> None:
+    """Refuse what picks no run, which is a slip of the pen; the command line may leave runs out on purpose."""
+    picks = [select(node, plan.experiment) for node in (where, *common)]
+    if not plan.changed and not any(all(matches(asdict(case), p) for p in picks) for case in plan.cases):
+        raise where.error("picks no run of the sweep")
+
+
 def _stamp(plan: Plan) -> Stamp:
-    module = (plan.experiment.root / Path(*plan.experiment.name.split("."))).with_suffix(".py")
-    return Stamp(config=plan.config_hash, code=code_version(module), libraries=library_versions())
+    code = code_version(plan.experiment.name, plan.experiment.root)
+    return Stamp(config=plan.config_hash, code=code, libraries=library_versions())
 
 
 def _make(folder: Path) -> None:

@@ -25,24 +25,27 @@ def _installed(names: tuple[str, ...]) -> str:
     return "-"
 
 
-def code_version(experiment: Path) -> str:
+def code_version(experiment: str, root: Path) -> str:
     """The git commit of the package; outside of git the package's version.
 
-    Where the Python files of the package or beside the experiment differ from the commit, `+dirty.` and a hash of
+    Where the Python files of the package or around the experiment differ from the commit, `+dirty.` and a hash of
     their contents follow, so that two different states never carry the same name.
 
     Args:
-        experiment: file of the experiment's module.
+        experiment: name of the module.
+        root: directory that the name counts from.
     """
-    folders = sorted({_PACKAGE, experiment.resolve().parent})
-    commit = _git("rev-parse", "--short=10", "HEAD")
+    top = (root / experiment.split(".")[0]).resolve()
+    files = [*_PACKAGE.rglob("*.py"), *(top.rglob("*.py") if top.is_dir() else root.resolve().glob("*.py"))]
+    # A package that is installed inside of somebody's repository is no part of it.
+    commit = _git("rev-parse", "--short=10", "HEAD") if _git("ls-files", "--error-unmatch", __file__) else None
     if commit is None:
-        return f"symrefine {version('symrefine')}+{_digest(folders)}"
-    changes = _git("status", "--porcelain", "--untracked-files=all", "--", *map(str, folders))
-    if changes is None:  # the experiment stands outside of the package's repository
-        return f"{commit}+{_digest(folders)}"
+        return f"symrefine {version('symrefine')}+{_digest(files)}"
+    changes = _git("status", "--porcelain", "--untracked-files=all", "--", str(_PACKAGE), str(top))
+    if changes is None or not top.is_dir():  # the experiment stands outside of the package's repository
+        return f"{commit}+{_digest(files)}"
     dirty = any(line.rstrip('"').endswith(".py") for line in changes.splitlines())
-    return f"{commit}+dirty.{_digest(folders)}" if dirty else commit
+    return f"{commit}+dirty.{_digest(files)}" if dirty else commit
 
 
 def _git(*arguments: str) -> str | None:
@@ -55,9 +58,8 @@ def _git(*arguments: str) -> str | None:
     return done.stdout.strip()
 
 
-def _digest(folders: list[Path]) -> str:
+def _digest(files: list[Path]) -> str:
     digest = hashlib.sha256()
-    for folder in folders:
-        for path in sorted(folder.rglob("*.py")):
-            digest.update(f"{path.relative_to(folder.parent)}\n".encode() + path.read_bytes())
+    for path in sorted(files):
+        digest.update(f"{path.parent.name}/{path.name}\n".encode() + path.read_bytes())
     return digest.hexdigest()[:8]
