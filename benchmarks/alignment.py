@@ -1,247 +1,108 @@
-"""Alignment: what the paper recovers, and more; Open3D beside us in the same run: `python -m benchmarks.alignment`.
+"""Alignment beside Open3D in the same run, and what n-tuples cost beside the moments: `python -m benchmarks.alignment`.
 
-Chiral objects of `../shared/objects` (not part of the product; whatever is not there is left out). A sample is 10,000
-independent points of the surface, drawn anew for source and target, which stands in a random pose with a shift. Errors
-are angles in degrees, modulo the rotations that map the object onto itself. `--seeds N` pairs for each object.
+Chiral objects of `../shared/objects` (not part of the product; whatever is not there is left out), 10,000 independent
+points of source and target, rotations and reflections. Processor time over all threads, which other load changes
+little; the least of three runs of each method, of Open3D too. `experiments.alignment` has the figures of accuracy.
 """
 
 import argparse
 import time
-from collections.abc import Callable, Iterator
-from functools import cache
-from pathlib import Path
-from typing import TypeVar
+from collections.abc import Callable, Iterator, Sequence
+from itertools import product
 
 import numpy as np
 
 from benchmarks.metric import Metric
-from symrefine.align import align
-from symrefine.detect import detect
-from symrefine.geometry import Array, random_orthogonal
-from symrefine.groups.orthogonal import nearest_orthogonal
-from symrefine.load import load
-from symrefine.quadrature import triangle_areas_and_normals
-from symrefine.shape import Shape
+from experiments.alignment import CHIRAL, RANDOM, Case, error_deg, estimator, given, mesh, present, sample
+from symrefine.align import Alignment
+from symrefine.moments import central_moments
+from symrefine.ntuples.contract import ntuples
 
-OBJECTS = Path(__file__).parents[2] / "shared" / "objects"
-CHIRAL = (
-    "drill_cordless",
-    "shark",
-    "panther",
-    "magnolia",
-    "teddy",
-    "propeller_bebop",
-    "propeller_cessna",
-    "quadknot",
-)
-POINTS = 10000
-# eq. Rcups2 and eq. FRHANDS as printed, to four digits; the nearest orthogonal matrices are what is applied.
-R_CUPS = [[-0.3085, 0.2118, 0.9273], [0.8599, -0.3546, 0.3671], [0.4066, 0.9106, -0.0727]]
-F = np.diag([1.0, -1.0, 1.0])
-R_F = [[-0.3085, 0.2118, 0.9273], [-0.8599, 0.3546, -0.3671], [0.4066, 0.9106, -0.0727]]
-# Voxel of Open3D's feature matching, as a fraction of the diagonal: of 5, 3 and 2 % the first at which it finds
-# (nearly) every rotation: 24 of 24 and 15 of 16 in two runs, against 4 of 8 at 5 % and 7 of 8 at 3 %.
-VOXEL = 0.02
-RIGHT_DEG = 5.0
-Result = TypeVar("Result")
+REPEATS = 3
+METHODS = ("align", "moments", "tuples", "open3d")
+# Every vector of moments to order 8 that has an n-tuple: single odd orders, and an even one with an odd one.
+ALL_ORDERS = [(p,) for p in (3, 5, 7)] + list(product((2, 4, 6, 8), (3, 5, 7)))
 
 
-@cache
-def mesh(name: str) -> Shape:
-    """The mesh of an object."""
-    return load(OBJECTS / f"{name}.ply")
+def best_of(work: Callable[[], object], repeats: int = REPEATS) -> float:
+    """Least processor time of several runs."""
+    times = []
+    for _ in range(repeats):
+        start = time.process_time()
+        work()
+        times.append(time.process_time() - start)
+    return min(times)
 
 
-@cache
-def rotations(name: str) -> Array:
-    """The rotations [k, 3, 3] that map the mesh onto itself."""
-    return detect(mesh(name)).group.proper_subgroup().operations()
+def rows(names: Sequence[str], seeds: int) -> Iterator[tuple[str, str, str, float, bool, float]]:
+    """Name, motion, method, error in degrees, whether the determinant is right, seconds."""
+    for name, motion, seed, method in product(names, RANDOM, range(seeds), METHODS):
+        case = Case(name=name, motion=motion, method=method, seed=seed)
+        pair = given(case)
+        work = estimator(case, pair)
+        found = work()
+        matrix = found.matrix if isinstance(found, Alignment) else found
+        error, det = error_deg(name, matrix, pair.truth), np.linalg.det(matrix) * np.linalg.det(pair.truth) > 0
+        yield name, motion, method, error, bool(det), best_of(work)
 
 
-def sample(shape: Shape, count: int, rng: np.random.Generator, noise_rel: float = 0.0) -> Array:
-    """Independent uniform points of the surface, with noise of `noise_rel` diagonals."""
-    areas, _ = triangle_areas_and_normals(shape.points, shape.faces)
-    face = rng.choice(len(areas), count, p=areas / areas.sum())
-    root, r = np.sqrt(rng.random(count)), rng.random(count)
-    weights = np.stack([1.0 - root, root * (1.0 - r), root * r], axis=1)
-    points = np.einsum("ik,ikd->id", weights, shape.points[shape.faces[face]])
-    return points + rng.normal(scale=noise_rel * shape.diagonal, size=points.shape)
-
-
-def angle_deg(a: Array, b: Array) -> float:
-    """Angle between two orthogonal matrices; 180 where the determinants differ."""
-    if np.linalg.det(a) * np.linalg.det(b) < 0:
-        return 180.0
-    return float(np.degrees(2.0 * np.arcsin(min(1.0, np.linalg.norm(a - b) / np.sqrt(8.0)))))
-
-
-def error_deg(name: str, found: Array, truth: Array) -> float:
-    """Angle to the nearest matrix that explains the pair exactly."""
-    return min(angle_deg(found, truth @ g) for g in rotations(name))
-
-
-def timed(work: Callable[[], Result]) -> tuple[Result, float, float]:
-    """Result, wall-clock seconds, and processor seconds over all threads, which other load does not change."""
-    time.sleep(0.2)  # let the threads of the last pool come to rest
-    wall, processor = time.perf_counter(), time.process_time()
-    result = work()
-    return result, time.perf_counter() - wall, time.process_time() - processor
-
-
-def exact() -> None:
-    """(a) The matrices of the paper, on the same points."""
-    print("(a) same points, another pose: largest error of a matrix entry")
-    cases = [("mug_vedo", "R", R_CUPS), ("drill_cordless", "F", F), ("drill_cordless", "R_F", R_F)]
-    for name, label, printed in cases:
-        truth = nearest_orthogonal(np.array([printed]))[0]
-        points = sample(mesh(name), POINTS, np.random.default_rng(0))
-        turned = Shape(points=mesh(name).points @ truth.T, faces=mesh(name).faces, measure="surface")
-        clouds, meshes = align(points, points @ truth.T), align(mesh(name), turned)
-        errors = [float(np.abs(found.matrix - truth).max()) for found in (clouds, meshes)]
-        print(f"    {name:18s} {label:4s} clouds {errors[0]:.1e}   meshes {errors[1]:.1e}")
-
-
-def pairs(name: str, seeds: int, noise_rel: float = 0.0) -> Iterator[tuple[Array, Array, Array]]:
-    """Source, target and the map between them, det +1 and -1 in turn."""
-    for seed in range(seeds):
-        rng = np.random.default_rng([seed, CHIRAL.index(name)])
-        truth = random_orthogonal(rng, det=1 if seed % 2 else -1)
-        source, target = (sample(mesh(name), POINTS, rng, noise_rel) for _ in range(2))
-        yield source, target @ truth.T + rng.uniform(-5, 5, 3) * mesh(name).diagonal, truth
-
-
-def independent(seeds: int) -> Iterator[Metric]:
-    """(b) Independent samples of either determinant, with the polish and without."""
-    print(
-        "\n(b) independent samples: error in degrees, median and worst of all pairs; determinants right; processor ms"
-    )
-    every: list[float] = []
-    for name in present():
-        rows = []
-        for source, target, truth in pairs(name, seeds):
-            full, _, seconds = timed(lambda s=source, t=target: align(s, t))
-            quick, _, seconds_quick = timed(lambda s=source, t=target: align(s, t, polish=False))
-            errors = [error_deg(name, found.matrix, truth) for found in (full, quick)]
-            rows.append((*errors, full.determinant == np.sign(np.linalg.det(truth)), seconds, seconds_quick))
-        full_deg, quick_deg, right, seconds, seconds_quick = (np.array(column) for column in zip(*rows, strict=True))
-        every += list(full_deg)
+def beside_open3d(seeds: int) -> Iterator[Metric]:
+    """Accuracy and time, pair by pair."""
+    table = list(rows(present(CHIRAL), seeds))
+    print("independent samples of 10,000 points: degrees (median, worst), determinants right, processor ms (median)")
+    for motion, method in product(RANDOM, METHODS):
+        error, det, seconds = _columns(table, motion, method)
+        theirs = _columns(table, motion, "open3d")[2]
         print(
-            f"    {name:18s} polished {np.median(full_deg):6.3f} {full_deg.max():6.3f}   moments alone "
-            f"{np.median(quick_deg):6.3f} {quick_deg.max():6.3f}   det {right.mean():4.0%}   "
-            f"{1e3 * np.median(seconds):5.0f} {1e3 * np.median(seconds_quick):5.0f} ms"
+            f"    {motion:10s} {method:7s} {np.median(error):7.3f} {error.max():7.3f}  {int(det.sum()):3d}/{len(det)}  "
+            f"{1e3 * np.median(seconds):7.1f} ms  {np.median(theirs / seconds):6.1f} times as fast as Open3D"
         )
-    yield Metric(key="align independent samples, worst", value=max(every), unit="degrees", target=0.5)
-
-
-def noise(seeds: int) -> None:
-    """(c) Noise: the mean squared error of the matrix entries, as in the paper (1e-2 there)."""
-    print("\n(c) noise on both sides: mean squared error of the matrix entries, mean over pairs; paper: 1e-2")
-    for level in (0.005, 0.01, 0.02):
-        for name in [n for n in ("drill_cordless", "shark", "teddy") if n in present()]:
-            errors = [
-                min(float(np.mean((align(s, t).matrix - truth @ g) ** 2)) for g in rotations(name))
-                for s, t, truth in pairs(name, seeds, level)
-            ]
-            print(f"    {name:18s} {level:5.1%} of the diagonal   {np.mean(errors):.1e}   worst {max(errors):.1e}")
-
-
-def forms(seeds: int) -> None:
-    """(d) A mesh against a cloud, and a cloud of a third of the points."""
-    print("\n(d) mesh against cloud: error in degrees, median and worst; cloud of 10,000 and of 3,000 points")
-    for name in present():
-        rows = []
-        for _, target, truth in pairs(name, seeds):
-            rows.append([error_deg(name, align(mesh(name), t).matrix, truth) for t in (target, target[:3000])])
-        median, worst = np.median(rows, axis=0), np.max(rows, axis=0)
-        print(f"    {name:18s} {median[0]:6.3f} {worst[0]:6.3f}   {median[1]:6.3f} {worst[1]:6.3f}")
-
-
-def open3d_align(source: Array, target: Array, voxel: float) -> Array:
-    """FPFH features, RANSAC, point-to-plane ICP, with the parameters of Open3D's own tutorial."""
-    import open3d as o3d
-
-    registration, search = o3d.pipelines.registration, o3d.geometry.KDTreeSearchParamHybrid
-
-    def prepared(points: Array) -> tuple[o3d.geometry.PointCloud, o3d.geometry.PointCloud, object]:
-        cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-        coarse = cloud.voxel_down_sample(voxel)
-        coarse.estimate_normals(search(radius=2 * voxel, max_nn=30))
-        return cloud, coarse, registration.compute_fpfh_feature(coarse, search(radius=5 * voxel, max_nn=100))
-
-    a, coarse_a, features_a = prepared(source)
-    b, coarse_b, features_b = prepared(target)
-    checks = [
-        registration.CorrespondenceCheckerBasedOnEdgeLength(0.9),
-        registration.CorrespondenceCheckerBasedOnDistance(1.5 * voxel),
-    ]
-    found = registration.registration_ransac_based_on_feature_matching(
-        coarse_a, coarse_b, features_a, features_b, True, 1.5 * voxel,
-        registration.TransformationEstimationPointToPoint(False), 3, checks,
-        registration.RANSACConvergenceCriteria(100000, 0.999),
-    )  # fmt: skip
-    b.estimate_normals(search(radius=2 * voxel, max_nn=30))
-    plane = registration.TransformationEstimationPointToPlane()
-    return registration.registration_icp(a, b, 0.4 * voxel, found.transformation, plane).transformation[:3, :3]
-
-
-def peers(seeds: int) -> Iterator[Metric]:
-    """(e) Open3D beside us, pair by pair."""
-    import ctypes
-
-    import libusb_package
-
-    ctypes.CDLL(str(libusb_package.get_library_path()))
-    print(f"\n(e) beside Open3D (FPFH, RANSAC, ICP; voxel {VOXEL:.0%} of the diagonal): right to {RIGHT_DEG:g} degrees")
-    rows = []
-    for name in present():
-        voxel = VOXEL * mesh(name).diagonal
-        for source, target, truth in pairs(name, seeds):
-            full, *seconds = timed(lambda s=source, t=target: align(s, t).matrix)
-            quick, *seconds_quick = timed(lambda s=source, t=target: align(s, t, polish=False).matrix)
-            theirs, *seconds_theirs = timed(lambda s=source, t=target, v=voxel: open3d_align(s, t, v))
-            right = [error_deg(name, m, truth) < RIGHT_DEG for m in (full, quick, theirs)]
-            rows.append((np.linalg.det(truth) > 0, *right, *seconds, *seconds_quick, *seconds_theirs))
-    table = np.array(rows, dtype=float)
-    for label, of_kind in (("rotations", table[:, 0] == 1), ("reflections", table[:, 0] == 0)):
-        ours, quick, theirs = table[of_kind, 1:4].sum(axis=0).astype(int)
-        count = int(of_kind.sum())
-        print(f"    {label:12s} right: align {ours}/{count}   moments alone {quick}/{count}   Open3D {theirs}/{count}")
-    kinds = ("wall-clock", "processor")
-    for k, label in enumerate(kinds):
-        ours, quick, theirs = table[:, [4 + k, 6 + k, 8 + k]].T
-        print(
-            f"    {label} seconds, median: align {np.median(ours):.3f}   moments alone {np.median(quick):.3f}   Open3D "
-            f"{np.median(theirs):.3f}: {np.median(theirs / ours):.1f} and {np.median(theirs / quick):.1f} times as long"
-        )
-    ratio = float(np.median(table[:, 5] / table[:, 9]))
+    error, _, seconds = _columns(table, None, "align")
+    theirs = _columns(table, None, "open3d")[2]
+    print(f"    all pairs: align {np.median(theirs / seconds):.1f} times as fast as Open3D in the median")
+    yield Metric(key="align independent samples, worst", value=float(error.max()), unit="degrees", target=0.5)
+    ratio = float(np.median(seconds / theirs))
     yield Metric(key="align over Open3D, processor time", value=ratio, unit="ratio", target=0.1)
 
 
-def present() -> list[str]:
-    """The chiral objects that are there."""
-    return [name for name in CHIRAL if (OBJECTS / f"{name}.ply").exists()]
+def _columns(
+    table: Sequence[tuple[str, str, str, float, bool, float]], motion: str | None, method: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    chosen = [row for row in table if motion in (None, row[1]) and row[2] == method]
+    return tuple(np.array(column) for column in list(zip(*chosen, strict=True))[3:])
 
 
-def metrics(seeds: int = 2) -> Iterator[Metric]:
-    """The two figures that are compared with stored ones."""
-    if present():
-        yield from independent(seeds)
-        yield from peers(seeds)
+def evaluation() -> Iterator[Metric]:
+    """All n-tuples that moments to order 8 offer, beside the moments of 20,000 points, with noise and covariance."""
+    cloud = sample(mesh("asymmetric"), 20000, np.random.default_rng(0))
+    ones = np.ones(len(cloud))
+    print(f"\n20,000 points, moments to order 8, {len(ALL_ORDERS)} vectors of moments")
+    for parts in (0, 16):
+        moments = central_moments(cloud, ones, 8, parts=parts)
+        count = len(ntuples(moments, ALL_ORDERS).labels)
+        first = best_of(lambda p=parts: central_moments(cloud, ones, 8, parts=p), 20)
+        second = best_of(lambda m=moments: ntuples(m, ALL_ORDERS), 20)
+        third = best_of(lambda m=moments: ntuples(m, ALL_ORDERS).covariance, 20)
+        print(
+            f"    {parts:2d} replicates: moments {1e3 * first:.2f} ms, {count} n-tuples {1e3 * second:.3f} ms "
+            f"({first / second:.0f} times cheaper), with covariance {1e3 * third:.3f} ms"
+        )
+        if not parts:
+            yield Metric(key="n-tuples over their moments", value=second / first, unit="ratio", target=0.1)
+
+
+def metrics(seeds: int = 1) -> Iterator[Metric]:
+    """The figures that are compared with stored ones."""
+    yield from evaluation()
+    if present(CHIRAL):
+        yield from beside_open3d(seeds)
 
 
 def main() -> None:
     """Print every figure."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=6)
-    options = parser.parse_args()
-    if not present():
-        print(f"{OBJECTS} is not there: nothing to measure")
-        return
-    exact()
-    list(independent(options.seeds))
-    noise(options.seeds)
-    forms(options.seeds)
-    list(peers(options.seeds))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=2, help="pairs of each object and determinant")
+    list(metrics(parser.parse_args().seeds))
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from benchmarks import detection
+from benchmarks import alignment, detection
 from benchmarks.metric import regressions, report, store
 
 
@@ -13,7 +13,7 @@ def main() -> int:
     parser.add_argument("--store", action="store_true", help="keep these figures for later comparisons")
     parser.add_argument("--gate", action="store_true", help="fail where a figure is worse than the stored one")
     options = parser.parse_args()
-    found = list(detection.metrics())
+    found = [*detection.metrics(), *alignment.metrics()]
     report(found)
     if options.store:
         store(found)
