@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from experiments.shapes import asymmetric, bottle, box, join, mug, sample, table
 from symrefine.align import Alignment, align
 from symrefine.errors import DegenerateShapeError, InputError
-from symrefine.geometry import Array, householder, random_orthogonal, rotation
+from symrefine.geometry import Array, householder, line_angle_rad, random_orthogonal, rotation
 from symrefine.groups.orthogonal import chord_angles
 from symrefine.harmonics import evaluate
 from symrefine.moments import central_moments
@@ -28,7 +28,9 @@ from symrefine.registration.harmonic_fit import (
     preference,
 )
 from symrefine.registration.moment_fit import moment_fit
+from symrefine.registration.polish import Similarity, polish, probes
 from symrefine.registration.procrustes import procrustes
+from symrefine.registration.skin import skin
 from symrefine.shape import Shape
 
 DETERMINANTS = (1, -1)
@@ -452,6 +454,45 @@ def test_the_moments_prefer_the_right_hand_only_of_chiral_objects() -> None:
         )
         mirror = fit(pair, np.stack([householder(n) for n in np.eye(3)])).matrices[0]
         assert (preference(pair, fit(pair, np.eye(3)[None]).matrices[0], mirror) > 5.0) is chiral
+
+
+def sheet(count: int, noise: float, rng: np.random.Generator) -> Array:
+    """Points of the plane x + y + z = 1."""
+    points = rng.uniform(-1, 1, (count, 3))
+    points -= (points.sum(axis=1)[:, None] - 1.0) / 3.0
+    return points + noise * rng.standard_normal(points.shape)
+
+
+# With noise: some 24 neighbours 0.06 wide give a normal to 0.01 / (0.06 sqrt(24) / 2), a plane to 0.01 / sqrt(24); twice that.
+@pytest.mark.parametrize(("noise", "normal_deg", "offset"), [(0.0, 1e-6, 1e-12), (0.01, 8.0, 0.006)])
+def test_planes_are_found_where_they_are_asked_for(noise: float, normal_deg: float, offset: float) -> None:
+    rng = rng_of(42)
+    surface = skin(sheet(20000, noise, rng), None, rng, exact=False)
+    assert surface.is_noisy == (noise > 0.0)
+    queries = sheet(50, 0.02, rng) * 0.5 + 1.0 / 6.0
+    planes = surface.near(queries)
+    angles = [np.degrees(line_angle_rad(n, [1, 1, 1])) for n in planes.normals]
+    assert np.quantile(angles, 0.9) < normal_deg
+    assert np.quantile(np.abs(planes.points.sum(axis=1) - 1.0) / np.sqrt(3.0), 0.9) <= offset
+    assert (planes.flatness < 0.3).all()
+    moved = probes(surface, 200, rng)
+    assert np.sqrt(np.mean((moved.points.sum(axis=1) - 1.0) ** 2) / 3.0) <= max(offset, noise / 2.0)
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+@pytest.mark.parametrize("scale", [None, 1.05])
+def test_the_polish_comes_back_from_where_the_moments_leave_it(det: int, scale: float | None) -> None:
+    rng = rng_of(43)
+    body, matrix = sample(asymmetric(), 20000, 0.0, rng), random_orthogonal(rng, det=det)
+    body = (body - body.mean(axis=0)) / np.sqrt(((body - body.mean(axis=0)) ** 2).sum(axis=1).mean())
+    source = skin(body[:10000], None, rng, exact=False)
+    target = skin((scale or 1.0) * body[10000:] @ matrix.T + [0.01, 0.0, -0.02], None, rng, exact=False)
+    start = Similarity(matrix=rotation([1, 2, 3], 0.03) @ matrix, shift=np.zeros(3))
+    found = polish(probes(source, 600, rng), target, start, error=0.1, known=np.zeros((6, 6)), scale=scale is not None)
+    assert found.converged
+    assert angle_deg(found.motion.matrix, matrix) < 0.1
+    np.testing.assert_allclose(found.motion.shift, [0.01, 0.0, -0.02], atol=2e-3)
+    assert found.motion.scale == pytest.approx(scale or 1.0, abs=2e-3)
 
 
 def test_moments_in_the_plane_agree_with_procrustes() -> None:

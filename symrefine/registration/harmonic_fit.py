@@ -31,6 +31,8 @@ APART_RAD = 0.35
 FLOOR = 1e-8
 # Added to the strength of a row of coefficients before it is divided by it: weak rows are noise.
 WEAK = 1e-3
+# Entries of a generator below this are rounding; those that are not are 1 at least.
+NOTHING = 1e-9
 # Longest step of the Gauss-Newton, radians. It ends with a step of 1e-7, after which quadratic convergence leaves 1e-14
 # where the moments agree to rounding, or where the costs stand still because they do not.
 STEP = 0.3
@@ -90,8 +92,8 @@ def _variance(c: Array, rows: Rows) -> Array:
 class _Layout:
     """Flat coefficients: |m| and l of each, where its partner -m stands, and the sign with which a turn mixes it in.
 
-    `tip` [C, C] is D of the quarter turn about x, transposed, between which R_y(b) is R_z(b); `generators` [C, 3C] are
-    the three of them side by side. Both multiply rows from the right.
+    `tip` [C, C] is D of the quarter turn about x, transposed, between which R_y(b) is R_z(b); `generators` [3C, C] are
+    the three of them on top of one another, of four entries a row at most.
     """
 
     m: Index
@@ -99,13 +101,19 @@ class _Layout:
     partner: Index
     sign: Array
     tip: Array
-    generators: Array
+    generators: Any
+
+    def turned(self, c: Array) -> Array:
+        """Changes [K, 3, C] of coefficients [K, C] under small turns about x, y and z."""
+        return np.asarray((self.generators @ c.T).T.reshape(len(c), 3, -1))
 
 
 @lru_cache(maxsize=32)
 def _layout(rows: Rows) -> _Layout:
     from scipy.linalg import block_diag
+    from scipy.sparse import csr_array
 
+    stacked = np.concatenate([block_diag(*(generators(l)[k] for l in rows)) for k in range(3)])
     m = np.concatenate([np.arange(-l, l + 1) for l in rows])
     l = np.repeat(rows, [2 * l + 1 for l in rows])
     return _Layout(
@@ -114,9 +122,7 @@ def _layout(rows: Rows) -> _Layout:
         partner=np.arange(len(m)) - 2 * m,
         sign=-np.sign(m).astype(np.float64),
         tip=read_only(block_diag(*(turn(l, 0, np.array(np.pi / 2)).T for l in rows))),
-        generators=read_only(
-            np.concatenate([block_diag(*(generators(l)[k].T for l in rows)) for k in range(3)], axis=1)
-        ),
+        generators=csr_array(np.where(np.abs(stacked) > NOTHING, stacked, 0.0)),
     )
 
 
@@ -268,7 +274,7 @@ def _linearised(pair: HarmonicPair, matrices: Array) -> tuple[Array, Array, Arra
     root = np.sqrt(pair.weights)
     here = (Turner.of(matrices, max(pair.rows))(pair.source[:1], pair.rows) * root)[:, 0]
     r = here - pair.target[0] * root
-    j = (here @ _layout(pair.rows).generators).reshape(len(matrices), 3, -1)
+    j = _layout(pair.rows).turned(here)
     return np.einsum("ki,ki->k", r, r), (j @ r[:, :, None])[:, :, 0], j @ j.transpose(0, 2, 1)
 
 
@@ -295,8 +301,7 @@ def rotation_covariance(pair: HarmonicPair, matrix: Array, hessian: Array) -> Ar
     """
     turner = Turner.of(matrix[None], max(pair.rows))
     inverse = np.linalg.pinv(hessian, rcond=1e-12, hermitian=True)
-    here = turner(pair.source[:1], pair.rows)[0, 0] * pair.weights
-    moved = (here @ _layout(pair.rows).generators).reshape(3, -1)
+    moved = _layout(pair.rows).turned(turner(pair.source[:1], pair.rows)[0] * pair.weights)[0]
     return inverse @ _projected_covariance(pair, turner, moved) @ inverse
 
 
