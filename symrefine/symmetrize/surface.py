@@ -28,7 +28,9 @@ def _closest_on_cloud(shape: Shape, rng: np.random.Generator) -> Closest:
     center = shape.points.mean(axis=0)
     size = float(np.sqrt(np.mean(np.sum((shape.points - center) ** 2, axis=1))))
     planes = local_planes((shape.points - center) / size, len(shape.points), rng)
-    points, normals, tree = center + size * planes.points, planes.normals, cKDTree(center + size * planes.points)
+    # The normal is that of the neighbours, the place that of the point itself: means of neighbours would merge the two
+    # sides of a thin sheet, and smooth more than the symmetry asks for.
+    points, normals, tree = shape.points, planes.normals, cKDTree(shape.points)
     # A plane fitted across an edge cuts it: there points stay where they are.
     usual = max(FLAT, USUAL * float(np.median(planes.flatness)))
     trust = np.clip(2.0 - planes.flatness / usual, 0.0, 1.0)
