@@ -530,7 +530,7 @@ def test_the_command_writes_what_the_reader_can_use(
     assert 0.4 < np.linalg.norm(np.ptp(points, axis=0)) < 2.0
     if order:
         assert distinct(motions) == order
-        assert misses(points, motions) < 1e-5
+        assert misses(points, motions) < 1e-12
     else:
         assert ring_misses(points, motions) < 2e-3  # it has 96 sides
 
@@ -546,7 +546,7 @@ def test_the_transform_takes_the_file_to_the_canonical_model(tmp_path: Path) -> 
     size = np.linalg.norm(np.ptp(after.points, axis=0))
     np.testing.assert_allclose(before.points @ matrix[:3, :3].T + matrix[:3, 3], after.points, atol=1e-12 * size)
     np.testing.assert_allclose(matrix @ data["inverse"], np.eye(4), atol=1e-9)
-    assert misses(after.points, np.array([motion(g) for g in standard_operations(point_group("C3v").symbol)])) < 1e-5
+    assert misses(after.points, np.array([motion(g) for g in standard_operations(point_group("C3v").symbol)])) < 1e-12
     again = tmp_path / "again.npz"
     assert invoke(["export", str(path), "--to", "canonical", "--out", str(out), "--transform", str(again)]) == 0
     with np.load(again) as archive:
@@ -611,7 +611,7 @@ def test_a_folder_of_models_becomes_one_models_info(
             motions = read_by_bop(info[str(number)], 0.01)
             points = 10.0 * load(shelf / f"obj_{number:06d}.ply").points
             assert distinct(motions) == order
-            assert misses(points, motions) < 1e-5
+            assert misses(points, motions) < 1e-12
             assert info[str(number)]["diameter"] == pytest.approx(
                 max(np.linalg.norm(points - p, axis=1).max() for p in points)
             )

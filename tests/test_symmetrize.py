@@ -19,7 +19,7 @@ from symrefine.groups import PointGroup, is_subgroup, point_group
 from symrefine.load import load
 from symrefine.quadrature import sample_surface
 from symrefine.shape import Shape
-from symrefine.symmetrize import Symmetrized, placed_subgroup, symmetrize
+from symrefine.symmetrize import Symmetrized, exact_place, placed_subgroup, symmetrize
 from symrefine.symmetrize.action import act, generators
 from symrefine.symmetrize.surface import closest_on
 
@@ -321,6 +321,35 @@ def lathe(count: int) -> Shape:
         last = (len(rings) - 1) * count
         faces += [[n, k, len(points) - 2], [last + k, last + n, len(points) - 1]]
     return Shape(points=points, faces=np.array(faces), measure="surface")
+
+
+# --- places -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", GROUPS)
+def test_exact_points_know_the_place_of_their_group_exactly(name: str) -> None:
+    thing = Thing(name)
+    group, center = exact_place(Shape(points=thing.exact), *thing.misplaced(2e-4, 1e-4))
+    assert group.name == name
+    assert group.distance_rad(thing.group.operations()).max() < 1e-9
+    moved = np.einsum("kij,nj->kni", thing.group.operations(), thing.exact - center) + center
+    assert cKDTree(thing.exact).query(moved.reshape(-1, 3))[0].max() < 1e-9 * thing.size
+
+
+def test_the_place_is_left_where_points_do_not_know_it() -> None:
+    thing = Thing("C4v", noise_rel=0.003)
+    group, center = thing.misplaced(2e-4, 1e-4)
+    assert exact_place(Shape(points=thing.points), group, center) == (group, center)
+
+
+def test_the_axis_of_a_lathed_mesh_is_that_of_its_rings() -> None:
+    turn = random_orthogonal(np.random.default_rng(8))
+    shape = replace(lathe(24), points=lathe(24).points @ turn.T + 2.0)
+    tilted = PointGroup(name="Cinfv", frame=turn.T @ rotation([1.0, 1.0, 0.0], 1e-4))
+    group, center = exact_place(shape, tilted, np.full(3, 2.0) + 1e-4)
+    assert group.name == "Cinfv"
+    np.testing.assert_allclose(np.abs(group.frame[2] @ turn[:, 2]), 1.0, atol=1e-12)
+    np.testing.assert_allclose(np.cross(center - 2.0, turn[:, 2]), 0.0, atol=1e-11)
 
 
 # --- parts ------------------------------------------------------------------------------------------------------------

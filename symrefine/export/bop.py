@@ -27,6 +27,7 @@ from symrefine.export.records import toward_positive
 from symrefine.geometry import Array, Isometry, frame_with_z, rotation, unit
 from symrefine.groups import PointGroup
 from symrefine.shape import Shape
+from symrefine.symmetrize import exact_place
 
 Entry = dict[str, Any]
 
@@ -50,7 +51,8 @@ def bop_entry(detection: Detection, shape: Shape, *, scale: float = 1.0) -> Entr
         raise InputError(f"scale is {scale}; expected millimetres in one unit of the file, such as 1 or 1000")
     if detection.undetermined:
         raise InputError(f"{shape.source}: no symmetries to export: {detection.undetermined}")
-    return placed_entry(detection.group, detection.center * scale, shape.points * scale)
+    group, center = exact_place(shape, detection.group, detection.center)
+    return placed_entry(group, center * scale, shape.points * scale)
 
 
 def placed_entry(group: PointGroup, center: Array, points: Array) -> Entry:

@@ -17,6 +17,7 @@ from symrefine.export.files import json_text
 from symrefine.export.models import check_suffix, model_bytes, moved
 from symrefine.export.operations import motions_bytes, motions_limits, reflections_left_out
 from symrefine.shape import Shape
+from symrefine.symmetrize import exact_place
 
 SCHEMA = "symrefine.canonical/1"
 
@@ -40,7 +41,7 @@ def bop_package(out: Path, detection: Detection, shape: Shape, *, number: int, s
 def npz_package(out: Path, detection: Detection, shape: Shape, *, improper: bool, steps: int) -> Package:
     """All operations as matrices in the frame and the units of the file."""
     _check_decided(detection, shape)
-    content = motions_bytes(detection.group, detection.center, improper=improper, steps=steps)
+    content = motions_bytes(*exact_place(shape, detection.group, detection.center), improper=improper, steps=steps)
     notes = motions_limits(detection.group, improper=improper, steps=steps)
     return Package(files={out: content}, notes=tuple(notes))
 
@@ -54,7 +55,7 @@ def canonical_package(out: Path, detection: Detection, shape: Shape, *, transfor
     _check_decided(detection, shape)
     if detection.group.name == "C1":
         raise InputError(f"{shape.source}: is C1: there is no axis and no mirror to put on the axes")
-    pose = canonical_pose(detection.group, detection.center, shape)
+    pose = canonical_pose(*exact_place(shape, detection.group, detection.center), shape)
     model, notes = _model(out, shape, pose, 1.0)
     return Package(files={out: model, transform: transform_bytes(transform, pose, shape.source)}, notes=tuple(notes))
 
@@ -68,7 +69,7 @@ def consumer_package(
         scale: millimetres in one unit of the shape.
     """
     _check_decided(detection, shape)
-    pose = canonical_pose(detection.group, detection.center, shape)
+    pose = canonical_pose(*exact_place(shape, detection.group, detection.center), shape)
     suffix, per_metre = MODELS[consumer]
     found = reading(consumer, pose.group, pose.apply(shape.points, scale))
     stem = f"obj_{number:06d}" if found.models_info is not None else "model"
