@@ -229,7 +229,7 @@ def _jackknife(points: Array, weights: Array, order: int, parts: int) -> tuple[A
     return total, recentred(rest / rest[:, :1], points.shape[1], order)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=2)
 def _deal(count: int, parts: int) -> NDArray[np.int64]:
     """Indices [parts, M] of points dealt in turn after a fixed shuffle; -1 where a part has one point less."""
     dealt = np.full(-(-count // parts) * parts, -1)
@@ -263,7 +263,10 @@ def _binomials(dim: int, order: int) -> tuple[NDArray[np.int64], NDArray[np.int6
 
     table = [tuple(e) for e in exponents(dim, order).tolist()]
     position = {e: i for i, e in enumerate(table)}
-    starts, kept, shifts, coefficients = [], [], [], []
+    starts: list[int] = []
+    kept: list[int] = []
+    shifts: list[int] = []
+    coefficients: list[float] = []
     for e in table:
         starts.append(len(kept))
         for k in product(*(range(v + 1) for v in e)):
