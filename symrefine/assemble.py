@@ -22,9 +22,11 @@ from symrefine.search import (
     Turn,
     axis_bundle,
     axis_directions,
+    closer_core,
     improper_about,
     mirrors,
     refined,
+    refined_closely,
     turns_about,
 )
 from symrefine.verify import Verdict
@@ -32,7 +34,7 @@ from symrefine.verify import Verdict
 # Beside an element that holds exactly, one that misses this many times more, and by this share of the limit, is not
 # the same kind of truth: a wheel maps onto itself nearly as well between its spokes.
 RIVAL = 4.0
-EXACT = 0.35
+EXACT = 0.45
 # Directions of elements are known to this before the joint refinement.
 DIRECTION_ERROR_RAD = math.radians(1.5)
 KNOWN_RAD = math.radians(4.0)
@@ -41,6 +43,12 @@ APART_RAD = math.radians(1.0)
 MAX_OPERATIONS = 9
 # An object is called round only if it misses by less than this share of the limits; a nut with its eight sides is not.
 ROUND_LIMIT = 0.5
+# Orders from which on a finite axis has to be better than a continuous one, and by what factor.
+CHANCE_FOLD = 5
+AS_GOOD = 1.5
+# Planes closer than this (angle, RMS radii) may be fits of one and the same mirror.
+BESIDE_RAD = math.radians(8.0)
+BESIDE = 0.15
 # How many candidates are looked at for the list of near misses once the group is known.
 NEAR = 4
 NOTHING = np.zeros((0, 3))
@@ -68,7 +76,7 @@ def assemble(evidence: Evidence) -> Assembly:
     others = list(mirrors(evidence, NOTHING, count=NEAR, known=_mirror_of(group), thorough=False))
     if any(_holds(m.verdict, _limit([bundle.verdict])) for m in others):
         # A mirror beside the bundle: the axis the n-tuples claimed by chance is not all there is.
-        return _from_parts(replace(evidence, tuples=replace(evidence.tuples, kind="vanish")))
+        return assemble(replace(evidence, tuples=replace(evidence.tuples, kind="vanish")))
     near = [mirror_element(m) for m in others]
     return _finish(evidence, group, bundle.state.center, bundle.history, near)
 
@@ -113,14 +121,20 @@ def _round(evidence: Evidence, bundle: Bundle) -> Assembly:
     axis, center = bundle.state.frame[2], bundle.state.center
     name = "Cinfv"
     if evidence.tuples.kind == "vanish":
-        tilted = Framed(standard=rotation([1, 0, 0], 1.0)[None], frame=bundle.state.frame, center=center)
+        tilted = refined(evidence, _tilted(bundle.state), sources=1500, outer=4)[-1].state
         across = refined(evidence, _plane_state(axis, center), sources=3000, outer=6)[-1].state
         mirror = evidence.judge(across.motions)
         if evidence.judge(tilted.motions).excess <= max(EXACT, bundle.verdict.excess):
-            name = "Kh"
+            name, center = "Kh", tilted.center
         elif _holds(mirror, _limit([bundle.verdict, mirror])):
             name, center = "Dinfh", center + axis * float(axis @ (across.center - center))
     return _finish(evidence, PointGroup(name=name, frame=bundle.state.frame), center, bundle.history, [])
+
+
+def _tilted(state: Framed) -> Framed:
+    """Turns about two axes across the frame's third, which only a sphere survives; they show where its centre is."""
+    turns = np.stack([rotation([1, 0, 0], 1.0), rotation([0, 1, 0], 1.7)])
+    return Framed(standard=turns, frame=state.frame, center=state.center)
 
 
 def _plane_state(normal: Array, point: Array) -> Framed:
@@ -135,8 +149,18 @@ def _from_parts(evidence: Evidence) -> Assembly:
         group, held, turns = _closed(held, turns)
         done = _group_of(evidence, group, held, turns, near)
         if all(e.verdict.excess <= 1.0 for e in done.elements) or not (held or turns):
-            return done
+            return _unless_round(evidence, done)
         near.extend(mirror_element(m) for m in _without_worst(held, turns))
+
+
+def _unless_round(evidence: Evidence, found: Assembly) -> Assembly:
+    """A high order about an axis that any turn keeps as well is chance: on a round object every mirror holds."""
+    main = [u for u, k in found.group.rotation_axes()[:1] if k >= CHANCE_FOLD]
+    for bundle in (b for u in main for b in axis_bundle(evidence, u, mirrored=False)):
+        worst = max((e.verdict.bulk for e in found.elements), default=0.0)
+        if _holds(bundle.verdict, max(EXACT, AS_GOOD * worst)):
+            return _round(evidence, bundle)
+    return found
 
 
 def _group_of(
@@ -149,7 +173,7 @@ def _group_of(
     start = _joint(group, center)
     if start is None:
         return _finish(evidence, group, center, (), near)
-    history = refined(evidence, start, sources=max(500, 12000 // len(start.standard)))
+    history = refined_closely(evidence, start, sources=max(500, 12000 // len(start.standard)))
     state = history[-1].state
     done = _finish(evidence, PointGroup(name=group.name, frame=state.frame), state.center, history, near)
     if any(e.verdict.excess > 1.0 for e in done.elements):
@@ -181,6 +205,10 @@ def _mirror_group(evidence: Evidence) -> tuple[list[Mirror], list[Element], Poin
     for mirror in mirrors(evidence, evidence.tuples.directions[2:], known=known):
         if mirror.verdict.excess > 1.0:
             near.append(mirror)
+            near += [m for m in held if _compromise(m, mirror)]
+            group, held, _ = _closed([m for m in held if not _compromise(m, mirror)], [])
+        elif any(_compromise(mirror, m) for m in near):
+            near.append(mirror)
         else:
             held.append(mirror)
             limit = _limit(m.verdict for m in held)
@@ -189,6 +217,15 @@ def _mirror_group(evidence: Evidence) -> tuple[list[Mirror], list[Element], Poin
         if few and held and len(near) >= NEAR:
             break
     return held, [mirror_element(m) for m in near], group
+
+
+def _compromise(mirror: Mirror, other: Mirror) -> bool:
+    """Whether a mirror is only what the fit of a detail made of another one beside it, which most of the surface
+    keeps far better."""
+    apart = abs(float(mirror.plane.normal @ other.plane.normal)) < math.cos(BESIDE_RAD)
+    side = math.copysign(1.0, float(mirror.plane.normal @ other.plane.normal))
+    shifted = abs(mirror.plane.offset - side * other.plane.offset) > BESIDE
+    return not apart and not shifted and closer_core(other.verdict, mirror.verdict)
 
 
 def _mirror_of(group: PointGroup) -> Callable[[Array], bool]:

@@ -112,6 +112,7 @@ def fold_candidates(points: Array, weights: Array, axis: Array, *, leak_max: flo
     An empty list means a surface of revolution as far as the azimuthal spectrum can tell, or no axis at all.
     """
     c, sigma = azimuthal_spectrum(points, weights, axis)
+    sigma = np.where(sigma > 0, sigma, np.inf)  # a flat object has no height to weigh azimuths with
     energy = np.clip(np.abs(c) ** 2 / sigma**2 - 1.0, 0.0, None).sum(axis=1)
     energy[0] = 0.0
     k = np.arange(len(energy))

@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,13 +16,13 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array, Axis, Plane, read_only, tight_diagonal
 from symrefine.groups import PointGroup
 from symrefine.harmonics import harmonic_moments
-from symrefine.matching import isolated_points, local_planes
+from symrefine.matching import LocalPlanes, fills_volume, isolated_points, local_planes
 from symrefine.moments import Moments, shape_moments
 from symrefine.ntuples.contract import NTuples, ntuples
-from symrefine.quadrature import sample_surface
+from symrefine.quadrature import mesh_nodes, sample_surface
 from symrefine.refine import Iterate
 from symrefine.search import Evidence
-from symrefine.shape import Shape
+from symrefine.shape import Index, Shape
 from symrefine.verify import TOLERANCE, Deviation, Judge, confidence, make_judge
 
 ORDER = 8
@@ -30,6 +30,10 @@ PARTS = 16
 SAMPLES = 20000
 LOCAL_PLANES = 4000
 CLOSER_PLANES = 12000
+# Points of a cloud that fills a volume, at most.
+VOLUME_POINTS = 20000
+# Masses of atoms that differ by more than this fraction are masses of different kinds.
+SAME_MASS = 0.01
 # Up to so many distinct points stand for themselves (atoms); more are samples of a surface.
 FEW = 250
 
@@ -118,6 +122,7 @@ def detect(
     *,
     weights: ArrayLike | None = None,
     normals: ArrayLike | None = None,
+    labels: ArrayLike | None = None,
     tolerance: float = TOLERANCE,
     seed: int = 0,
 ) -> Detection:
@@ -125,8 +130,10 @@ def detect(
 
     Args:
         shape: a `Shape`, or points [N, 3].
-        weights: [N] masses of the points; not with a `Shape`, which carries its own.
+        weights: [N] masses of the points; not with a `Shape`, which carries its own. Of up to 250 points those of
+            different mass are different things, which no symmetry exchanges; of more, masses are a sampling density.
         normals: [N, 3] normals, any sign; estimated where absent. Not with a `Shape`.
+        labels: [N] integers: classes (elements, colours, materials) that every symmetry must keep. Not with a `Shape`.
         tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal: 95 % of the
             surface must come within it, 99 % within 1.4 of it, and the mean within 0.28 (see `verify`).
         seed: of the random choices (samples of a mesh, subsets of a cloud).
@@ -136,9 +143,9 @@ def detect(
         DegenerateShapeError: the points do not spread.
     """
     if not isinstance(shape, Shape):
-        shape = Shape.of(shape, weights=weights, normals=normals)
-    elif weights is not None or normals is not None:
-        raise InputError("weights and normals belong to the Shape; give them there, or give an array of points")
+        shape = Shape.of(shape, weights=weights, normals=normals, labels=labels)
+    elif not (weights is None and normals is None and labels is None):
+        raise InputError("weights, normals and labels belong to the Shape; give them there, or give an array of points")
     if shape.dim != 3:
         raise InputError(f"{shape.source}: detect takes 3-D shapes; {_elsewhere(shape.dim)}")
     if not 0.0 < tolerance <= 0.2:
@@ -146,11 +153,13 @@ def detect(
     shape = _with_mass(shape)
     clock = Clock()
     few = shape.faces is None and len(shape.points) <= FEW
+    classes = _classes(shape, few)
     with clock("moments"):
-        moments = shape_moments(shape, ORDER, parts=0 if few or shape.faces is not None else PARTS)
+        moments = _moments(shape, classes, parts=0 if few or shape.faces is not None else PARTS)
         vectors = ntuples(moments)
     with clock("local_planes"):
-        evidence = (few_points if few else gather)(shape, moments, vectors, tolerance, np.random.default_rng(seed))
+        gathered = few_points if few else gather
+        evidence = gathered(shape, classes, moments, vectors, tolerance, np.random.default_rng(seed))
     with clock("search"):
         found = assemble(evidence)
     doubt = _doubt(evidence)
@@ -163,7 +172,35 @@ def _with_mass(shape: Shape) -> Shape:
         return shape
     kept = shape.weights > 0
     normals = None if shape.normals is None else shape.normals[kept]
-    return replace(shape, points=shape.points[kept], weights=shape.weights[kept], normals=normals)
+    labels = None if shape.labels is None else shape.labels[kept]
+    return replace(shape, points=shape.points[kept], weights=shape.weights[kept], normals=normals, labels=labels)
+
+
+def _classes(shape: Shape, few: bool) -> Index | None:
+    """Classes 0, 1, ... of the points (faces, for a mesh) that must match: labels, and masses where points are few."""
+    kinds = [] if shape.labels is None else [shape.labels]
+    if few and shape.weights is not None:
+        ascending = np.argsort(shape.weights, kind="stable")
+        steps = np.diff(shape.weights[ascending]) > SAME_MASS * shape.weights[ascending][1:]
+        kinds.append(np.concatenate([[0], np.cumsum(steps)])[np.argsort(ascending, kind="stable")])
+    if not kinds:
+        return None
+    classes = np.unique(np.stack(kinds), axis=1, return_inverse=True)[1].reshape(-1)
+    return classes if classes.any() else None
+
+
+def _moments(shape: Shape, classes: Index | None, parts: int) -> Moments:
+    """Moments of the shape in which each class has a density of its own, so that they know one class from another."""
+    if classes is None:
+        return shape_moments(shape, ORDER, parts=parts)
+    # Multiples of the golden ratio modulo 1 keep any number of classes apart.
+    density = 0.5 + np.modf(0.6180339887498949 * (classes + 1))[0]
+    if shape.faces is None:
+        own = np.ones(len(shape.points)) if shape.weights is None else shape.weights
+        return shape_moments(replace(shape, weights=own * density), ORDER, parts=parts)
+    nodes, weights = mesh_nodes(replace(shape, measure="surface"), ORDER)
+    heavier = weights * np.repeat(density, len(weights) // len(density))
+    return shape_moments(Shape(points=shape.points[0] + nodes, weights=heavier), ORDER)
 
 
 def _elsewhere(dim: int) -> str:
@@ -212,21 +249,32 @@ class Clock:
         self.seconds[stage] = time.perf_counter() - start
 
 
-def gather(shape: Shape, moments: Moments, vectors: NTuples, tolerance: float, rng: np.random.Generator) -> Evidence:
-    """Moments, n-tuples and a judged cloud of local planes, in normalised units."""
+def gather(
+    shape: Shape,
+    classes: Index | None,
+    moments: Moments,
+    vectors: NTuples,
+    tolerance: float,
+    rng: np.random.Generator,
+) -> Evidence:
+    """Moments, n-tuples and a judged cloud of local planes (points, where they fill a volume), in normalised units."""
     from scipy.spatial import cKDTree
 
-    points, normals, weights = _cloud(shape, rng)
+    points, normals, weights, labels = _cloud(shape, classes, rng)
     local = (points - moments.center) / moments.scale
     exact = shape.faces is not None
     tree = None if exact else cKDTree(local, balanced_tree=False, compact_nodes=False)
-    cloud = local_planes(local, LOCAL_PLANES, rng, normals=normals, exact=exact, tree=tree)
+    chance = None if exact else shape.weights
+    planes = partial(
+        local_planes, local, rng=rng, normals=normals, labels=labels, weights=chance, exact=exact, tree=tree
+    )
+    filled = tree is not None and normals is None and fills_volume(local, tree, rng)
+    cloud = _volume(local, labels, rng) if filled else planes(LOCAL_PLANES)
     diagonal = tight_diagonal(cloud.points)
 
     @cache
     def closer() -> Judge:
-        dense = local_planes(local, CLOSER_PLANES, rng, normals=normals, exact=exact, tree=tree)
-        return make_judge(dense, diagonal, tolerance)
+        return make_judge(cloud if filled else planes(CLOSER_PLANES), diagonal, tolerance)
 
     return Evidence(
         moments=moments,
@@ -239,10 +287,17 @@ def gather(shape: Shape, moments: Moments, vectors: NTuples, tolerance: float, r
     )
 
 
-def few_points(shape: Shape, moments: Moments, vectors: NTuples, tolerance: float, _: np.random.Generator) -> Evidence:
+def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> LocalPlanes:
+    pick = np.sort(rng.choice(len(points), min(VOLUME_POINTS, len(points)), replace=False))
+    return isolated_points(points[pick], None if labels is None else labels[pick], body="volume")
+
+
+def few_points(
+    shape: Shape, classes: Index | None, moments: Moments, vectors: NTuples, tolerance: float, _: np.random.Generator
+) -> Evidence:
     """Evidence from points that stand for themselves: every direction is searched, whatever the n-tuples say."""
     local = (shape.points - moments.center) / moments.scale
-    judge = make_judge(isolated_points(local), tight_diagonal(local), tolerance)
+    judge = make_judge(isolated_points(local, classes), tight_diagonal(local), tolerance)
     weights = np.ones(len(local)) if shape.weights is None else shape.weights
     return Evidence(
         moments=moments,
@@ -255,12 +310,15 @@ def few_points(shape: Shape, moments: Moments, vectors: NTuples, tolerance: floa
     )
 
 
-def _cloud(shape: Shape, rng: np.random.Generator) -> tuple[Array, Array | None, Array]:
-    """Points, normals and weights: samples with exact normals for a mesh, the points themselves otherwise."""
+def _cloud(
+    shape: Shape, classes: Index | None, rng: np.random.Generator
+) -> tuple[Array, Array | None, Array, Index | None]:
+    """Points, normals, weights and classes: samples with exact normals for a mesh, else the points themselves."""
     if shape.faces is not None:
-        points, normals, _ = sample_surface(shape, SAMPLES, rng)
-        return points, normals, np.ones(len(points))
-    return shape.points, shape.normals, np.ones(len(shape.points)) if shape.weights is None else shape.weights
+        points, normals, face = sample_surface(shape, SAMPLES, rng)
+        return points, normals, np.ones(len(points)), None if classes is None else classes[face]
+    weights = np.ones(len(shape.points)) if shape.weights is None else shape.weights
+    return shape.points, shape.normals, weights, classes
 
 
 def _report(found: Assembly, evidence: Evidence, vectors: NTuples, doubt: str, timings: dict[str, float]) -> Detection:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -17,9 +17,17 @@ WIDEST = 0.2
 FLAT = 0.3
 # Flatness at which a local plane counts for little in a residual.
 WORTH = 1.0
+# Median flatness of neighbourhoods up to WIDEST_BLOB wide, over that of a blob, from which on points fill a volume.
+VOLUME = 0.8
+WIDEST_BLOB = 0.5
+# Classes stand so far apart along a fourth coordinate (RMS radii) that no query finds a point of another class first.
+APART = 1e3
 # Robust scale over the median absolute residual (three standard deviations), and its bound from below in spacings.
 ROBUST = 4.4
 SCALE_FLOOR = 0.1
+
+
+Body = Literal["surface", "atoms", "volume"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,8 +42,9 @@ class LocalPlanes:
         reach: [M] radius of the disc each local plane stands for: the distance to its fifth neighbour among these M.
         spacing: median distance from a point to the nearest other one of these M.
         redundancy: how many of the local planes each point of the cloud takes part in; >= 1.
-        tree: kd-tree over `points`.
-        isolated: the points stand for themselves (atoms), not for a surface: there are no normals and no discs.
+        tree: kd-tree over `points`, with the class as a fourth coordinate where there are classes.
+        body: what the points are: samples of a surface, atoms that stand for themselves, or samples of a volume.
+        labels: [M] class of each point, which only meets points of its own class; None where all are of one.
     """
 
     points: Array
@@ -46,11 +55,29 @@ class LocalPlanes:
     spacing: float
     redundancy: float
     tree: Any
-    isolated: bool = False
+    body: Body = "surface"
+    labels: Index | None = None
 
     def __post_init__(self) -> None:
         for name in ("points", "normals", "thickness", "flatness", "reach"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def isolated(self) -> bool:
+        """Whether points meet points: there are no normals and no discs."""
+        return self.body != "surface"
+
+    def classes(self, chosen: Index | slice) -> Index | None:
+        """Classes of some of the points."""
+        return None if self.labels is None else self.labels[chosen]
+
+    def nearest(self, queries: Array, classes: Index | None, **options: Any) -> tuple[Array, Index]:
+        """Distances and indices of the points nearest to queries [Q, 3] of the given classes [Q], as the tree says."""
+        return self.tree.query(_with_class(queries, classes), **options)
+
+
+def _with_class(points: Array, classes: Index | None) -> Array:
+    return points if classes is None else np.column_stack([points, APART * classes])
 
 
 def smallest_eigenvectors(covariance: Array) -> tuple[Array, Array]:
@@ -68,7 +95,7 @@ def _fit(points: Array, neighbours: Index, normals: Array | None = None) -> tupl
     values, fitted = smallest_eigenvectors(covariance)
     if normals is None:
         return mean, fitted, values
-    across = np.einsum("ni,nij,nj->n", normals, covariance, normals)
+    across = np.clip(np.einsum("ni,nij,nj->n", normals, covariance, normals), 0.0, None)
     return mean, normals, np.column_stack([across, values[:, 1:]])
 
 
@@ -104,12 +131,29 @@ def _blob_flatness(k: int) -> float:
     return max(float(np.median(_flatness(values))), 1e-12)
 
 
+def fills_volume(points: Array, tree: Any, rng: np.random.Generator, *, probes: int = 240) -> bool:
+    """Whether points [N, 3] (RMS radius 1) fill a volume: at no width do neighbourhoods look flatter than a blob."""
+    pick = rng.choice(len(points), min(probes, len(points)), replace=False)
+    size = NEIGHBOURS[0]
+    while size <= max(len(points) // 8, NEIGHBOURS[0]):
+        distance, near = tree.query(points[pick], k=size)
+        if float(np.median(distance[:, -1])) > WIDEST_BLOB:
+            break
+        _, _, values = _fit(points, near)
+        if float(np.median(_flatness(values))) < VOLUME * _blob_flatness(size):
+            return False
+        size *= 2
+    return True
+
+
 def local_planes(
     points: Array,
     count: int,
     rng: np.random.Generator,
     *,
     normals: Array | None = None,
+    labels: Index | None = None,
+    weights: Array | None = None,
     exact: bool = False,
     tree: Any = None,
 ) -> LocalPlanes:
@@ -117,12 +161,15 @@ def local_planes(
 
     Args:
         normals: [N, 3] unit normals to use instead of fitted ones, any sign.
+        labels: [N] classes; they do not matter to the fits.
+        weights: [N] positive; a point is chosen in proportion to it, so that the inverse of an uneven density evens out.
         exact: points and normals are free of noise (samples of a mesh) and are taken as they are.
         tree: kd-tree over `points`, if there is one already.
     """
     from scipy.spatial import cKDTree
 
-    pick = np.sort(rng.choice(len(points), min(count, len(points)), replace=False))
+    chance = None if weights is None else weights / weights.sum()
+    pick = np.sort(rng.choice(len(points), min(count, len(points)), replace=False, p=chance))
     chosen, redundancy = points[pick], 1.0
     thickness: Array = np.zeros(len(pick))
     flatness: Array = np.zeros(len(pick))
@@ -136,8 +183,8 @@ def local_planes(
         mean, n, values = _fit(points, near, None if normals is None else normals[pick])
         chosen = chosen - n * np.einsum("ij,ij->i", n, chosen - mean)[:, None]
         thickness, flatness = np.sqrt(values[:, 0]), _flatness(values)
-    own = cKDTree(chosen)
-    distance, _ = own.query(chosen, k=min(6, len(chosen)))
+    distance, _ = cKDTree(chosen).query(chosen, k=min(6, len(chosen)))
+    classes = None if labels is None else labels[pick]
     return LocalPlanes(
         points=chosen,
         normals=n,
@@ -146,16 +193,16 @@ def local_planes(
         reach=distance[:, -1],
         spacing=float(np.median(distance[:, 1])),
         redundancy=redundancy,
-        tree=own,
+        tree=cKDTree(_with_class(chosen, classes)),
+        labels=classes,
     )
 
 
-def isolated_points(points: Array) -> LocalPlanes:
-    """A small set of points [M, 3] that stand for themselves."""
+def isolated_points(points: Array, labels: Index | None = None, *, body: Body = "atoms") -> LocalPlanes:
+    """Points [M, 3] that meet points: few that stand for themselves ("atoms"), or samples of a "volume"."""
     from scipy.spatial import cKDTree
 
-    tree = cKDTree(points)
-    distance, _ = tree.query(points, k=2)
+    distance, _ = cKDTree(points).query(points, k=2)
     none = np.zeros(len(points))
     return LocalPlanes(
         points=points,
@@ -165,8 +212,9 @@ def isolated_points(points: Array) -> LocalPlanes:
         reach=none,
         spacing=float(np.median(distance[:, 1])),
         redundancy=1.0,
-        tree=tree,
-        isolated=True,
+        tree=cKDTree(_with_class(points, labels)),
+        body=body,
+        labels=labels,
     )
 
 
@@ -179,7 +227,9 @@ class Pairs:
     weights: Array
 
 
-def match(cloud: LocalPlanes, motion: Isometry, uncertainty: float, *, stride: int = 1) -> Pairs:
+def match(
+    cloud: LocalPlanes, motion: Isometry, uncertainty: float, *, stride: int = 1, robust: float = ROBUST
+) -> Pairs:
     """Pair every `stride`-th local plane, moved, with the nearest one; weight by how much the pair is worth.
 
     Pairs are dropped when the moved normal disagrees by more than 45 degrees, when the point hardly moves, so that it
@@ -190,10 +240,12 @@ def match(cloud: LocalPlanes, motion: Isometry, uncertainty: float, *, stride: i
 
     Args:
         uncertainty: how far the motion may still move a point, RMS radii.
+        robust: that scale over the median absolute residual.
     """
     source = np.arange(0, len(cloud.points), stride)
     moved = motion.apply(cloud.points[source])
-    distance, target = cloud.tree.query(moved, distance_upper_bound=3.0 * (cloud.spacing + uncertainty))
+    reach = 3.0 * (cloud.spacing + uncertainty)
+    distance, target = cloud.nearest(moved, cloud.classes(source), distance_upper_bound=reach)
     floor = max(SCALE_FLOOR * cloud.spacing, uncertainty)
     keep = np.isfinite(distance)
     if not cloud.isolated:
@@ -201,20 +253,20 @@ def match(cloud: LocalPlanes, motion: Isometry, uncertainty: float, *, stride: i
         keep &= travel > cloud.spacing
     source, target, moved = source[keep], target[keep], moved[keep]
     if cloud.isolated:
-        return Pairs(sources=source, targets=target, weights=_robust(distance[keep], floor))
+        return Pairs(sources=source, targets=target, weights=_robust(distance[keep], floor, robust))
     turned = motion.turn(cloud.normals[source])
     agree = np.abs(np.einsum("ij,ij->i", turned, cloud.normals[target])) > np.sqrt(0.5)
     source, target, moved = source[agree], target[agree], moved[agree]
     error = np.einsum("ij,ij->i", moved - cloud.points[target], cloud.normals[target])
     flat = np.exp(-((cloud.flatness[source] / WORTH) ** 2) - (cloud.flatness[target] / WORTH) ** 2)
-    return Pairs(sources=source, targets=target, weights=flat * _robust(error, floor))
+    return Pairs(sources=source, targets=target, weights=flat * _robust(error, floor, robust))
 
 
-def _robust(error: Array, floor: float) -> Array:
+def _robust(error: Array, floor: float, robust: float) -> Array:
     """Geman-McClure weights [N] at a scale from the residuals [N], not below `floor`."""
     if error.size == 0:
         return np.empty(0)
-    scale2 = max(ROBUST * float(np.median(np.abs(error))), floor) ** 2
+    scale2 = max(robust * float(np.median(np.abs(error))), floor) ** 2
     return (scale2 / (scale2 + error**2)) ** 2
 
 

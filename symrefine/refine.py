@@ -12,7 +12,7 @@ import numpy as np
 
 from symrefine.gauss_newton import Linearisation, Solution, minimise
 from symrefine.geometry import Array, Isometry, Plane, frame_with_z, householder, read_only
-from symrefine.matching import LocalPlanes, Pairs, match, pair_equations
+from symrefine.matching import ROBUST, LocalPlanes, Pairs, match, pair_equations
 from symrefine.residual import axis_gram, design_rows, frame_model, gram, observable_motions, theta_model, turn_frame
 
 MAX_OUTER = 10
@@ -112,7 +112,13 @@ class Iterate:
 
 
 def refine(
-    cloud: LocalPlanes, start: Framed, *, start_error_rad: float = 0.05, max_outer: int = MAX_OUTER, stride: int = 1
+    cloud: LocalPlanes,
+    start: Framed,
+    *,
+    start_error_rad: float = 0.05,
+    max_outer: int = MAX_OUTER,
+    stride: int = 1,
+    robust: float = ROBUST,
 ) -> Iterator[Iterate]:
     """Refine operations that share a frame: theta of each plane first, then the unknowns they have in common.
 
@@ -122,6 +128,7 @@ def refine(
         start_error_rad: how far the start may be off; sets the first gate and robust scale.
         max_outer: outer iterations at most.
         stride: use every stride-th local plane as a source.
+        robust: scale of the weights over the median absolute residual (see `match`).
 
     Yields: the start as iterate 0, then one iterate for each outer iteration, the last one when the change settles.
     """
@@ -133,7 +140,7 @@ def refine(
     )  # fmt: skip
     for index in range(1, max_outer + 1):
         uncertainty = min(start_error_rad, 4.0 * step)
-        pairs = tuple(match(cloud, motion, uncertainty, stride=stride) for motion in state.motions)
+        pairs = tuple(match(cloud, motion, uncertainty, stride=stride, robust=robust) for motion in state.motions)
         grams = np.stack([_pair_gram(cloud, p) for p in pairs])
         theta = _thetas(grams, state) if state.bundle else np.zeros(0)
         solution = _solve(grams, state, float(np.median(theta)) if theta.size else 0.0)

@@ -6,7 +6,7 @@ the mirrors. The directional spectrum proposes what they cannot see. Everything 
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +33,15 @@ PROMISING = 2.0
 AXIS_HOPELESS = 0.15
 # Excesses between these are close calls.
 CLOSE = (0.5, 1.4)
+# A miss below this share of the limits is no compromise between parts.
+SURE = 0.15
+# Gate (spacings) of a refinement held to what agrees, and how much better its bulk has to be to be believed.
+LOCK = 0.5
+# Scale of its weights over the median absolute residual: what misses by more than most does hardly counts.
+STRICT = 1.5
+MUCH_BETTER = 0.75
+# ... beyond what sampling alone may show (tolerances).
+CORE_NOISE = 0.07
 # Folds tried one by one about the axes of a small set of points.
 SMALL_FOLD = 12
 # A fold that no moment reaches: only the coefficients with m = 0 are invariant.
@@ -97,6 +106,26 @@ def refined(
     return tuple(refine(cloud, start, start_error_rad=error_rad, max_outer=outer, stride=stride))
 
 
+def preferred(verdict: Verdict, other: Verdict) -> bool:
+    """Whether a fit in which most of the surface agrees far better, or else one that misses by less, is this one."""
+    if closer_core(verdict, other):
+        return True
+    return verdict.excess < other.excess and not closer_core(other, verdict)
+
+
+def closer_core(verdict: Verdict, other: Verdict) -> bool:
+    """Whether most of the surface agrees far better under this one."""
+    return verdict.core < MUCH_BETTER * other.core and other.core > CORE_NOISE
+
+
+def refined_closely(evidence: Evidence, start: Framed, *, sources: int) -> tuple[Iterate, ...]:
+    """All iterates from a start that is known to less than the spacing of the points."""
+    cloud = evidence.judge.cloud
+    gate = LOCK * cloud.spacing
+    stride = evidence.stride(sources)
+    return tuple(refine(cloud, start, start_error_rad=gate, max_outer=8, stride=stride, robust=STRICT))
+
+
 def axis_bundle(evidence: Evidence, direction: Array, *, mirrored: bool = True) -> Iterator[Bundle]:
     """C_infv, then C_bv by falling plausibility, about an axis through the centre; every one that passes a first look.
 
@@ -123,9 +152,27 @@ def _mirrors_through(evidence: Evidence, candidate: FoldCandidate) -> Bundle | N
     if _look(evidence, start.motions[:4]) > 4.0:
         return None
     history = refined(evidence, start, sources=max(LOOK, 12000 // candidate.fold))
+    stride = evidence.stride(max(LOOK, 4000 // candidate.fold))
+    history, verdict = locked(evidence, history, evidence.judge(history[-1].state.motions, stride=stride), stride)
+    return Bundle(state=history[-1].state, fold=candidate.fold, history=history, verdict=verdict)
+
+
+def locked(
+    evidence: Evidence, history: tuple[Iterate, ...], verdict: Verdict, stride: int
+) -> tuple[tuple[Iterate, ...], Verdict]:
+    """The same refinement, or one that went on with narrow gates, if most of the surface then agrees far better.
+
+    A detail out of place draws the fit of everything to a compromise in which nothing agrees exactly and nothing
+    misses by much; held to what agrees, the same detail shows its whole miss.
+    """
+    if verdict.bulk < SURE:
+        return history, verdict
     state = history[-1].state
-    verdict = evidence.judge(state.motions, stride=evidence.stride(max(LOOK, 4000 // candidate.fold)))
-    return Bundle(state=state, fold=candidate.fold, history=history, verdict=verdict)
+    more = refined_closely(evidence, state, sources=max(LOOK, 12000 // len(state.standard)))
+    held = evidence.verdict(more[-1].state.motions, stride=stride)
+    if preferred(held, verdict):
+        return (*history, *(replace(i, index=len(history) - 1 + i.index) for i in more[1:])), held
+    return history, verdict
 
 
 def _look(evidence: Evidence, motions: tuple[Isometry, ...]) -> float:
@@ -176,15 +223,22 @@ def mirrors(
             plane = _settle(evidence, plane, sources=3000, outer=6)
             if known(plane.normal) or any(_same_plane(plane, p) for p in found):
                 continue
-            mirror = _judged(evidence, plane)
+            mirror = _held(evidence, _judged(evidence, plane))
             if 1.0 < mirror.verdict.excess < PROMISING:
-                mirror = min(mirror, _judged(evidence, _polished(evidence, normal)), key=lambda m: m.verdict.excess)
+                other = _judged(evidence, _polished(evidence, normal))
+                mirror = other if preferred(other.verdict, mirror.verdict) else mirror
         found.append(mirror.plane)
         yield mirror
 
 
 def _judged(evidence: Evidence, plane: Plane, *, stride: int = 1) -> Mirror:
     return Mirror(plane=plane, verdict=evidence.verdict([Isometry.reflection(plane)], stride=stride))
+
+
+def _held(evidence: Evidence, mirror: Mirror) -> Mirror:
+    history = refined(evidence, single_plane(mirror.plane), outer=0)
+    history, verdict = locked(evidence, history, mirror.verdict, 1)
+    return Mirror(plane=history[-1].state.planes[0], verdict=verdict)
 
 
 def _polished(evidence: Evidence, normal: Array) -> Plane:
@@ -232,8 +286,9 @@ def turns_about(evidence: Evidence, direction: Array, center: Array) -> Turn | N
         start = refined(evidence, start, sources=LOOK, outer=3, error_rad=0.1)[-1].state
         if _look(evidence, start.motions) > PROMISING:
             continue
-        state = refined(evidence, start, sources=2000, outer=6)[-1].state
-        verdict = evidence.verdict(state.motions)
+        history = refined(evidence, start, sources=2000, outer=6)
+        history, verdict = locked(evidence, history, evidence.verdict(history[-1].state.motions), 1)
+        state = history[-1].state
         if verdict.excess <= 1.0 and (best is None or fold > best.order):
             best = Turn(point=state.center, direction=state.frame[2], order=float(fold), verdict=verdict)
     return best

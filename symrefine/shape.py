@@ -22,6 +22,8 @@ class Shape:
         weights: [N] non-negative, not all zero; equal if absent. A mesh takes its weights from its measure.
         normals: [N, n], any length but zero, any sign; estimated where needed if absent.
         faces: [F, 3] vertex indices of a triangle mesh in 3-space, or None.
+        labels: [N] integers for a cloud, [F] for a mesh: classes (elements, colours, materials) that a symmetry must
+            keep; one class if absent.
         measure: "points" for a cloud; "surface" or "solid" for a mesh: what carries the mass.
         source: where the data came from, for messages.
 
@@ -34,6 +36,7 @@ class Shape:
     weights: Array | None = None
     normals: Array | None = None
     faces: Index | None = None
+    labels: Index | None = None
     measure: Measure = "points"
     source: str = "array"
 
@@ -46,6 +49,9 @@ class Shape:
             object.__setattr__(self, "normals", _normals(self.normals, points, self.source))
         if self.faces is not None:
             object.__setattr__(self, "faces", _faces(self.faces, points, self.source))
+        if self.labels is not None:
+            count, what = (len(points), "point") if self.faces is None else (len(self.faces), "face")
+            object.__setattr__(self, "labels", _labels(self.labels, count, what, self.source))
         if self.measure not in get_args(Measure):
             raise InputError(f"{self.source}: measure is {self.measure!r}; expected one of {list(get_args(Measure))}")
         if (self.faces is None) != (self.measure == "points"):
@@ -59,9 +65,16 @@ class Shape:
             )
 
     @classmethod
-    def of(cls, points: ArrayLike, *, weights: ArrayLike | None = None, normals: ArrayLike | None = None) -> "Shape":
+    def of(
+        cls,
+        points: ArrayLike,
+        *,
+        weights: ArrayLike | None = None,
+        normals: ArrayLike | None = None,
+        labels: ArrayLike | None = None,
+    ) -> "Shape":
         """A cloud from anything numpy can read as an array [N, n]."""
-        given = {"weights": weights, "normals": normals}
+        given = {"weights": weights, "normals": normals, "labels": labels}
         return cls(points=points, **{k: v for k, v in given.items() if v is not None})  # type: ignore[arg-type]
 
     @property
@@ -109,6 +122,17 @@ def _weights(values: ArrayLike, count: int, source: str) -> Array:
     if not np.isfinite(array).all() or (array < 0).any() or array.sum() == 0:
         raise InputError(f"{source}: weights must be finite, non-negative and not all zero")
     return read_only(array)
+
+
+def _labels(values: ArrayLike, count: int, what: str, source: str) -> Index:
+    array = np.asarray(values)
+    if not np.issubdtype(array.dtype, np.integer):
+        raise InputError(f"{source}: labels are {array.dtype}; expected integers, one class for each {what}")
+    if array.shape != (count,):
+        raise InputError(f"{source}: labels have shape {array.shape}; expected ({count},), one for each {what}")
+    array = array.astype(np.int64)
+    array.flags.writeable = False
+    return array
 
 
 def _normals(values: ArrayLike, points: Array, source: str) -> Array:

@@ -108,7 +108,7 @@ def test_a_single_plane_stands_where_it_was():
     (found,) = single_plane(plane).planes
     sign = np.sign(found.normal @ plane.normal)
     np.testing.assert_allclose(sign * found.normal, plane.normal, atol=1e-14)
-    assert sign * found.offset == pytest.approx(0.7)
+    assert sign * found.offset == pytest.approx(plane.offset)
 
 
 # Convergence

@@ -112,17 +112,17 @@ def test_an_exact_symmetry_misses_by_nothing():
     assert verdict.deviation.max < 1e-9
     assert verdict.excess < 1e-6
     wrong = judge([mirror(np.pi / 3)])
-    assert wrong.deviation.p995 > 0.02
+    assert wrong.deviation.p994 > 0.02
 
 
 def test_statistics_are_ordered_and_fractions_of_the_diagonal():
     judge = judge_of(table())
     found = judge([mirror(0.1)]).deviation
-    assert 0 < found.mean < found.p95 <= found.p99 <= found.p995 <= found.max < 1
+    assert 0 < found.mean < found.p95 <= found.p97 <= found.p99 <= found.p994 <= found.max < 1
     distances = miss_distances(judge.cloud, mirror(0.1)) / judge.diagonal
     assert found.mean == pytest.approx(distances.mean())
     assert found.max == pytest.approx(distances.max())
-    for name, level in (("p95", 0.95), ("p99", 0.99), ("p995", 0.995)):
+    for name, level in (("p80", 0.8), ("p95", 0.95), ("p97", 0.97), ("p99", 0.99), ("p994", 0.994)):
         assert getattr(found, name) == pytest.approx(np.quantile(distances, level))
 
 
@@ -143,9 +143,9 @@ def test_a_larger_tolerance_forgives_in_proportion():
 
 
 def test_what_the_cloud_shows_against_itself_raises_the_limits():
-    miss = Deviation(mean=0.01, p95=0.02, p99=0.03, p995=0.03, max=0.05)
-    nothing = Deviation(mean=0, p95=0, p99=0, p995=0, max=0)
-    own = Deviation(mean=0.005, p95=0.01, p99=0.02, p995=0.02, max=0.03)
+    miss = Deviation(mean=0.01, p80=0.01, p95=0.02, p97=0.02, p99=0.03, p994=0.03, max=0.05)
+    nothing = Deviation(mean=0, p80=0, p95=0, p97=0, p99=0, p994=0, max=0)
+    own = Deviation(mean=0.005, p80=0.01, p95=0.01, p97=0.015, p99=0.02, p994=0.02, max=0.03)
     without, raised = miss.over_limits(0.02, nothing), miss.over_limits(0.02, own)
     assert len(without) == len(raised)
     assert all(b < a for a, b in zip(without, raised, strict=True))
