@@ -54,7 +54,7 @@ def align(
         source: a `Shape`, or points [N, n].
         target: a `Shape`, or points [M, n].
         scale: whether the objects may differ in size; then `target ~ scale * matrix @ source + translation`.
-        polish: refine on the points (3-space only); without it the moments have the last word, in a third of the time.
+        polish: refine on the points (3-space only); without it the moments have the last word, in half of the time.
         allow_reflection: whether determinant -1 is an answer.
         tolerance: largest miss that still counts as agreement, as in `detect`: decides between rivals, and symmetry.
         seed: of the random choices (samples of meshes, subsets of clouds).

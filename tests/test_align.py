@@ -463,7 +463,8 @@ def sheet(count: int, noise: float, rng: np.random.Generator) -> Array:
     return points + noise * rng.standard_normal(points.shape)
 
 
-# With noise: some 24 neighbours 0.06 wide give a normal to 0.01 / (0.06 sqrt(24) / 2), a plane to 0.01 / sqrt(24); twice that.
+# With noise: 24 neighbours or more, 0.06 wide, give a normal to 0.01 / (0.03 sqrt(24)) and a plane to 0.01 / sqrt(24);
+# twice that.
 @pytest.mark.parametrize(("noise", "normal_deg", "offset"), [(0.0, 1e-6, 1e-12), (0.01, 8.0, 0.006)])
 def test_planes_are_found_where_they_are_asked_for(noise: float, normal_deg: float, offset: float) -> None:
     rng = rng_of(42)
@@ -474,7 +475,7 @@ def test_planes_are_found_where_they_are_asked_for(noise: float, normal_deg: flo
     angles = [np.degrees(line_angle_rad(n, [1, 1, 1])) for n in planes.normals]
     assert np.quantile(angles, 0.9) < normal_deg
     assert np.quantile(np.abs(planes.points.sum(axis=1) - 1.0) / np.sqrt(3.0), 0.9) <= offset
-    assert (planes.flatness < 0.3).all()
+    assert (planes.flatness < 0.5).all()
     moved = probes(surface, 200, rng)
     assert np.sqrt(np.mean((moved.points.sum(axis=1) - 1.0) ** 2) / 3.0) <= max(offset, noise / 2.0)
 
