@@ -26,8 +26,8 @@ PARTS = 16
 # Up to so many points stand for themselves, without sampling noise.
 FEW = 250
 LARGEST_DIM = 8
-# Points whose nearest neighbours are looked up.
-LOOKED_UP = 2000
+# Cosine of the angle within which two candidates are one.
+_SAME = math.cos(math.radians(2.0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,21 +89,42 @@ def _padded(values: Array, dim: int) -> Array:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Hyperplane:
+    """A candidate for a hyperplane of symmetry.
+
+    Attributes:
+        plane: in input units.
+        asymmetry: what the moments of orders 2 to 4 have against it, as a fraction of the whole.
+        noise: what sampling alone would leave of that; 0 for points that stand for themselves.
+        miss: of those, the largest distance from a reflected point to its nearest neighbour, over the diameter; NaN for
+            samples, whose neighbours say nothing in high dimensions.
+    """
+
+    plane: Plane
+    asymmetry: float
+    noise: float
+    miss: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SubspaceDetection:
     """What `detect_nd` found.
 
     Attributes:
         fixed: rank and singular values of the n-tuples.
         center: [n] the point that every symmetry leaves in place.
-        hyperplane: the only hyperplane of symmetry there can be, where the rank is n - 1.
-        ratio: mean distance from the points, reflected in it, to the nearest points, over that from the points to their
-            own nearest neighbours; about 1 for a sampled symmetric object, NaN without a hyperplane.
+        hyperplanes: of symmetry, best first; several at right angles to one another where there are.
+        rejected: candidates turned down, best first.
+        diameter: twice the largest distance of a point from the centre.
+        undetermined: why the data support no decision; empty when they do.
     """
 
     fixed: FixedSubspace
     center: Array
-    hyperplane: Plane | None
-    ratio: float
+    hyperplanes: tuple[Hyperplane, ...]
+    rejected: tuple[Hyperplane, ...]
+    diameter: float
+    undetermined: str
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", read_only(self.center))
@@ -112,39 +133,129 @@ class SubspaceDetection:
 def detect_nd(
     shape: Shape | ArrayLike, *, tolerance: float = 10.0 * FLOOR, sampled: bool | None = None
 ) -> SubspaceDetection:
-    """Class of symmetry of an object in n-space, 2 <= n <= 8, from its n-tuples alone; nothing is refined.
+    """Hyperplanes of symmetry of points in n-space, 2 <= n <= 8, and the rank of their n-tuples.
+
+    The normal of a hyperplane of symmetry is an eigenvector of the second moments, and the only one at right angles to
+    the n-tuples where these have rank n - 1. From there it is turned until the moments of orders 2 to 4 are closest to
+    their images. Where second moments coincide, hyperplanes can escape; turns are not looked for.
 
     Args:
         shape: a cloud, or points [N, n].
-        tolerance: what still counts as symmetric; n-tuples, whose bound is 1, may differ by a tenth of it. The singular
-            values fall fast in high dimensions: exact points bear 1e-6.
+        tolerance: what still counts as symmetric: points that stand for themselves may miss by this fraction of the
+            diameter; the moments of samples, and n-tuples, by a tenth of it.
         sampled: whether the points are random samples of the object, whose noise hides what is smaller, or the object
             itself; more than 250 points are samples if None.
 
     Raises:
-        InputError: more dimensions, or a mesh.
+        InputError: other dimensions, or a mesh.
         DegenerateShapeError: the points do not spread.
     """
     shape = shape if isinstance(shape, Shape) else Shape.of(shape)
     if not 0.0 < tolerance <= 0.2:
         raise InputError(f"tolerance is {tolerance}; expected a number in (0, 0.2]")
-    if shape.dim > LARGEST_DIM or shape.faces is not None:
+    if not 2 <= shape.dim <= LARGEST_DIM or shape.faces is not None:
         what = "a mesh" if shape.faces is not None else f"{shape.dim} coordinates"
         raise InputError(f"{shape.source}: {what}; detect_nd takes points of 2 to {LARGEST_DIM} coordinates")
     sampled = len(shape.points) > FEW if sampled is None else sampled
     moments = shape_moments(shape, 5, parts=PARTS if sampled else 0)
     fixed = fixed_subspace(ntuples(moments, PAPER_ORDERS), floor=0.1 * tolerance)
-    if fixed.rank != shape.dim - 1:
-        return SubspaceDetection(fixed=fixed, center=moments.center, hyperplane=None, ratio=math.nan)
-    normal = fixed.directions[-1]
-    plane = Plane(normal=normal, offset=float(normal @ moments.center))
-    return SubspaceDetection(fixed=fixed, center=moments.center, hyperplane=plane, ratio=_ratio(shape.points, plane))
+    points = (shape.points - moments.center) / moments.scale
+    masses = np.ones(len(points)) if shape.weights is None else shape.weights
+    kept = masses > 0
+    points, masses = points[kept], masses[kept] / masses.sum()
+    reach = float(np.linalg.norm(points, axis=1).max())
+    parts = _parts(points, masses, PARTS if sampled else 1)
+    whole = [np.sum(part, axis=0) for part in zip(*parts, strict=True)]
+    found: list[Hyperplane] = []
+    for normal in _normals(whole, fixed):
+        if all(abs(float(normal @ other.plane.normal)) < _SAME for other in found):
+            miss = math.nan if sampled else _miss(points, normal) / (2.0 * reach)
+            plane = Plane(normal=normal, offset=float(normal @ moments.center))
+            asymmetry, noise = _against(whole, parts, normal)
+            found.append(Hyperplane(plane=plane, asymmetry=asymmetry, noise=noise, miss=miss))
+    found.sort(key=lambda h: h.asymmetry)
+    holds = [h for h in found if _holds(h, tolerance)]
+    doubt = _doubt(holds, tolerance)
+    return SubspaceDetection(
+        fixed=fixed,
+        center=moments.center,
+        hyperplanes=() if doubt else tuple(holds),
+        rejected=tuple(found) if doubt else tuple(h for h in found if h not in holds),
+        diameter=2.0 * reach * moments.scale,
+        undetermined=doubt,
+    )
 
 
-def _ratio(points: Array, plane: Plane) -> float:
+def _parts(points: Array, masses: Array, count: int) -> list[list[Array]]:
+    """Moment tensors [n, n], [n, n, n] and [n, n, n, n] of each of `count` equal shares of the points."""
+    return [_tensors(points[k::count], masses[k::count]) for k in range(count)]
+
+
+def _tensors(points: Array, masses: Array) -> list[Array]:
+    squares = np.einsum("ai,aj->aij", points, points).reshape(len(points), -1)
+    weighted = masses[:, None] * points
+    n = points.shape[1]
+    second, third = weighted.T @ points, weighted.T @ squares
+    fourth = (masses[:, None] * squares).T @ squares
+    return [second, third.reshape((n,) * 3), fourth.reshape((n,) * 4)]
+
+
+def _odd(tensors: list[Array], normal: Array) -> float:
+    """Energy of the part of the tensors that a reflection flips."""
+    flip = np.eye(len(normal)) - 2.0 * np.outer(normal, normal)
+    energy = 0.0
+    for tensor in tensors:
+        image = tensor
+        # The axes come round: each product takes the first one and appends its image.
+        for _ in range(tensor.ndim):
+            image = np.tensordot(image, flip, (0, 0))
+        energy += 0.25 * float(((tensor - image) ** 2).sum())
+    return energy
+
+
+def _normals(tensors: list[Array], fixed: FixedSubspace) -> list[Array]:
+    """Normals where the odd energy is least, from each eigenvector of the second moments and from the n-tuples."""
+    from scipy.optimize import minimize
+
+    normals = []
+    for start in (fixed.directions[-1], *np.linalg.eigh(tensors[0])[1].T):
+
+        def turned(x: Array, start: Array = start) -> Array:
+            moved = start + x - (x @ start) * start
+            return np.asarray(moved / np.linalg.norm(moved))
+
+        best = minimize(lambda x: _odd(tensors, turned(x)), np.zeros(len(start)), method="BFGS")
+        normals.append(turned(best.x))
+    return sorted(normals, key=lambda n: _odd(tensors, n))
+
+
+def _against(whole: list[Array], parts: list[list[Array]], normal: Array) -> tuple[float, float]:
+    """Asymmetry and its sampling noise (jackknife), as fractions of the whole."""
+    size = math.fsum(float((t**2).sum()) for t in whole)
+    count = len(parts)
+    apart = [_odd([count * p - t for p, t in zip(part, whole, strict=True)], normal) for part in parts]
+    noise = math.fsum(apart) / (count * max(count - 1, 1)) if count > 1 else 0.0
+    return math.sqrt(_odd(whole, normal) / size), math.sqrt(noise / size)
+
+
+def _miss(points: Array, normal: Array) -> float:
     from scipy.spatial import cKDTree
 
-    tree = cKDTree(points)
-    some = points[:: max(1, len(points) // LOOKED_UP)]
-    own = tree.query(some, k=2)[0][:, 1].mean()
-    return float(tree.query(plane.reflect(some))[0].mean() / max(own, 1e-300))
+    image = points - 2.0 * np.outer(points @ normal, normal)
+    return float(cKDTree(points).query(image)[0].max())
+
+
+def _holds(candidate: Hyperplane, tolerance: float) -> bool:
+    if not math.isnan(candidate.miss):
+        return candidate.miss <= tolerance
+    return candidate.asymmetry <= math.hypot(0.1 * tolerance, math.sqrt(SIGNIFICANT) * candidate.noise)
+
+
+def _doubt(holds: list[Hyperplane], tolerance: float) -> str:
+    """Why too little is known of what seems to hold, or nothing."""
+    noise = max((h.noise for h in holds), default=0.0)
+    if noise <= 0.5 * tolerance:
+        return ""
+    return (
+        f"the noise of the samples, {noise:.1%} of the moments, hides asymmetries of {tolerance:.1%}; give more points"
+    )

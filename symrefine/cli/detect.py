@@ -5,7 +5,7 @@ import sys
 import time
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal
 
 from symrefine.cli.outputs import STDOUT, Writer, check_outputs, note, say, text_writer, waiting, write_all
 from symrefine.cli.values import add_detection_options, grey, natural, positive
@@ -13,7 +13,6 @@ from symrefine.errors import InputError
 
 if TYPE_CHECKING:
     from symrefine.detect import Detection
-    from symrefine.planar import PlanarDetection
     from symrefine.shape import Shape
 
 NAME = "detect"
@@ -21,8 +20,8 @@ HELP = "find the planes, axes and point group of a mesh, cloud or picture"
 DESCRIPTION = (
     "Find the mirror planes, rotation axes and point group of the mesh or point cloud in PATH (.ply .stl .obj .off "
     ".glb .gltf .pcd .xyz .csv .txt .npy .npz), or the mirror lines and turns of a picture (.png .jpg .jpeg .bmp) or "
-    "of points with two coordinates (.csv .txt .npy .npz). Prints a table; lengths are in the units of the file, "
-    "misses in percent of the bounding-box diagonal."
+    "of points with two coordinates (.csv .txt .npy .npz), or the hyperplanes of symmetry of points with 4 to 8 "
+    "coordinates. Prints a table; lengths are in the units of the file, misses in percent of the bounding-box diagonal."
 )
 
 
@@ -67,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
         writers = _writers(args, shape, detection, record)
         write_all(writers)
     if args.bop is not None:
-        _note_limits(cast("Detection", detection))
+        _note_limits(detection)
     if args.json == STDOUT:
         from symrefine.export.files import json_text
 
@@ -85,8 +84,12 @@ def examine(
     *,
     threshold: float | Literal["otsu"] | None = None,
     invert: bool = False,
-) -> tuple["Shape", "Detection | PlanarDetection", dict[str, Any]]:
-    """Shape, detection and JSON record of a file, in space or in the plane as its points are."""
+) -> tuple["Shape", Any, dict[str, Any]]:
+    """Shape, detection and JSON record of a file.
+
+    The detection is a `PlanarDetection`, a `Detection` or a `SubspaceDetection`, as the points have two, three or more
+    coordinates.
+    """
     from symrefine.load import IMAGES, load
 
     start = time.perf_counter()
@@ -101,6 +104,14 @@ def examine(
         if Path(path).suffix.lower() in IMAGES:
             options |= {"threshold": threshold, "invert": invert}
         return shape, flat, planar_record(flat, shape, options=options, load_s=load_s)
+    if shape.dim > 3:
+        from symrefine.export.spaces import subspace_record
+        from symrefine.subspace import detect_nd
+
+        start = time.perf_counter()
+        beyond = detect_nd(shape, tolerance=tolerance)
+        timings = {"load": load_s, "detect": time.perf_counter() - start}
+        return shape, beyond, subspace_record(beyond, shape, options=options, timings=timings)
     from symrefine.detect import detect
     from symrefine.export.records import detection_record
 
@@ -115,24 +126,28 @@ def _check_bop(path: Path) -> None:
 
 
 def _writers(
-    args: argparse.Namespace, shape: "Shape", detection: "Detection | PlanarDetection", record: dict[str, Any]
+    args: argparse.Namespace,
+    shape: "Shape",
+    detection: Any,
+    record: dict[str, Any],
 ) -> dict[str, Writer]:
     writers: dict[str, Writer] = {}
     if args.json not in (None, STDOUT):
         from symrefine.export.files import json_text
 
         writers[args.json] = text_writer(json_text(record))
-    if shape.dim == 2:
-        _refuse_spatial(args)
+    if shape.dim != 3:
+        _refuse_spatial(args, shape.dim)
         return writers
-    return writers | _spatial_writers(args, shape, cast("Detection", detection))
+    return writers | _spatial_writers(args, shape, detection)
 
 
-def _refuse_spatial(args: argparse.Namespace) -> None:
+def _refuse_spatial(args: argparse.Namespace, dim: int) -> None:
+    where = "lies in the plane" if dim == 2 else f"has {dim} coordinates"
     options = {"--bop": args.bop, "--recording": args.recording, "--report": args.report}
     for option, name in options.items():
         if name is not None:
-            raise InputError(f"{option} {name}: is for objects in space; {args.path} lies in the plane, use --json")
+            raise InputError(f"{option} {name}: is for objects in space; {args.path} {where}, use --json")
 
 
 def _spatial_writers(args: argparse.Namespace, shape: "Shape", detection: "Detection") -> dict[str, Writer]:
@@ -167,10 +182,11 @@ def _note_limits(detection: "Detection") -> None:
 
 def _print(record: dict[str, Any], written: list[str]) -> None:
     from symrefine.cli.outputs import console
-    from symrefine.cli.tables import detection_lines, planar_lines
+    from symrefine.cli.tables import detection_lines, hyperplane_lines, planar_lines
 
     out = console()
-    for line in planar_lines(record) if "lines" in record else detection_lines(record):
+    lines = planar_lines if "lines" in record else hyperplane_lines if "hyperplanes" in record else detection_lines
+    for line in lines(record):
         out.print(line, soft_wrap=isinstance(line, str))
     for name in written:
         out.print(f"wrote {name}", soft_wrap=True)

@@ -144,6 +144,31 @@ def _ratios(record: Record) -> Table:
     return table
 
 
+def hyperplane_lines(record: Record) -> Iterator[Table | str]:
+    """Everything a table can say about points of four and more dimensions."""
+    found, dim = record["hyperplanes"], record["dimension"]
+    told = _count(len(found), "hyperplane") + " of symmetry" if found else "no hyperplane of symmetry"
+    doubt = record["undetermined"]
+    yield f"{record['source']}: {f'undetermined: {doubt}' if doubt else f'{told} in {dim} dimensions'}"
+    yield f"n-tuples of rank {record['ntuples']['rank']}; turns are not looked for in {dim} dimensions"
+    for title, candidates in (("hyperplanes: normal", found), ("turned down: normal", record["rejected"])):
+        if candidates:
+            yield ""
+            yield _hyperplanes(title, candidates, record)
+    yield ""
+    yield "Offsets in units of the file, asymmetry and noise in % of the moments, largest miss in % of the diameter."
+    yield f"{sum(record['timings'].values()):.2f} s"
+
+
+def _hyperplanes(title: str, candidates: Sequence[Record], record: Record) -> Table:
+    table = _table(title, "offset", "asymmetry", "noise", "largest miss")
+    for h in candidates:
+        offset = _length(h["offset"], {"diagonal": record["diameter"]})
+        miss = "" if h["miss"] is None else _percent(h["miss"])
+        table.add_row(_direction(h["normal"]), offset, _percent(h["asymmetry"]), _percent(h["noise"]), miss)
+    return table
+
+
 def alignment_lines(record: Record) -> Iterator[str]:
     """Everything a person wants to know about one alignment."""
     yield f"{record['source']} onto {record['target']}: {record['status']}"
@@ -168,6 +193,11 @@ def batch_table(rows: Sequence[Record]) -> Table:
     for row in rows:
         if row["error"] is not None:
             table.add_row(row["file"], f"failed: {row['error']}")
+            continue
+        if "hyperplanes" in row:
+            told = "undetermined" if row["undetermined"] else f"{row['dimension']}-D"
+            seconds = f"{sum(row['timings'].values()):.2f}"
+            table.add_row(row["file"], told, str(len(row["hyperplanes"])), "", "", "", seconds)
             continue
         mirrors, turns = _mirrors_and_turns(row)
         elements = mirrors + turns
