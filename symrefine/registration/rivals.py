@@ -38,7 +38,7 @@ UNEVEN, MISFIT = 4.0, 20.0
 # Moments that agree to this are those of the same points.
 ROUNDING = 1e-7
 # Singular values of the n-tuples this many times beyond significance make the landscape unnecessary.
-CLEAR = 5.0
+CLEAR = 2.5
 # Standard deviations by which the moments must prefer one determinant to decide it alone.
 DECIDED = 5.0
 # A rival that misses by less than this share of the limits is good; no other of its determinant is tried.
@@ -129,7 +129,7 @@ def candidates(evidence: Evidence, determinants: tuple[int, ...]) -> HarmonicFit
     starts = [m for m in (closed.matrix, closed.flipped) if int(np.sign(np.linalg.det(m))) in determinants]
     if closed.singular_values[1] > CLEAR * closed.significance:
         fitted = fit(pair, np.array(starts), steps=FIRST_STEPS + LAST_STEPS)
-        if fitted.costs[0] < MISFIT * pair.size:
+        if fitted.costs[0] < UNEVEN * pair.size:
             return fitted
     scores = dict(zip((1, -1), landscape(evidence.source.moments, evidence.target.moments, pair), strict=True))
     climbed = [hills(scores[d], d, count=HILLS) for d in determinants]
