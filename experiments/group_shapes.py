@@ -69,6 +69,7 @@ def group(name: str, sibling: bool = False) -> str:
 
 
 TANGENT, AXIAL = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+ROOT5 = 5**0.5
 ROUND_BODY = spun([(0, 0), (0.35, 0), (0.35, 0.7), (0.13, 0.9), (0, 0.9)])
 
 
@@ -163,7 +164,9 @@ def _many_axes() -> dict[str, Design]:
         "jack": Design(group="Oh", sibling="Cs", build=made.jack, detail=3, along=TANGENT),
         "bossed_cube": Design(group="Oh", sibling="Cs", build=made.bossed_cube, detail=1, along=TANGENT),
         "thirty_bars": Design(group="I", sibling="C1", build=made.thirty_bars, detail=1, along=(0, -1, 1)),
-        "spiked_ball": Design(group="Ih", sibling="C1", build=made.spiked_ball, detail=1, along=(1, 0, 0)),
+        "spiked_ball": Design(
+            group="Ih", sibling="Cs", build=made.spiked_ball, detail=1, along=(5 + ROOT5, -2, ROOT5 - 1)
+        ),
         "dodecahedral_frame": Design(
             group="Ih", sibling="C3v", build=made.dodecahedral_frame, along=(1, 1, 1), detail=30
         ),

@@ -20,7 +20,7 @@ from symrefine.geometry import Array, random_orthogonal
 from symrefine.verify import TOLERANCE
 
 NOISE_BOND = 0.01
-TOLERANCES = (TOLERANCE, 0.04, 0.06)
+TOLERANCES = (TOLERANCE, 0.03, 0.04, 0.06)
 # In angstroms: its default, and two smaller ones.
 PYMATGEN_TOLERANCES = (0.3, 0.1, 0.03)
 
