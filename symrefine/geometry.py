@@ -191,7 +191,8 @@ def tight_diagonal(points: Array) -> float:
 
 
 def _smallest_box(points: Array, frames: Array) -> tuple[float, Array]:
-    extent = np.ptp(np.einsum("fij,nj->fni", frames, points), axis=1)
+    along = (frames.reshape(-1, 3) @ points.T).reshape(len(frames), 3, -1)
+    extent = along.max(axis=2) - along.min(axis=2)
     diagonals = np.linalg.norm(extent, axis=1)
     best = int(diagonals.argmin())
     return float(diagonals[best]), frames[best]
