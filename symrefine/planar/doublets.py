@@ -42,7 +42,8 @@ class VectorDoublets:
     def ratio(self) -> float:
         """Larger over smaller singular value: the larger, the closer the doublets are to a line; inf on a line."""
         large, small = self.singular_values
-        return float(large / small) if small > 0 else float("inf")
+        # What is smaller than that is rounding, another on each processor.
+        return float(large / small) if small > 1e-10 * large else float("inf")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
