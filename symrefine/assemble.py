@@ -35,6 +35,9 @@ from symrefine.verify import Verdict
 # the same kind of truth: a wheel maps onto itself nearly as well between its spokes.
 RIVAL = 4.0
 EXACT = 0.45
+# The same with the details: one leg of eight out of place shows in no bulk.
+RIVAL_DETAIL = 2.5
+EXACT_DETAIL = 0.55
 # Directions of elements are known to this before the joint refinement.
 DIRECTION_ERROR_RAD = math.radians(1.5)
 KNOWN_RAD = math.radians(4.0)
@@ -74,20 +77,34 @@ def assemble(evidence: Evidence) -> Assembly:
         return _round(evidence, bundle)
     group = PointGroup(name=f"C{int(bundle.fold)}v", frame=bundle.state.frame)
     others = list(mirrors(evidence, NOTHING, count=NEAR, known=_mirror_of(group), thorough=False))
-    if any(_holds(m.verdict, _limit([bundle.verdict])) for m in others):
+    if any(_standard([bundle.verdict]).admits(m.verdict) for m in others):
         # A mirror beside the bundle: the axis the n-tuples claimed by chance is not all there is.
         return assemble(replace(evidence, tuples=replace(evidence.tuples, kind="vanish")))
     near = [mirror_element(m) for m in others]
-    return _finish(evidence, group, bundle.state.center, bundle.history, near)
+    done = _finish(evidence, group, bundle.state.center, bundle.history, near)
+    standard = _standard(e.verdict for e in done.elements)
+    # Some of its mirrors may be exact and the others broken by a detail: then each is asked for by itself.
+    return done if all(standard.admits(e.verdict) for e in done.elements) else _from_parts(evidence)
 
 
-def _limit(verdicts: Iterable[Verdict]) -> float:
-    """Bulk miss up to which candidates are taken for true, given the best of them."""
-    return min(1.0, max(EXACT, RIVAL * min((v.bulk for v in verdicts), default=1.0)))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Standard:
+    """Misses, of the bulk and with the details, up to which candidates are taken for true."""
+
+    bulk: float = 1.0
+    detail: float = 1.0
+
+    def admits(self, verdict: Verdict) -> bool:
+        """Whether an element holds by this standard."""
+        return verdict.excess <= 1.0 and verdict.bulk <= self.bulk and verdict.detail <= self.detail
 
 
-def _holds(verdict: Verdict, limit: float) -> bool:
-    return verdict.excess <= 1.0 and verdict.bulk <= limit
+def _standard(verdicts: Iterable[Verdict]) -> _Standard:
+    """The standard that the best of the candidates sets."""
+    given = tuple(verdicts)
+    bulk = min((v.bulk for v in given), default=1.0)
+    detail = min((v.detail for v in given), default=1.0)
+    return _Standard(bulk=max(EXACT, RIVAL * bulk), detail=max(EXACT_DETAIL, RIVAL_DETAIL * detail))
 
 
 def _axis_open(evidence: Evidence) -> Array:
@@ -112,8 +129,8 @@ def _best_bundle(evidence: Evidence) -> Bundle | None:
         found += [b for b in bundles if b.verdict.excess <= (ROUND_LIMIT if math.isinf(b.fold) else 1.0)]
         if any(b.verdict.bulk <= EXACT for b in found):
             break
-    limit = _limit(b.verdict for b in found)
-    return max((b for b in found if _holds(b.verdict, min(limit, EXACT))), key=lambda b: b.fold, default=None)
+    standard = replace(_standard(b.verdict for b in found), bulk=EXACT)
+    return max((b for b in found if standard.admits(b.verdict)), key=lambda b: b.fold, default=None)
 
 
 def _round(evidence: Evidence, bundle: Bundle) -> Assembly:
@@ -126,7 +143,7 @@ def _round(evidence: Evidence, bundle: Bundle) -> Assembly:
         mirror = evidence.judge(across.motions)
         if evidence.judge(tilted.motions).excess <= max(EXACT, bundle.verdict.excess):
             name, center = "Kh", tilted.center
-        elif _holds(mirror, _limit([bundle.verdict, mirror])):
+        elif _standard([bundle.verdict, mirror]).admits(mirror):
             name, center = "Dinfh", center + axis * float(axis @ (across.center - center))
     return _finish(evidence, PointGroup(name=name, frame=bundle.state.frame), center, bundle.history, [])
 
@@ -158,7 +175,7 @@ def _unless_round(evidence: Evidence, found: Assembly) -> Assembly:
     main = [u for u, k in found.group.rotation_axes()[:1] if k >= CHANCE_FOLD]
     for bundle in (b for u in main for b in axis_bundle(evidence, u, mirrored=False)):
         worst = max((e.verdict.bulk for e in found.elements), default=0.0)
-        if _holds(bundle.verdict, max(EXACT, AS_GOOD * worst)):
+        if _Standard(bulk=max(EXACT, AS_GOOD * worst)).admits(bundle.verdict):
             return _round(evidence, bundle)
     return found
 
@@ -211,9 +228,9 @@ def _mirror_group(evidence: Evidence) -> tuple[list[Mirror], list[Element], Poin
             near.append(mirror)
         else:
             held.append(mirror)
-            limit = _limit(m.verdict for m in held)
-            near += [m for m in held if not _holds(m.verdict, limit)]
-            group, held, _ = _closed([m for m in held if _holds(m.verdict, limit)], [])
+            standard = _standard(m.verdict for m in held)
+            near += [m for m in held if not standard.admits(m.verdict)]
+            group, held, _ = _closed([m for m in held if standard.admits(m.verdict)], [])
         if few and held and len(near) >= NEAR:
             break
     return held, [mirror_element(m) for m in near], group
@@ -257,8 +274,8 @@ def _turns(evidence: Evidence, held: list[Mirror], group: PointGroup) -> list[Tu
         offered = _axis_open(evidence) if held or evidence.tuples.kind == "vanish" else axis_directions(evidence)
         directions = np.concatenate([np.array(normals).reshape(-1, 3), evidence.tuples.directions[:1], offered])
     found = [t for d in _apart(directions, KNOWN_RAD) if (t := turns_about(evidence, d, center)) is not None]
-    limit = _limit([*(m.verdict for m in held), *(t.verdict for t in found)])
-    return [t for t in found if _holds(t.verdict, limit)]
+    standard = _standard([*(m.verdict for m in held), *(t.verdict for t in found)])
+    return [t for t in found if standard.admits(t.verdict)]
 
 
 def _apart(directions: Array, angle_rad: float) -> list[Array]:
@@ -287,14 +304,14 @@ def _closed(held: list[Mirror], turns: list[Turn]) -> tuple[PointGroup, list[Mir
 
 def _with_improper(evidence: Evidence, group: PointGroup, verdicts: list[Verdict], center: Array) -> PointGroup:
     """The group with the inversion, or the rotoreflection of its main axis, where they hold as well as the rest."""
-    limit = _limit(verdicts)
+    standard = _standard(verdicts)
     axes = [(u, int(2 * k)) for u, k in group.rotation_axes()[:1] if k <= 12]
     improper = (
-        [(u, k) for u, k in axes if _holds(improper_about(evidence, u, center, k), limit)]
+        [(u, k) for u, k in axes if standard.admits(improper_about(evidence, u, center, k))]
         if not _has_all(group)
         else []
     )
-    inversion = group.has_inversion or _holds(improper_about(evidence, np.array([0.0, 0.0, 1.0]), center, 2), limit)
+    inversion = group.has_inversion or standard.admits(improper_about(evidence, np.array([0.0, 0.0, 1.0]), center, 2))
     if inversion == group.has_inversion and not improper:
         return group
     try:
@@ -324,7 +341,8 @@ def _common_point(held: list[Mirror], turns: list[Turn]) -> Array:
         values += list(p @ t.point)
     if not rows:
         return np.zeros(3)
-    return np.linalg.lstsq(np.array(rows), np.array(values), rcond=1e-3)[0]
+    # Normals are known to a degree or so: what little they leave their common plane by is no third condition.
+    return np.linalg.lstsq(np.array(rows), np.array(values), rcond=0.1)[0]
 
 
 def _joint(group: PointGroup, center: Array) -> Framed | None:

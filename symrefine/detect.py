@@ -23,7 +23,7 @@ from symrefine.quadrature import mesh_nodes, sample_surface
 from symrefine.refine import Iterate
 from symrefine.search import Evidence
 from symrefine.shape import Index, Shape
-from symrefine.verify import TOLERANCE, Deviation, Judge, confidence, make_judge
+from symrefine.verify import TOLERANCE, Deviation, Judge, confidence, make_judge, split_floor
 
 ORDER = 8
 PARTS = 16
@@ -34,6 +34,10 @@ CLOSER_PLANES = 12000
 VOLUME_POINTS = 20000
 # Masses of atoms that differ by more than this fraction are masses of different kinds.
 SAME_MASS = 0.01
+# Up to so many points of a surface it is asked whether the answer hangs on a few: of so many parts of this size.
+SPARSE = 1500
+SUBSETS = 3
+SUBSET = 0.8
 # Up to so many distinct points stand for themselves (atoms); more are samples of a surface.
 FEW = 250
 
@@ -152,7 +156,15 @@ def detect(
         raise InputError(f"tolerance is {tolerance}; expected a fraction of the diagonal in (0, 0.2]")
     shape = _with_mass(shape)
     clock = Clock()
-    few = shape.faces is None and len(shape.points) <= FEW
+    vectors, evidence, found = _examine(shape, tolerance, seed, clock)
+    with clock("doubt"):
+        doubt = _doubt(evidence) or _fickle(shape, found, tolerance, seed)
+    return _report(_unclaimed(found) if doubt else found, evidence, vectors, doubt, clock.seconds)
+
+
+def _examine(shape: Shape, tolerance: float, seed: int, clock: "Clock") -> tuple[NTuples, Evidence, Assembly]:
+    """The n-tuples, all evidence, and the group that it speaks for."""
+    few = _is_few(shape)
     classes = _classes(shape, few)
     with clock("moments"):
         moments = _moments(shape, classes, parts=0 if few or shape.faces is not None else PARTS)
@@ -161,19 +173,30 @@ def detect(
         gathered = few_points if few else gather
         evidence = gathered(shape, classes, moments, vectors, tolerance, np.random.default_rng(seed))
     with clock("search"):
-        found = assemble(evidence)
-    doubt = _doubt(evidence)
-    return _report(_unclaimed(found) if doubt else found, evidence, vectors, doubt, clock.seconds)
+        return vectors, evidence, assemble(evidence)
+
+
+def _is_few(shape: Shape) -> bool:
+    """Whether the points are few enough to stand for themselves."""
+    return shape.faces is None and len(shape.points) <= FEW
 
 
 def _with_mass(shape: Shape) -> Shape:
     """The shape without points of no mass, which are no part of the object."""
     if shape.weights is None or shape.faces is not None or shape.weights.all():
         return shape
-    kept = shape.weights > 0
-    normals = None if shape.normals is None else shape.normals[kept]
-    labels = None if shape.labels is None else shape.labels[kept]
-    return replace(shape, points=shape.points[kept], weights=shape.weights[kept], normals=normals, labels=labels)
+    return _part(shape, np.flatnonzero(shape.weights > 0))
+
+
+def _part(shape: Shape, some: Index) -> Shape:
+    """Some of the points of a cloud."""
+    return replace(
+        shape,
+        points=shape.points[some],
+        weights=None if shape.weights is None else shape.weights[some],
+        normals=None if shape.normals is None else shape.normals[some],
+        labels=None if shape.labels is None else shape.labels[some],
+    )
 
 
 def _classes(shape: Shape, few: bool) -> Index | None:
@@ -209,7 +232,7 @@ def _elsewhere(dim: int) -> str:
         return "these points have 2 coordinates: use symrefine.planar.detect_planar"
     return (
         f"these points have {dim} coordinates: for 4 and more symrefine.subspace.detect_nd tells the rank of the "
-        "n-tuples and the one hyperplane of symmetry there may be, no turns and no groups"
+        "n-tuples and the hyperplanes of symmetry, no turns and no groups"
     )
 
 
@@ -221,6 +244,24 @@ def _doubt(evidence: Evidence) -> str:
     return (
         f"the cloud does not even agree with itself: 5 % of its surface misses the rest by {floor:.1%} of the diagonal "
         f"or more, against a tolerance of {tolerance:.1%}; give more points, less noise, or a larger tolerance"
+    )
+
+
+def _fickle(shape: Shape, found: Assembly, tolerance: float, seed: int) -> str:
+    """Of a sparse surface: what else it would be if some points were missing, or nothing if the group stays."""
+    count = len(shape.points)
+    if shape.faces is not None or _is_few(shape) or count > SPARSE:
+        return ""
+    rng = np.random.default_rng(seed)
+    names = {found.group.name}
+    for _ in range(SUBSETS):
+        some = np.sort(rng.choice(count, int(SUBSET * count), replace=False))
+        names.add(_examine(_part(shape, some), tolerance, seed, Clock())[2].group.name)
+    if len(names) == 1:
+        return ""
+    return (
+        f"{count} points are too few for this surface: without a fifth of them it could be {' or '.join(sorted(names))}"
+        "; give more points"
     )
 
 
@@ -264,17 +305,18 @@ def gather(
     local = (points - moments.center) / moments.scale
     exact = shape.faces is not None
     tree = None if exact else cKDTree(local, balanced_tree=False, compact_nodes=False)
-    chance = None if exact else shape.weights
+    chance = None if exact or np.ptp(weights) == 0.0 else weights
     planes = partial(
         local_planes, local, rng=rng, normals=normals, labels=labels, weights=chance, exact=exact, tree=tree
     )
     filled = tree is not None and normals is None and fills_volume(local, tree, rng)
     cloud = _volume(local, labels, rng) if filled else planes(LOCAL_PLANES)
     diagonal = tight_diagonal(cloud.points)
+    floor = None if exact or filled or len(local) > LOCAL_PLANES else _sparse_floor(local, labels, diagonal, rng)
 
     @cache
     def closer() -> Judge:
-        return make_judge(cloud if filled else planes(CLOSER_PLANES), diagonal, tolerance)
+        return make_judge(cloud if filled else planes(CLOSER_PLANES), diagonal, tolerance, floor)
 
     return Evidence(
         moments=moments,
@@ -282,9 +324,19 @@ def gather(
         tuples=classify(vectors),
         points=local,
         weights=weights / weights.sum(),
-        judge=make_judge(cloud, diagonal, tolerance),
+        judge=make_judge(cloud, diagonal, tolerance, floor),
         closer=closer,
     )
+
+
+def _sparse_floor(points: Array, labels: Index | None, diagonal: float, rng: np.random.Generator) -> Deviation:
+    """What two halves of a sparse cloud show against one another."""
+    order = rng.permutation(len(points))
+    halves = [
+        local_planes(points[half], len(half), rng, labels=None if labels is None else labels[half])
+        for half in (np.sort(order[::2]), np.sort(order[1::2]))
+    ]
+    return split_floor(halves[0], halves[1], diagonal)
 
 
 def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> LocalPlanes:

@@ -162,7 +162,7 @@ def local_planes(
     Args:
         normals: [N, 3] unit normals to use instead of fitted ones, any sign.
         labels: [N] classes; they do not matter to the fits.
-        weights: [N] positive; a point is chosen in proportion to it, so that the inverse of an uneven density evens out.
+        weights: [N] positive; a point is chosen in proportion to its own, so that an uneven density evens out.
         exact: points and normals are free of noise (samples of a mesh) and are taken as they are.
         tree: kd-tree over `points`, if there is one already.
     """

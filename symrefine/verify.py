@@ -18,8 +18,12 @@ from symrefine.shape import Index
 # the 52 catalogued meshes every false element passes at least one of them (a propeller's blades the first two, a
 # mailbox's flag the last) and every true one but a posed ant stays below; the closest is a camera.
 LIMITS = (0.22, 0.75, 1.15, 1.6, 2.0)
+# The same for atoms, of mean, 95th percentile and the farthest: noise moves every one of them, and every one counts.
+ATOM_LIMITS = (0.7, 1.2, 1.5)
 TOLERANCE = 0.02
 DISCS = 4
+# Miss of a cloud against itself over that of its halves, whose points stand sqrt(2) times as far apart.
+HALF_SPACING = 0.75
 # Local planes that the cloud is compared with itself at.
 OWN = 1300
 
@@ -57,12 +61,14 @@ class Verdict:
         deviation: the miss.
         excess: the largest of its statistics over its limit; the operation holds if this is <= 1.
         bulk: the same from mean and 95th percentile alone: how well the object as a whole, but for details, agrees.
+        detail: the same from all but the farthest percentile: with the details, but for specks.
         core: 80th percentile of the miss over the tolerance: how well most of it agrees.
     """
 
     deviation: Deviation
     excess: float
     bulk: float
+    detail: float
     core: float
 
 
@@ -82,23 +88,37 @@ class Judge:
         worst = Deviation(**{f.name: max(getattr(d, f.name) for d in found) for f in fields(Deviation)})
         ratios = worst.over_limits(self.tolerance, self.floor)
         if self.cloud.body == "atoms":
-            # Every point counts: one atom out of place breaks the symmetry.
-            ratios = (*ratios, worst.max / (LIMITS[-1] * self.tolerance))
+            own = (worst.mean, worst.p95, worst.max)
+            ratios = tuple(value / (limit * self.tolerance) for value, limit in zip(own, ATOM_LIMITS, strict=True))
         if self.cloud.body == "volume":
             # Of a volume the nearest points tell the outline only; how the mass spreads tells the rest.
             spread = max(spread_distance(self.cloud.points, m) for m in motions) / self.diagonal
             ratios = (max(ratios[0], spread / (LIMITS[0] * self.tolerance)), *ratios[1:])
         core = max(worst.p80**2 - self.floor.p80**2, 0.0) ** 0.5 / self.tolerance
-        return Verdict(deviation=worst, excess=max(ratios), bulk=max(ratios[:2]), core=core)
+        return Verdict(
+            deviation=worst, excess=max(ratios), bulk=max(ratios[:2]), detail=max(ratios[: len(LIMITS) - 1]), core=core
+        )
 
 
-def make_judge(cloud: LocalPlanes, diagonal: float, tolerance: float) -> Judge:
-    """A judge that knows what the cloud shows against itself."""
+def make_judge(cloud: LocalPlanes, diagonal: float, tolerance: float, floor: Deviation | None = None) -> Judge:
+    """A judge that knows what the cloud shows against itself, unless it is told that `floor`."""
+    if floor is not None:
+        return Judge(cloud=cloud, diagonal=diagonal, tolerance=tolerance, floor=floor)
     if cloud.body == "atoms":
         return Judge(cloud=cloud, diagonal=diagonal, tolerance=tolerance, floor=_summary(np.zeros(1)))
     some = slice(None, None, max(1, len(cloud.points) // OWN))
     own = disc_distances(cloud, cloud.points[some], cloud.classes(some), skip_self=True) / diagonal
     return Judge(cloud=cloud, diagonal=diagonal, tolerance=tolerance, floor=_summary(own))
+
+
+def split_floor(one: LocalPlanes, other: LocalPlanes, diagonal: float) -> Deviation:
+    """What a cloud shows against itself, from two halves of it with planes of their own.
+
+    Where every point takes part in the planes of its neighbours, as in a sparse cloud, comparing it with those planes
+    says half of what independent points would show; halves say more than the whole would, by their wider spacing.
+    """
+    across = [disc_distances(a, b.points, b.labels) for a, b in ((one, other), (other, one))]
+    return _summary(HALF_SPACING * np.concatenate(across) / diagonal)
 
 
 def miss_distances(cloud: LocalPlanes, motion: Isometry, *, stride: int = 1) -> Array:
