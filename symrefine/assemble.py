@@ -259,8 +259,10 @@ def _turns(evidence: Evidence, held: list[Mirror], group: PointGroup) -> list[Tu
     """Rotation axes worth having beside the mirrors: those the n-tuples leave open, or a higher order of the main axis.
 
     Two mirrors or more imply their axes; then only the main one can be of a higher order than the mirrors show. Beside
-    one mirror alone an axis can only stand across it, where all n-tuples vanish.
+    one mirror alone an axis can only stand across it, where all n-tuples vanish. No finite group holds Oh or Ih.
     """
+    if group.name in ("Oh", "Ih"):
+        return []
     center = _common_point(held, [])
     if len(held) > 1:
         directions = np.array([u for u, _ in group.rotation_axes()[:1]]).reshape(-1, 3)

@@ -14,7 +14,7 @@ from symrefine.verify import Verdict
 FREE_TURNS = (0.517, 1.234, 2.6833)
 # Distances evaluated in all for the final judgement of a group's elements, and at least for each.
 JUDGED = 12000
-JUDGED_EACH = 600
+JUDGED_EACH = 450
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

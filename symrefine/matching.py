@@ -19,6 +19,9 @@ FLAT = 0.3
 WORTH = 1.0
 # Median flatness of neighbourhoods up to WIDEST_BLOB wide, over that of a blob, from which on points fill a volume.
 VOLUME = 0.8
+# Probes at first, and the doubt that they leave.
+PROBES = 60
+UNCERTAIN = 0.08
 WIDEST_BLOB = 0.5
 # Classes stand so far apart along a fourth coordinate (RMS radii) that no query finds a point of another class first.
 APART = 1e3
@@ -131,19 +134,28 @@ def _blob_flatness(k: int) -> float:
     return max(float(np.median(_flatness(values))), 1e-12)
 
 
-def fills_volume(points: Array, tree: Any, rng: np.random.Generator, *, probes: int = 240) -> bool:
+def fills_volume(points: Array, tree: Any, rng: np.random.Generator) -> bool:
     """Whether points [N, 3] (RMS radius 1) fill a volume: at no width do neighbourhoods look flatter than a blob."""
-    pick = rng.choice(len(points), min(probes, len(points)), replace=False)
-    size = NEIGHBOURS[0]
+    order = rng.permutation(len(points))
+    first = _flattest(points, tree, order[:PROBES])
+    if abs(first - VOLUME) > UNCERTAIN:
+        return first > VOLUME
+    return _flattest(points, tree, order[: 5 * PROBES]) > VOLUME
+
+
+def _flattest(points: Array, tree: Any, pick: Index) -> float:
+    """Smallest median flatness of neighbourhoods of some points, over that of a blob, at any size and width."""
+    size, flattest = NEIGHBOURS[0], np.inf
     while size <= max(len(points) // 8, NEIGHBOURS[0]):
         distance, near = tree.query(points[pick], k=size)
         if float(np.median(distance[:, -1])) > WIDEST_BLOB:
             break
         _, _, values = _fit(points, near)
-        if float(np.median(_flatness(values))) < VOLUME * _blob_flatness(size):
-            return False
+        flattest = min(flattest, float(np.median(_flatness(values))) / _blob_flatness(size))
+        if flattest < VOLUME - UNCERTAIN:
+            break
         size *= 2
-    return True
+    return flattest
 
 
 def local_planes(

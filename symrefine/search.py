@@ -21,6 +21,8 @@ from symrefine.verify import Judge, Verdict
 IRRATIONAL_TURNS = 2.0 * np.pi * np.array([0.0823, 0.1381966, 0.2360680, 0.4270510])
 # A revolution that misses by less than this fraction of the limits is round, whatever folds its facets suggest.
 ROUND = 0.3
+# A bundle of mirrors that misses by less is not outdone by another about nearly the same axis.
+CLEAR = 0.5
 # Excess of a free turn, at the start, beyond which an object is not round.
 BARELY_ROUND = 1.5
 # Sources of a first look: enough to tell hopeless from possible.
@@ -34,7 +36,7 @@ AXIS_HOPELESS = 0.15
 # Excesses between these are close calls.
 CLOSE = (0.5, 1.4)
 # A miss below this share of the limits is no compromise between parts.
-SURE = 0.15
+SURE = 0.3
 # Gate (spacings) of a refinement held to what agrees, and how much better its bulk has to be to be believed.
 LOCK = 0.5
 # Scale of its weights over the median absolute residual: what misses by more than most does hardly counts.
@@ -142,7 +144,7 @@ def axis_bundle(evidence: Evidence, direction: Array, *, mirrored: bool = True) 
                 found = _mirrors_through(evidence, candidate)
                 if found is not None:
                     yield found
-                    if found.verdict.excess < ROUND:
+                    if found.verdict.excess < CLEAR:
                         return
 
 
