@@ -59,7 +59,8 @@ class Answer:
         starts: planes (or bundles of planes) that were refined from.
         iterations: most outer iterations behind a plane that is reported.
         iterations_all: most outer iterations of any start.
-        evaluations: passes over all pairs of points, each plane of a bundle and each start counted.
+        passes: over all pairs of points to set up an outer iteration, each plane of a bundle and each start counted.
+        evaluations: of the residual of all pairs as the original counts them; ours needs one for each pass.
         steps: normals of the reported planes, start first, one list for each outer iteration.
         normals_s: seconds that estimating normals took, for methods that need them.
     """
@@ -69,6 +70,7 @@ class Answer:
     starts: int | None = None
     iterations: int | None = None
     iterations_all: int | None = None
+    passes: int | None = None
     evaluations: int | None = None
     steps: Sequence[Sequence[Array]] = ()
     normals_s: float = 0.0
@@ -85,6 +87,7 @@ def from_ntuples(scan: Scan) -> Answer:
         starts=1 if history else 0,
         iterations=found.iterations,
         iterations_all=found.iterations,
+        passes=bundle * found.iterations,
         evaluations=bundle * found.iterations,
         steps=history,
     )
@@ -112,6 +115,7 @@ def from_grid(scan: Scan) -> Answer:
         starts=len(histories),
         iterations=max((len(histories[i]) - 1 for i in kept), default=None),
         iterations_all=max(len(history) - 1 for history in histories),
+        passes=sum(len(history) - 1 for history in histories),
         evaluations=sum(len(history) - 1 for history in histories),
         steps=_steps([[it.state.planes[0].normal for it in histories[i]] for i in kept]),
     )
@@ -127,7 +131,7 @@ def from_axis(scan: Scan) -> Answer:
     tuples = classify(ntuples(moments))
     if tuples.kind == "plane":
         plane = Plane(normal=tuples.directions[2], offset=float(tuples.directions[2] @ moments.center))
-        return Answer(planes=[plane], group="Cs", starts=1, iterations=0, iterations_all=0, evaluations=0)
+        return Answer(planes=[plane], group="Cs", starts=1, iterations=0, iterations_all=0, passes=0, evaluations=0)
     local = (scan.points - moments.center) / moments.scale
     folds = fold_candidates(local, np.full(len(local), 1.0 / len(local)), tuples.directions[0])
     if tuples.kind != "axis" or not folds:
@@ -143,6 +147,7 @@ def from_axis(scan: Scan) -> Answer:
         starts=fold,
         iterations=len(steps) - 1,
         iterations_all=len(steps) - 1,
+        passes=fold * (len(steps) - 1),
         evaluations=fold * (len(steps) - 1),
         steps=normals,
     )
@@ -221,6 +226,7 @@ def baseline(settings: Settings, *, estimate: bool) -> Callable[[Scan], Answer]:
             starts=found.candidates,
             iterations=max(found.iterations, default=None),
             iterations_all=found.max_iterations,
+            passes=found.passes,
             evaluations=found.evaluations,
             steps=_steps([found.history[p.candidate].normals for p in found.planes]),
             normals_s=normals_s,

@@ -52,6 +52,7 @@ def run(case):
     if case.broken == "taken":
         return {"seed": 1}
     row = {"found": 4 - case.seed % 2, "err": case.noise / 7 + case.seed / 3, "right": case.seed != 1, "spent_s": 0.5}
+    row["pulse"] = time.time()
     return row | {"group": "C4v" if case.seed < 3 else "C2v", "miss": float("nan") if case.seed else 0.25}
 
 
@@ -61,6 +62,9 @@ def trace(case):
 
 def record(case, path):
     path.write_text(repr(case))
+
+
+MEASURED = ("pulse",)
 """
 CONFIG = """\
 experiment: lab.toy
@@ -280,7 +284,7 @@ def test_everything_is_written(make: Make, lab: Path) -> None:
     assert len(rows) == 12
     assert list(rows[0])[:5] == ["shape", "seed", "noise", "wait", "broken"]
     assert {"config", "code", "numpy", "scipy", "casadi", "open3d", "error", "found"} <= set(rows[0])
-    assert "spent_s" not in rows[0]
+    assert not {"spent_s", "pulse"} & set(rows[0])
     assert [(r["shape"], r["noise"], r["seed"]) for r in rows[3:5]] == [
         ("square", "0.01", "0"),
         ("square", "0.01", "1"),
@@ -289,6 +293,7 @@ def test_everything_is_written(make: Make, lab: Path) -> None:
     assert float(rows[4]["err"]) == 0.01 / 7 + 1 / 3
     timings = rows_of(lab / "out", "timings.csv")
     assert {t["spent_s"] for t in timings} == {"0.5"}
+    assert len({t["pulse"] for t in timings}) == 12
     assert all(float(t["wall_s"]) >= 0 for t in timings)
     assert outcome.failed == 0
     assert {p.name for p in (lab / "out").iterdir()} >= {

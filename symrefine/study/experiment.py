@@ -16,7 +16,7 @@ Row = dict[str, Scalar | None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Experiment:
-    """What a module offers; `check`, `trace` and `record` are optional.
+    """What a module offers; `check`, `trace`, `record` and `MEASURED` are optional.
 
     Attributes:
         name: of the module.
@@ -26,6 +26,7 @@ class Experiment:
         check: raises InputError("field: what is wrong") for an impossible case.
         trace: a row for each iteration of a case.
         record: writes a recording of a case.
+        measured: results that differ from run to run like timings do, and are kept with them.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Experiment:
     check: Callable[[Any], None] | None
     trace: Callable[[Any], list[dict[str, Any]]] | None
     record: Callable[[Any, Path], None] | None
+    measured: frozenset[str]
 
 
 def find_root(name: str, start: Path) -> Path:
@@ -75,6 +77,7 @@ def load_experiment(name: str, root: Path) -> Experiment:
         check=getattr(module, "check", None),
         trace=getattr(module, "trace", None),
         record=getattr(module, "record", None),
+        measured=frozenset(getattr(module, "MEASURED", ())),
     )
 
 

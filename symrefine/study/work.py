@@ -107,7 +107,7 @@ def attempt(experiment: Experiment, index: int, case: Any) -> Entry:
         raise
     except Exception as caught:  # noqa: BLE001 - one run must not end the others
         error = " ".join(f"internal error: {type(caught).__name__}: {caught}".split())
-    timings = {name: value for name, value in row.items() if name.endswith(TIMING)}
+    timings = {name: row[name] for name in row if name.endswith(TIMING) or name in experiment.measured}
     return Entry(
         index=index,
         error=error,
