@@ -30,7 +30,7 @@ from symrefine.verify import confidence
 VIEWS = (("mesh", 0, 0.0), ("cloud", 8000, 0.0), ("cloud", 20000, 0.005), ("cloud", 8000, 0.01))
 SURE = 0.95
 EDGES = (0.0, 0.05, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 1.0)
-QUICK_EVERY = 21
+EVERY, QUICK_EVERY = 3, 21
 BLUE, ORANGE, RULE, GRID = "#0072b2", "#d55e00", "#6b7484", "#e3e7ee"
 FIGURE = Path(__file__).parents[1] / "docs" / "reliability.png"
 
@@ -126,6 +126,38 @@ def claims(found: Detection) -> list[tuple[Claim, float, bool]]:
         for m in found.near_misses
     ]
     return [*planes, *axes, *near]
+
+
+def check(case: Case) -> None:
+    """Whether such a case can be run.
+
+    Raises:
+        InputError: it cannot.
+    """
+    if case.family not in FAMILIES:
+        raise InputError(f"family: value is {case.family!r}, expected one of {', '.join(FAMILIES)}")
+    if case.name not in names(case.family):
+        known = ", ".join(names(case.family)) or f"none: {OBJECTS} is not there"
+        raise InputError(f"name: value is {case.name!r}, expected one of the family {case.family!r}: {known}")
+    if not 0 <= case.view < len(VIEWS):
+        raise InputError(f"view: value is {case.view}, expected 0 to {len(VIEWS) - 1}")
+    if case.seed < 0:
+        raise InputError(f"seed: value is {case.seed}, expected 0 or more")
+
+
+def run(case: Case) -> dict[str, int | float | str | bool | None]:
+    """What one detection claims, how much of it is right, and how much of that which it is 95 % sure of."""
+    check(case)
+    claimed = [row for row in judged(case) if row.claimed]
+    sure = [row for row in claimed if row.confidence >= SURE]
+    return {
+        "claimed": len(claimed),
+        "right": sum(row.right for row in claimed),
+        "sure": len(sure),
+        "sure_right": sum(row.right for row in sure),
+        "sure_share": sum(row.right for row in sure) / len(sure) if sure else None,
+        "brier": summary(claimed).brier if claimed else None,
+    }
 
 
 def look(case: Case) -> tuple[Shape, Truth]:
@@ -274,6 +306,7 @@ def report(rows: Sequence[Judged]) -> Iterator[str]:
                 f"  {100 * low:.0f} to {100 * high:.0f}"
             )
         yield ""
+    yield from sure_and_wrong(rows)
     yield "                                                           of those called 95 % sure"
     yield "                               elements   Brier    gap %   count  right %  mean of objects %"
     for label, these in mixes(rows).items():
@@ -285,11 +318,23 @@ def report(rows: Sequence[Judged]) -> Iterator[str]:
             )
 
 
+def sure_and_wrong(rows: Sequence[Judged]) -> Iterator[str]:
+    """A line for every detection that claims what is not there and is sure of it."""
+    wrong = [r for r in rows if r.claimed and r.confidence >= SURE and not r.right]
+    for family, name, view in dict.fromkeys((r.family, r.object, r.view) for r in wrong):
+        these = [r for r in wrong if (r.family, r.object, r.view) == (family, name, view)]
+        kinds = ", ".join(sorted({r.kind for r in these}))
+        form, points, noise_rel = VIEWS[view]
+        seen = form if form == "mesh" else f"{points} points, noise {100 * noise_rel:g} %"
+        yield f"sure and wrong: {family} {name} ({seen}): {len(these)} of {kinds}"
+    yield ""
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Print the table, write the plot; 2 if the plot has no place to go."""
     parser = argparse.ArgumentParser(prog="python -m experiments.reliability", description=__doc__.partition("\n")[0])
     parser.add_argument("--quick", action="store_true", help=f"each {QUICK_EVERY}th look only, no figure unless asked")
-    parser.add_argument("--every", type=int, default=1, help="each so many-th look (default: %(default)s)")
+    parser.add_argument("--every", type=int, default=EVERY, help="each so many-th look (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of poses, samples and noise (default: %(default)s)")
     parser.add_argument("--figure", type=Path, help=f"where the plot goes (default: {FIGURE.name} in docs)")
     options = parser.parse_args(arguments)

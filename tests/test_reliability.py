@@ -11,6 +11,7 @@ from experiments import built_symmetry, reliability
 from experiments.built_symmetry import Claim, Truth
 from experiments.exhibits import Pose
 from experiments.reliability import Case, Judged
+from symrefine.errors import InputError
 from symrefine.geometry import random_orthogonal, rotation
 from symrefine.groups import PointGroup
 from symrefine.quadrature import sample_surface
@@ -202,6 +203,34 @@ def test_the_plot_is_the_same_twice(tmp_path):
         reliability.plot(rows, tmp_path / name)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert any("0.95 to 1.00           6" in line for line in reliability.report(rows))
+
+
+def test_what_is_sure_and_wrong_is_named():
+    lines = list(reliability.sure_and_wrong([row(0.99, False), row(0.96, False), row(0.5, False), row(0.99, True)]))
+    assert lines == ["sure and wrong: shape a (mesh): 2 of plane", ""]
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"family": "shapes", "name": "table"}, "family: value is 'shapes'"),
+        ({"family": "shape", "name": "tabel"}, "name: value is 'tabel'"),
+        ({"family": "shape", "name": "table", "view": 4}, "view: value is 4, expected 0 to 3"),
+        ({"family": "shape", "name": "table", "seed": -1}, "seed: value is -1"),
+    ],
+)
+def test_impossible_cases_are_refused(fields, message):
+    with pytest.raises(InputError, match=message):
+        reliability.check(Case(**fields))
+
+
+def test_a_row_counts_what_is_claimed():
+    found = reliability.run(Case(family="shape", name="stool3", view=0))
+    assert (found["claimed"], found["right"]) == (4, 4)
+    assert found["sure_right"] == found["sure"] == 4
+    assert found["sure_share"] == 1.0
+    nothing = reliability.run(Case(family="shape", name="clutter", view=0))
+    assert (nothing["claimed"], nothing["sure_share"]) == (0, None)
 
 
 def test_a_plot_without_a_place_is_refused_before_any_work(tmp_path, capsys):
