@@ -67,13 +67,21 @@ class Judged:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bin:
-    """Elements of similar confidence."""
+    """Elements of similar confidence: from `low` to `high`, `sure` in the mean.
+
+    Attributes:
+        right: share that is right.
+        looks: detections they come from. The elements of one stand or fall together, so that these are what counts.
+        right_each: share that is right, every detection counting as one.
+    """
 
     low: float
     high: float
     count: int
     sure: float
     right: float
+    looks: int
+    right_each: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -214,36 +222,44 @@ def mixes(rows: Sequence[Judged]) -> dict[str, list[Judged]]:
 
 def bins(rows: Sequence[Judged], edges: Sequence[float] = EDGES) -> list[Bin]:
     """Rows by confidence: a bin holds its lower edge, the last one both; empty ones are left out."""
-    sure, right = _columns(rows)
+    sure, _ = _columns(rows)
     place = np.clip(np.searchsorted(edges, sure, side="right") - 1, 0, len(edges) - 2)
-    return [
-        Bin(
-            low=edges[i],
-            high=edges[i + 1],
-            count=int((place == i).sum()),
-            sure=float(sure[place == i].mean()),
-            right=float(right[place == i].mean()),
-        )
-        for i in np.unique(place)
-    ]
+    return [_bin([rows[j] for j in np.flatnonzero(place == i)], edges[i], edges[i + 1]) for i in np.unique(place)]
+
+
+def _bin(rows: Sequence[Judged], low: float, high: float) -> Bin:
+    sure, right = _columns(rows)
+    each = _by_look(rows)
+    return Bin(
+        low=low,
+        high=high,
+        count=len(rows),
+        sure=_mean(sure),
+        right=_mean(right),
+        looks=len(each),
+        right_each=_mean(each),
+    )
 
 
 def summary(rows: Sequence[Judged]) -> Summary:
     """All rows in a few figures."""
     sure, right = _columns(rows)
-    looks: dict[tuple[str, str, int], list[bool]] = {}
-    for r in rows:
-        if r.confidence >= SURE:
-            looks.setdefault((r.family, r.object, r.view), []).append(r.right)
-    each = [np.mean(found) for found in looks.values()]
     return Summary(
         count=len(rows),
         brier=_mean((sure - right) ** 2),
         gap=sum(b.count * abs(b.sure - b.right) for b in bins(rows)) / max(1, len(rows)),
         sure=int((sure >= SURE).sum()),
         sure_right=_mean(right[sure >= SURE]),
-        sure_right_each=_mean(np.array(each)),
+        sure_right_each=_mean(_by_look([r for r in rows if r.confidence >= SURE])),
     )
+
+
+def _by_look(rows: Sequence[Judged]) -> Array:
+    """Share right [K] of each detection that the rows come from."""
+    looks: dict[tuple[str, str, int], list[bool]] = {}
+    for r in rows:
+        looks.setdefault((r.family, r.object, r.view), []).append(r.right)
+    return np.array([np.mean(found) for found in looks.values()])
 
 
 def _columns(rows: Sequence[Judged]) -> tuple[Array, Array]:
@@ -264,27 +280,37 @@ def plausible(right: float, count: int) -> tuple[float, float]:
 
 
 def plot(rows: Sequence[Judged], path: Path) -> None:
-    """The reliability plot, and below it how many elements each of its points stands for."""
+    """The reliability plot of what is claimed, and below it how many elements and detections its points stand for."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    found = bins([r for r in rows if r.claimed])
     figure = Figure(figsize=(6.4, 7.2), dpi=130, facecolor="white")
     FigureCanvasAgg(figure)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-    upper.plot([0, 1], [0, 1], color=RULE, zorder=0)
-    sets = [("claimed and turned down", rows, BLUE), ("claimed", [r for r in rows if r.claimed], ORANGE)]
-    for side, (label, these, colour) in enumerate(sets):
-        found = bins(these)
-        x, y = [b.sure for b in found], [b.right for b in found]
-        ends = np.array([plausible(b.right, b.count) for b in found]).reshape(-1, 2).T
-        error = np.abs(ends - np.array(y))
-        upper.errorbar(x, y, error, fmt="o-", color=colour, capsize=2, lw=1, ms=5, label=f"{label}, {len(these):,}")
+    sure, right = [b.sure for b in found], np.array([b.right_each for b in found])
+    ends = np.array([plausible(b.right_each, b.looks) for b in found]).reshape(-1, 2).T
+    upper.plot([0, 1], [0, 1], color=RULE, lw=1, zorder=0, label="as sure as right")
+    upper.errorbar(
+        sure,
+        right,
+        np.maximum(np.abs(ends - right), 0.0),
+        fmt="o-",
+        color=BLUE,
+        capsize=3,
+        label="elements claimed, each detection counted once, with 95 % interval",
+    )
+    upper.plot(sure, [b.right for b in found], "s", color=ORANGE, mfc="none", label="elements claimed, one by one")
+    for side, (colour, counts) in enumerate([(ORANGE, [b.count for b in found]), (BLUE, [b.looks for b in found])]):
         widths = np.array([b.high - b.low for b in found]) / 2.2
-        starts = np.array([b.low for b in found]) + side * widths
-        lower.bar(starts, [b.count for b in found], widths, align="edge", color=colour)
-    upper.set(ylabel="share that is right", ylim=(-0.03, 1.03), title="Confidence against truth")
-    upper.legend(loc="upper left", frameon=False)
-    lower.set(xlabel="confidence", ylabel="elements", yscale="log", xlim=(-0.02, 1.02))
+        lower.bar(
+            [b.low + side * w for b, w in zip(found, widths, strict=True)], counts, widths, align="edge", color=colour
+        )
+    upper.set(
+        ylabel="share that is right", ylim=(-0.03, 1.2), yticks=np.linspace(0, 1, 6), title="Confidence against truth"
+    )
+    upper.legend(loc="upper left", frameon=False, fontsize=9)
+    lower.set(xlabel="confidence", ylabel="elements, detections", yscale="log", xlim=(-0.02, 1.02))
     for axes in (upper, lower):
         axes.grid(color=GRID, lw=0.6)
         axes.set_axisbelow(True)
@@ -298,23 +324,23 @@ def report(rows: Sequence[Judged]) -> Iterator[str]:
     """The reliability table, and the figures family by family, as lines."""
     for label, these in (("claimed", [r for r in rows if r.claimed]), ("claimed and turned down", rows)):
         yield f"Elements {label}"
-        yield "confidence      elements  mean confidence %  right %  plausible %"
+        yield "confidence    elements  mean confidence %  right %  detections  right, each once %  95 % interval"
         for b in bins(these):
-            low, high = plausible(b.right, b.count)
+            low, high = plausible(b.right_each, b.looks)
             yield (
-                f"{b.low:.2f} to {b.high:.2f}  {b.count:10d}  {100 * b.sure:17.1f}  {100 * b.right:7.1f}"
-                f"  {100 * low:.0f} to {100 * high:.0f}"
+                f"{b.low:.2f} to {b.high:.2f}  {b.count:8d}  {100 * b.sure:17.1f}  {100 * b.right:7.1f}"
+                f"  {b.looks:10d}  {100 * b.right_each:18.1f}  {100 * low:.0f} to {100 * high:.0f}"
             )
         yield ""
     yield from sure_and_wrong(rows)
     yield "                                                           of those called 95 % sure"
-    yield "                               elements   Brier    gap %   count  right %  mean of objects %"
+    yield "                               elements   Brier    gap %   count  right %  each once %"
     for label, these in mixes(rows).items():
         for first, kind, some in ((label, "claimed", [r for r in these if r.claimed]), ("", "and turned down", these)):
             s = summary(some)
             yield (
                 f"{first:16s} {kind:15s} {s.count:6d}  {s.brier:.4f}  {100 * s.gap:7.2f}"
-                f"  {s.sure:6d}  {100 * s.sure_right:7.2f}  {100 * s.sure_right_each:17.2f}"
+                f"  {s.sure:6d}  {100 * s.sure_right:7.2f}  {100 * s.sure_right_each:11.2f}"
             )
 
 

@@ -134,6 +134,14 @@ def test_bins_hold_their_lower_edge_and_the_last_one_both():
     assert found[1].right == 0.5
 
 
+def test_a_bin_counts_elements_and_detections():
+    rows = [row(0.96, True)] * 9 + [row(0.96, False, name="b")]
+    (found,) = reliability.bins(rows)
+    assert (found.count, found.looks) == (10, 2)
+    assert found.right == pytest.approx(0.9)
+    assert found.right_each == pytest.approx(0.5)
+
+
 def test_the_summary_counts_elements_and_objects():
     rows = [row(0.99, True)] * 8 + [row(0.99, False, name="b")] * 2 + [row(0.1, False)] * 10
     found = reliability.summary(rows)
@@ -202,7 +210,7 @@ def test_the_plot_is_the_same_twice(tmp_path):
     for name in ("a.png", "b.png"):
         reliability.plot(rows, tmp_path / name)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    assert any("0.95 to 1.00           6" in line for line in reliability.report(rows))
+    assert any("0.95 to 1.00         6" in line for line in reliability.report(rows))
 
 
 def test_what_is_sure_and_wrong_is_named():
