@@ -1,7 +1,8 @@
 """Detection on one page: shape -> moments -> n-tuples and spectrum -> candidates -> refine -> judge -> group."""
 
+import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
@@ -26,6 +27,9 @@ from symrefine.shape import Index, Shape
 from symrefine.verify import TOLERANCE, Deviation, Judge, confidence, make_judge, split_floor
 
 ORDER = 8
+LARGEST_TOLERANCE = 0.2
+# Tolerances of the staircase that the command line tells.
+LADDER = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08)
 PARTS = 16
 SAMPLES = 20000
 LOCAL_PLANES = 4000
@@ -44,22 +48,43 @@ FEW = 250
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FoundPlane:
-    """A mirror plane in input units: its miss as fractions of the bounding-box diagonal, and how sure it is."""
+    """A mirror plane in input units: its miss as fractions of the bounding-box diagonal, and how sure it is.
+
+    `sigma_rad` is the standard deviation of the normal in its least certain direction, `sigma` that of the offset in
+    input units: both from the joint refinement of the whole group; NaN where there was none.
+    """
 
     plane: Plane
     residual: Deviation
     confidence: float
+    sigma_rad: float
+    sigma: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FoundAxis:
-    """A rotation axis (or rotoreflection, if `improper`) in input units; `order` is `math.inf` for revolution."""
+    """A rotation axis (or rotoreflection, if `improper`) in input units; `order` is `math.inf` for revolution.
+
+    `sigma_rad` and `sigma` (input units) are standard deviations of direction and position, each where it is least
+    certain; NaN where no refinement told them.
+    """
 
     axis: Axis
     order: float
     improper: bool
     residual: Deviation
     confidence: float
+    sigma_rad: float
+    sigma: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """The answer at one tolerance: the group as a function of the tolerance is a staircase."""
+
+    tolerance: float
+    point_group: str
+    undetermined: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -90,6 +115,7 @@ class Detection:
         tolerance: the tolerance the decisions were made at, as a fraction of `diagonal`.
         diagonal: diagonal of the smallest bounding box over all orientations, input units.
         undetermined: why the data support no decision; empty when they do.
+        staircase: the group at the tolerances that were asked for besides.
         tuples: class of the n-tuples, with singular values.
         vectors: the n-tuples themselves, dimensionless.
         history: the iterates of that refinement, in normalised units; `scale` and `origin` undo the normalisation.
@@ -108,6 +134,7 @@ class Detection:
     tolerance: float
     diagonal: float
     undetermined: str
+    staircase: tuple[Step, ...]
     tuples: TupleClass
     vectors: NTuples
     history: tuple[Iterate, ...]
@@ -128,6 +155,7 @@ def detect(
     normals: ArrayLike | None = None,
     labels: ArrayLike | None = None,
     tolerance: float = TOLERANCE,
+    ladder: Sequence[float] = (),
     seed: int = 0,
 ) -> Detection:
     """Point group, mirror planes and rotation axes of an object in 3-space, with what it misses each of them by.
@@ -140,10 +168,11 @@ def detect(
         labels: [N] integers: classes (elements, colours, materials) that every symmetry must keep. Not with a `Shape`.
         tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal: 95 % of the
             surface must come within it, 99 % within 1.4 of it, and the mean within 0.28 (see `verify`).
+        ladder: other tolerances to tell the group at, from the same evidence; see `Detection.staircase`.
         seed: of the random choices (samples of a mesh, subsets of a cloud).
 
     Raises:
-        InputError: not a 3-D shape, or a tolerance outside (0, 0.2].
+        InputError: not a 3-D shape, or tolerances outside (0, 0.2].
         DegenerateShapeError: the points do not spread.
     """
     if not isinstance(shape, Shape):
@@ -152,14 +181,25 @@ def detect(
         raise InputError("weights, normals and labels belong to the Shape; give them there, or give an array of points")
     if shape.dim != 3:
         raise InputError(f"{shape.source}: detect takes 3-D shapes; {_elsewhere(shape.dim)}")
-    if not 0.0 < tolerance <= 0.2:
-        raise InputError(f"tolerance is {tolerance}; expected a fraction of the diagonal in (0, 0.2]")
+    for t in (tolerance, *ladder):
+        if not 0.0 < t <= LARGEST_TOLERANCE:
+            raise InputError(f"tolerance is {t}; expected a fraction of the diagonal in (0, {LARGEST_TOLERANCE}]")
     shape = _with_mass(shape)
     clock = Clock()
     vectors, evidence, found = _examine(shape, tolerance, seed, clock)
     with clock("doubt"):
         doubt = _doubt(evidence) or _fickle(shape, found, tolerance, seed)
-    return _report(_unclaimed(found) if doubt else found, evidence, vectors, doubt, clock.seconds)
+    with clock("staircase"):
+        stairs = tuple(_step(evidence, t) for t in sorted(ladder))
+    return _report(_unclaimed(found) if doubt else found, evidence, vectors, doubt, stairs, clock.seconds)
+
+
+def _step(evidence: Evidence, tolerance: float) -> Step:
+    """The group at another tolerance, from the same evidence."""
+    judge = replace(evidence.judge, tolerance=tolerance)
+    asked = replace(evidence, judge=judge, closer=lambda: replace(evidence.closer(), tolerance=tolerance))
+    doubt = bool(_doubt(asked))
+    return Step(tolerance=tolerance, point_group="C1" if doubt else assemble(asked).group.name, undetermined=doubt)
 
 
 def _examine(shape: Shape, tolerance: float, seed: int, clock: "Clock") -> tuple[NTuples, Evidence, Assembly]:
@@ -373,7 +413,14 @@ def _cloud(
     return shape.points, shape.normals, weights, classes
 
 
-def _report(found: Assembly, evidence: Evidence, vectors: NTuples, doubt: str, timings: dict[str, float]) -> Detection:
+def _report(
+    found: Assembly,
+    evidence: Evidence,
+    vectors: NTuples,
+    doubt: str,
+    stairs: tuple[Step, ...],
+    timings: dict[str, float],
+) -> Detection:
     origin, scale = evidence.moments.center, evidence.moments.scale
     planes = [e for e in found.elements if e.kind == "plane"]
     axes = [e for e in found.elements if e.kind != "plane"]
@@ -383,7 +430,11 @@ def _report(found: Assembly, evidence: Evidence, vectors: NTuples, doubt: str, t
         center=origin + scale * found.center,
         planes=tuple(
             FoundPlane(
-                plane=_plane(e, origin, scale), residual=e.verdict.deviation, confidence=confidence(e.verdict.excess)
+                plane=_plane(e, origin, scale),
+                residual=e.verdict.deviation,
+                confidence=confidence(e.verdict.excess),
+                sigma_rad=(known := _uncertainty(found.history, e))[0],
+                sigma=known[1] * scale,
             )
             for e in sorted(planes, key=lambda e: e.verdict.excess)
         ),
@@ -394,6 +445,8 @@ def _report(found: Assembly, evidence: Evidence, vectors: NTuples, doubt: str, t
                 improper=e.kind == "improper",
                 residual=e.verdict.deviation,
                 confidence=confidence(e.verdict.excess),
+                sigma_rad=(known := _uncertainty(found.history, e))[0],
+                sigma=known[1] * scale,
             )
             for e in axes
         ),
@@ -413,6 +466,7 @@ def _report(found: Assembly, evidence: Evidence, vectors: NTuples, doubt: str, t
         tolerance=evidence.judge.tolerance,
         diagonal=evidence.judge.diagonal * scale,
         undetermined=doubt,
+        staircase=stairs,
         tuples=evidence.tuples,
         vectors=vectors,
         history=found.history,
@@ -421,6 +475,24 @@ def _report(found: Assembly, evidence: Evidence, vectors: NTuples, doubt: str, t
         scale=scale,
         timings=timings,
     )
+
+
+def _uncertainty(history: tuple[Iterate, ...], element: Element) -> tuple[float, float]:
+    """Standard deviations of an element's direction (radians) and place (RMS radii), each where it is least certain.
+
+    The covariance of the joint refinement is that of a small turn w and a shift of the common frame: a direction u
+    moves by w x u, a plane along its normal, an axis across itself.
+    """
+    if len(history) < 2:
+        return math.nan, math.nan
+    frame, covariance = history[-1].state.frame, history[-1].covariance
+    u = frame @ element.direction
+    cross = np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
+    along = np.outer(u, u)
+    moves = along if element.kind == "plane" else np.eye(3) - along
+    turned, shifted = cross @ covariance[:3, :3] @ cross.T, moves @ covariance[3:, 3:] @ moves
+    largest = [max(float(np.linalg.eigvalsh(c)[-1]), 0.0) for c in (turned, shifted)]
+    return math.sqrt(largest[0]), math.sqrt(largest[1])
 
 
 def _plane(element: Element, origin: Array, scale: float) -> Plane:

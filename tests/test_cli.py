@@ -101,11 +101,13 @@ def test_the_report_holds_what_was_agreed(record: dict[str, Any], data: Path) ->
     assert (record["point_group"], record["inversion"], record["undetermined"]) == ("D2h", True, None)
     assert len(record["center"]) == 3
     assert len(record["planes"]) == len(record["axes"]) == 3
-    keys = "center diagonal tolerance planes axes near_misses iterations ntuples timings"
+    keys = "center diagonal tolerance planes axes near_misses staircase iterations ntuples timings"
     assert set(keys.split()) <= set(record)
-    assert set(record["planes"][0]) == {"normal", "offset", "residual", "confidence"}
-    assert set(record["axes"][0]) == {"direction", "point", "order", "improper", "residual", "confidence"}
+    assert set(record["planes"][0]) == {"normal", "offset", "residual", "confidence", "sigma"}
+    assert set(record["axes"][0]) == {"direction", "point", "order", "improper", "residual", "confidence", "sigma"}
     assert set(record["ntuples"]) == {"kind", "singular_values", "significance"}
+    assert {step["point_group"] for step in record["staircase"]} == {"D2h"}
+    assert [step["tolerance"] for step in record["staircase"]] == sorted({s["tolerance"] for s in record["staircase"]})
 
 
 def test_stdout_holds_the_json_alone_and_equal_runs_give_equal_bytes(data: Path, record: dict[str, Any]) -> None:

@@ -552,3 +552,40 @@ def test_bad_input_raises_one_line(arguments, error, message):
     with pytest.raises(error, match=message) as caught:
         detect(**arguments)
     assert "\n" not in str(caught.value)
+
+
+# Uncertainty and the staircase
+
+
+def test_the_uncertainty_of_a_plane_is_what_samples_show():
+    """Deviation of the normals over independent samples, in units of the stated standard deviation."""
+    ratios = []
+    for seed in range(4):
+        turn = random_orthogonal(np.random.default_rng(seed))
+        found = detect(sample(table(), 8000, 0.005, np.random.default_rng(100 + seed)) @ turn.T)
+        truth = bundle_normals(4, turn)
+        for p in found.planes:
+            ratios.append(min(line_angle_rad(p.plane.normal, n) for n in truth) / p.sigma_rad)
+            assert 0 < p.sigma < 1e-3 * found.diagonal
+    assert 0.5 < np.sqrt(np.mean(np.square(ratios))) < 3.0  # two directions, one of them the less certain one
+
+
+def test_no_uncertainty_is_claimed_where_nothing_was_refined_together():
+    found = detect(np.array([[1.0, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]]))
+    assert all(np.isnan(p.sigma_rad) or p.sigma_rad < 1e-6 for p in found.planes)
+
+
+def test_the_group_as_a_function_of_the_tolerance():
+    """A table with one leg 3 % out of place: nothing exact, four mirrors for who tolerates that much."""
+    parts = [box((0, 0, 0.7), (1, 1, 0.06))]
+    shift = 0.03 * table().diagonal
+    for k, (x, y) in enumerate([(-1, -1), (-1, 1), (1, -1), (1, 1)]):
+        parts.append(box((0.43 * x + (shift if k == 0 else 0), 0.43 * y, 0.335), (0.08, 0.08, 0.67)))
+    found = detect(join(parts), tolerance=0.01, ladder=(0.08, 0.01))
+    assert found.point_group == "C1"
+    assert [(s.tolerance, s.point_group, s.undetermined) for s in found.staircase] == [
+        (0.01, "C1", False),
+        (0.08, "C4v", False),
+    ]
+    with pytest.raises(InputError, match=r"tolerance is 0\.3; expected"):
+        detect(TABLE, ladder=(0.3,))

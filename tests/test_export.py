@@ -209,8 +209,12 @@ def test_planes_and_axes_keep_their_place_when_their_sign_is_chosen(box: tuple[S
     axis = Axis(point=CENTER, direction=np.array([0.0, 0.0, -1.0]))
     changed = replace(
         box[1],
-        planes=(FoundPlane(plane=plane, residual=miss, confidence=1.0),),
-        axes=(FoundAxis(axis=axis, order=math.inf, improper=False, residual=miss, confidence=0.5),),
+        planes=(FoundPlane(plane=plane, residual=miss, confidence=1.0, sigma_rad=math.nan, sigma=math.nan),),
+        axes=(
+            FoundAxis(
+                axis=axis, order=math.inf, improper=False, residual=miss, confidence=0.5, sigma_rad=0.1, sigma=0.2
+            ),
+        ),
     )
     record = detection_record(changed, box[0], options={})
     np.testing.assert_allclose(record["planes"][0]["normal"], [-1e-9, 0.6, -0.8], atol=1e-12)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from symrefine.cli.outputs import STDOUT, Writer, check_outputs, note, say, text_writer, waiting, write_all
-from symrefine.cli.values import add_detection_options, grey, natural, positive
+from symrefine.cli.values import add_class_options, add_detection_options, grey, natural, positive
 from symrefine.errors import InputError
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "as they differ from the background, which is what most of the border shows)",
     )
     parser.add_argument("--invert", action="store_true", help="exchange object and background of a picture")
+    add_class_options(parser)
     add_detection_options(parser)
 
 
@@ -61,8 +62,9 @@ def run(args: argparse.Namespace) -> int:
         _check_bop(Path(args.bop))
     with waiting("detecting"):
         shape, detection, record = examine(
-            args.path, args.measure, args.tolerance, args.seed, threshold=args.threshold, invert=args.invert
-        )
+            args.path, args.measure, args.tolerance, args.seed, labels=args.labels, weights=args.weights,
+            threshold=args.threshold, invert=args.invert,
+        )  # fmt: skip
         writers = _writers(args, shape, detection, record)
         write_all(writers)
     if args.bop is not None:
@@ -82,6 +84,8 @@ def examine(
     tolerance: float,
     seed: int,
     *,
+    labels: str | None = None,
+    weights: str | None = None,
     threshold: float | Literal["otsu"] | None = None,
     invert: bool = False,
 ) -> tuple["Shape", Any, dict[str, Any]]:
@@ -93,9 +97,14 @@ def examine(
     from symrefine.load import IMAGES, load
 
     start = time.perf_counter()
-    shape = load(path, measure=measure, threshold=threshold, invert=invert)
+    shape = load(path, measure=measure, labels=labels, weights=weights, threshold=threshold, invert=invert)
     load_s = time.perf_counter() - start
     options: dict[str, Any] = {"tolerance": tolerance, "measure": measure, "seed": seed}
+    options |= {name: given for name, given in (("labels", labels), ("weights", weights)) if given is not None}
+    if shape.labels is not None and shape.dim != 3:
+        raise InputError(
+            f"{path}: points have {shape.dim} coordinates; labels are for objects in space, leave them out"
+        )
     if shape.dim == 2:
         from symrefine.export.planar import planar_record
         from symrefine.planar import detect_planar
@@ -112,10 +121,10 @@ def examine(
         beyond = detect_nd(shape, tolerance=tolerance)
         timings = {"load": load_s, "detect": time.perf_counter() - start}
         return shape, beyond, subspace_record(beyond, shape, options=options, timings=timings)
-    from symrefine.detect import detect
+    from symrefine.detect import LADDER, detect
     from symrefine.export.records import detection_record
 
-    detection = detect(shape, tolerance=tolerance, seed=seed)
+    detection = detect(shape, tolerance=tolerance, ladder=LADDER, seed=seed)
     return shape, detection, detection_record(detection, shape, options=options, load_s=load_s)
 
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 from typing import Any
 
 from rich.table import Table
@@ -37,6 +38,8 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
     yield f"n-tuples {_TUPLES[record['ntuples']['kind']]}"
     centre = ", ".join(_length(x, record) for x in record["center"])
     yield f"centre ({centre}), diagonal {_length(record['diagonal'], record)} in units of the file"
+    if record["classes"]:
+        yield f"labels: {_count(record['classes']['count'], 'class', 'classes')}"
     if record["planes"]:
         yield ""
         yield _planes(record)
@@ -51,7 +54,19 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
         yield "Offsets in units of the file, misses in % of the diagonal; axes go through the centre."
     if record["near_misses"]:
         yield "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows."
+    if record["staircase"]:
+        yield f"Group by tolerance: {staircase(record)}"
     yield f"{_count(record['iterations'], 'iteration')}, {sum(record['timings'].values()):.2f} s"
+
+
+def staircase(record: Record) -> str:
+    """The group as a function of the tolerance: `C1 at 0.25-0.5 %, C4v at 1-8 %`."""
+    parts = []
+    for name, steps in groupby(record["staircase"], key=lambda s: s["point_group"]):
+        percents = [f"{100 * s['tolerance']:g}" for s in steps]
+        span = percents[0] if len(percents) == 1 else f"{percents[0]}-{percents[-1]}"
+        parts.append(f"{name or 'undetermined'} at {span} %")
+    return ", ".join(parts)
 
 
 def headline(record: Record) -> str:

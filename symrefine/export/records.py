@@ -45,6 +45,7 @@ def detection_record(
         "version": version("symrefine"),
         "options": dict(options),
         "measure": shape.measure,
+        "classes": _classes(shape),
         "point_group": d.point_group,
         "center": _numbers(d.center, scale),
         "diagonal": number(d.diagonal),
@@ -52,6 +53,13 @@ def detection_record(
         "planes": [_plane(p, scale) for p in d.planes],
         "axes": [_axis(a, scale) for a in d.axes],
         "inversion": bool(d.inversion),
+        "staircase": [
+            {
+                "tolerance": number(s.tolerance),
+                "point_group": None if s.undetermined else s.point_group,
+            }
+            for s in d.staircase
+        ],
         "near_misses": [_near_miss(m, scale) for m in d.near_misses],
         "iterations": int(d.iterations),
         "undetermined": d.undetermined or None,
@@ -102,6 +110,14 @@ def alignment_record(
     return record | {"timings": _seconds(timings)}
 
 
+def _classes(shape: Shape) -> Record | None:
+    """How many classes the labels make, and how many points (faces, of a mesh) are in each, in the order of labels."""
+    if shape.labels is None:
+        return None
+    sizes = np.unique(shape.labels, return_counts=True)[1].tolist()
+    return {"count": len(sizes), "sizes": sizes}
+
+
 def toward_positive(direction: Array) -> float:
     """The sign, +1.0 or -1.0, that makes the first component of at least a tenth of the largest positive."""
     size = np.abs(direction)
@@ -141,6 +157,7 @@ def _plane(found: FoundPlane, scale: float) -> Record:
         "offset": number(sign * found.plane.offset, scale),
         "residual": _residual(found.residual),
         "confidence": number(found.confidence),
+        "sigma": {"direction_rad": number(found.sigma_rad), "offset": number(found.sigma)},
     }
 
 
@@ -152,6 +169,7 @@ def _axis(found: FoundAxis, scale: float) -> Record:
         "improper": bool(found.improper),
         "residual": _residual(found.residual),
         "confidence": number(found.confidence),
+        "sigma": {"direction_rad": number(found.sigma_rad), "position": number(found.sigma)},
     }
 
 

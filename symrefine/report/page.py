@@ -14,7 +14,7 @@ from symrefine.picture.words import coordinates, fit, headline, meaning, percent
 from symrefine.report.charts import bar_chart, line_chart
 from symrefine.report.style import STYLE
 from symrefine.shape import Shape
-from symrefine.verify import Deviation
+from symrefine.verify import LIMITS, Deviation
 
 _MISSES = ("mean", "p95", "p99", "max")
 _MISS_NAMES = ("mean", "95 %", "99 %", "largest")
@@ -29,6 +29,7 @@ def html_page(detection: Detection, shape: Shape, picture: bytes) -> str:
         _facts(detection, shape),
         _found(detection),
         _near_misses(detection),
+        _staircase(detection),
         _convergence(detection),
         _tuples(detection),
         _reproduce(detection, shape),
@@ -83,7 +84,7 @@ def _found(d: Detection) -> str:
             r.kind,
             _code(r.vector),
             *_misses(r.residual),
-            _bar(r.residual.p95 / d.tolerance),
+            _bar(r.residual.p95 / (LIMITS[1] * d.tolerance)),
             f"{r.score:.2f}",
         )
         for r in found_rows(d)
@@ -91,7 +92,7 @@ def _found(d: Detection) -> str:
     told = (
         "Each plane and axis maps the surface onto an image of itself. The columns say by how much that image misses "
         "the surface, in % of the diagonal: on average, for the best 95 % and 99 % of the surface, and at worst. "
-        f"The bar shows the 95 % column against the {percent(d.tolerance)} that is allowed."
+        f"The bar shows the 95 % column against the {percent(LIMITS[1] * d.tolerance)} that is allowed."
     )
     heads = ("", "kind", "normal or direction", *_MISS_NAMES, "95 % and its limit", "confidence")
     return _section("What was found, and how well it holds", told, _table(heads, rows))
@@ -107,6 +108,21 @@ def _near_misses(d: Detection) -> str:
     )
     heads = ("", "kind", "normal or direction", *_MISS_NAMES, "times the limit")
     return _section("Near misses", told, _table(heads, rows))
+
+
+def _staircase(d: Detection) -> str:
+    if not d.staircase:
+        return ""
+    cells = "".join(
+        f"<div><dt>{escape(percent(s.tolerance))}</dt>"
+        f"<dd>{escape('undetermined' if s.undetermined else symbol(s.point_group))}</dd></div>"
+        for s in d.staircase
+    )
+    told = (
+        "What the answer would be at other tolerances, as fractions of the diagonal: an exact symmetry stands at all "
+        "of them, an approximate one only from what it misses by."
+    )
+    return _section("The group as a function of the tolerance", told, f"<dl>{cells}</dl>")
 
 
 def _convergence(d: Detection) -> str:
