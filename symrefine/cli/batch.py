@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from symrefine.cli import journal
 from symrefine.cli.outputs import check_outputs, console, note, progress, text_writer, write_all
-from symrefine.cli.values import add_detection_options, count, positive
+from symrefine.cli.values import add_class_options, add_detection_options, count, positive
 from symrefine.errors import InputError, SymrefineError
 
 if TYPE_CHECKING:
@@ -48,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=count, default=1, metavar="N", help="files done at the same time (default: %(default)s)"
     )
+    add_class_options(parser)
     add_detection_options(parser)
 
 
@@ -57,6 +58,7 @@ def run(args: argparse.Namespace) -> int:
     check_outputs({"--out": args.out, "--bop": args.bop}, [Path(args.dir, name) for name in files])
     scale = _check_bop(args, files)
     options = {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed}
+    options |= {name: given for name in ("labels", "weights") if (given := getattr(args, name)) is not None}
     rows = journal.finished(Path(args.out), Path(args.dir), files, options) if args.out else {}
     rows = {name: row for name, row in rows.items() if _serves_bop(row, scale)}
     jobs = [(args.dir, name, options, scale) for name in files if name not in rows]

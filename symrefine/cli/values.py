@@ -28,6 +28,24 @@ def add_detection_options(parser: argparse.ArgumentParser, counts_as: str = "sym
     )
 
 
+def add_class_options(parser: argparse.ArgumentParser) -> None:
+    """The options that name what tells the points of a file apart."""
+    parser.add_argument(
+        "--labels",
+        metavar="NAME",
+        help="classes that every symmetry must keep, from the file: a property of .ply or .pcd (label, class, "
+        "material_index), a titled column of .csv or .txt (numbers or texts), an array of .npz, `material` for the "
+        "usemtl of .obj, or `color` for the colours of vertices or faces, where colours closer than a quarter of the "
+        "scale are one class and images of textures are not read (default: none, but the elements of chemical .xyz)",
+    )
+    parser.add_argument(
+        "--weights",
+        metavar="NAME",
+        help="masses of the points of a cloud: a property, titled column or array of numbers (default: equal, or the "
+        "array `weights` of .npz)",
+    )
+
+
 def tolerance(text: str) -> float:
     """A fraction of the diagonal."""
     value = _float(text)

@@ -10,7 +10,7 @@ uncompressed PCD are read here, line by line or straight from the bytes; glTF by
 leave out; compressed PCD by open3d, after a check of sizes. Images are read by Pillow.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from os import PathLike
 from pathlib import Path
 from typing import Literal
@@ -19,6 +19,7 @@ from symrefine.errors import InputError
 from symrefine.load.content import Content, check_distinct, check_finite
 from symrefine.load.gltf import read_glb, read_gltf
 from symrefine.load.image import FORMATS, Threshold, read_image
+from symrefine.load.labels import point_classes, point_weights
 from symrefine.load.mesh import mesh_shape
 from symrefine.load.obj import read_obj
 from symrefine.load.off import read_off
@@ -30,23 +31,25 @@ from symrefine.shape import Shape
 
 __all__ = ["IMAGES", "READERS", "load"]
 
-# A reader gets the bytes of a file and its path, which messages begin with.
+# A reader gets the bytes of a file and its path, which messages begin with; that of a table of any columns also the
+# names of those that it shall take beside coordinates.
 Reader = Callable[[bytes, str], Content]
+NamingReader = Callable[[bytes, str, Collection[str]], Content]
 
-READERS: dict[str, Reader] = {
-    ".csv": read_table,
+_NAMING: dict[str, NamingReader] = {".csv": read_table, ".npz": read_npz, ".txt": read_table}
+_PLAIN: dict[str, Reader] = {
     ".glb": read_glb,
     ".gltf": read_gltf,
     ".npy": read_npy,
-    ".npz": read_npz,
     ".obj": read_obj,
     ".off": read_off,
     ".pcd": read_pcd,
     ".ply": read_ply,
     ".stl": read_stl,
-    ".txt": read_table,
     ".xyz": read_xyz,
 }
+# Suffixes of meshes and clouds.
+READERS = tuple(sorted({*_NAMING, *_PLAIN}))
 # Suffixes of pictures: apart from the others, because the textures of meshes lie beside these in one directory.
 IMAGES = frozenset(FORMATS)
 
@@ -55,6 +58,8 @@ def load(
     path: str | PathLike[str],
     *,
     measure: Literal["surface", "solid"] | None = None,
+    labels: str | None = None,
+    weights: str | None = None,
     threshold: Threshold | None = None,
     invert: bool = False,
 ) -> Shape:
@@ -65,45 +70,71 @@ def load(
     Coordinates keep the precision of the file, float64 where it has that. Polygons become triangles; several parts of
     a scene become one shape in the frame of the scene.
 
+    Chemical .xyz (the number of atoms, a remark, then an element and x y z for each atom) gives the elements as labels.
+    Other labels, and colours, are read only where they are asked for; images of textures never are.
+
     Args:
         path: file whose suffix is one of `READERS` or `IMAGES`, in any case.
         measure: what carries the mass of a mesh, "surface" if None. Clouds and pictures have no choice.
+        labels: what tells the classes that every symmetry must keep: a vertex or face property of .ply (`label`,
+            `material_index`), a field of .pcd, a titled column of .csv or .txt (numbers or texts), an array of .npz
+            ([F] for faces, [N] for points), `material` for what `usemtl` names in .obj, or `color` for the colours of
+            vertices or faces (.ply, .obj, .off, and columns red green blue). Colours closer than about a quarter of
+            the scale become one class (see `symrefine.load.colours`). A face whose vertices have labels takes that of
+            two corners, or of the first where all differ. Elements if None, for chemical .xyz.
+        weights: a property, column or array of numbers that are the masses of the points of a cloud.
         threshold: of a picture: grey value from 0 to 1 that makes it binary, or "otsu"; it is taken as it is if None.
         invert: of a picture: exchange object and background.
 
     Raises:
         InputError: the file is missing, unreadable, not what its suffix says, incomplete, contradicts itself, holds
             coordinates that are not finite, fewer than two distinct points or no area; a measure for a cloud, a
-            threshold or `invert` for what is no picture.
+            threshold or `invert` for what is no picture; labels or weights that the file does not have, or that are
+            of the wrong kind.
     """
     if measure not in (None, "surface", "solid"):
         raise InputError(f"measure is {measure!r}; expected 'surface', 'solid' or None")
     source = str(path)
     suffix = Path(path).suffix.lower()
     if suffix in IMAGES and not Path(path).is_dir():
+        if labels is not None or weights is not None:
+            raise InputError(f"{source}: is a picture: labels and weights apply to meshes and clouds only")
         content = read_image(_read(Path(path), source), source, suffix, threshold=threshold, invert=invert)
     else:
-        reader = _reader(Path(path), source)
+        _check_suffix(Path(path), source)
         if threshold is not None or invert:
             raise InputError(f"{source}: is no picture: threshold and invert apply to {' '.join(sorted(IMAGES))} only")
-        content = reader(_read(Path(path), source), source)
+        named = [name for name in (labels, weights) if name is not None]
+        content = _content(_read(Path(path), source), source, suffix, named)
     check_finite(content, source)
     check_distinct(content, source)
     if content.faces is not None:
-        return mesh_shape(content, content.faces, measure or "surface", source)
+        if weights is not None:
+            raise InputError(f"{source}: has faces, which weigh what their areas do; weights are for clouds")
+        return mesh_shape(content, content.faces, measure or "surface", source, labels=labels)
     if measure is not None:
         raise InputError(f"{source}: has no faces, so measure {measure!r} does not apply; leave it out for clouds")
-    return Shape(points=content.points, normals=content.normals, weights=content.weights, source=source)
+    return Shape(
+        points=content.points,
+        normals=content.normals,
+        weights=content.weights if weights is None else point_weights(content, weights, source),
+        labels=content.labels if labels is None else point_classes(content, labels, source),
+        source=source,
+    )
 
 
-def _reader(path: Path, source: str) -> Reader:
+def _check_suffix(path: Path, source: str) -> None:
     if path.is_dir():
         raise InputError(f"{source}: is a directory; expected a file")
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        known, images = " ".join(sorted(READERS)), " ".join(sorted(IMAGES))
+    if path.suffix.lower() not in READERS:
+        known, images = " ".join(READERS), " ".join(sorted(IMAGES))
         raise InputError(f"{source}: unknown suffix {path.suffix!r}; known are {known}, and images {images}")
-    return reader
+
+
+def _content(data: bytes, source: str, suffix: str, named: Collection[str]) -> Content:
+    if suffix in _NAMING:
+        return _NAMING[suffix](data, source, named)
+    return _PLAIN[suffix](data, source)
 
 
 def _read(path: Path, source: str) -> bytes:

@@ -1,7 +1,7 @@
 """Content: what a file holds, exactly as written; the readers make it, `mesh` and `load` judge it."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.shape import Index
+
+# Values of any kind, one for each point or face: numbers, texts, or the three of a colour.
+Values = NDArray[Any]
 
 # Squares of areas of such triangles are still numbers; no unit of length asks for more.
 LARGEST = 1e60
@@ -44,6 +47,10 @@ class Content:
         points: [N, n] coordinates, possibly not finite.
         normals: [N, n] or None.
         weights: [N] or None.
+        labels: [N] classes that count unasked (the elements of atoms), or None.
+        point_fields: what else the file tells of each point, by name: [N] whole numbers, numbers or texts, or [N, 3]
+            colours.
+        face_fields: the same of each face.
         faces: polygons over `points`, or None for a cloud.
         point_lines: line of the file that each point stands in, for text formats.
         face_lines: the same for the faces.
@@ -54,7 +61,10 @@ class Content:
     points: Array
     normals: Array | None = None
     weights: Array | None = None
+    labels: Index | None = None
     faces: Polygons | None = None
+    point_fields: Mapping[str, Values] = field(default_factory=dict)
+    face_fields: Mapping[str, Values] = field(default_factory=dict)
     point_lines: Sequence[int] | None = None
     face_lines: Sequence[int] | None = None
     first_index: int = 0

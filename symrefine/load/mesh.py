@@ -7,23 +7,28 @@ import numpy as np
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.content import Content, Polygons
+from symrefine.load.labels import triangle_classes
 from symrefine.load.polygons import negligible, triangulate
 from symrefine.shape import Index, Measure, Shape
 
 _LOG = logging.getLogger(__name__)
 
 
-def mesh_shape(content: Content, faces: Polygons, measure: Measure, source: str) -> Shape:
+def mesh_shape(content: Content, faces: Polygons, measure: Measure, source: str, *, labels: str | None = None) -> Shape:
     """Triangle mesh of a file with faces.
 
     Polygons are triangulated; vertices that the format repeats are merged; triangles without area and vertices
     without a face carry no mass and go, so that they influence nothing.
 
+    Args:
+        labels: name of a field of the faces or the vertices that becomes the classes of the triangles.
+
     Raises:
-        InputError: indices out of range, crossing outlines, no area at all.
+        InputError: indices out of range, crossing outlines, no area at all, no such field.
     """
     _check_range(content, faces, source)
     triangles, owner = triangulate(content, faces, source)
+    corners = triangles
     points, triangles = _merged(content.points, triangles) if content.split else (content.points, triangles)
     flat = negligible(points, triangles)
     if flat.all():
@@ -36,7 +41,10 @@ def mesh_shape(content: Content, faces: Polygons, measure: Measure, source: str)
         "%s: %d vertices, %d triangles; left out %d triangles without area and %d vertices without a face",
         source, len(used), int((~flat).sum()), int(flat.sum()), len(points) - len(used),
     )  # fmt: skip
-    return Shape(points=points[used], faces=compact.reshape(-1, 3), measure=measure, source=source)
+    classes = None
+    if labels is not None:
+        classes = triangle_classes(content, labels, owner[~flat], corners[~flat], source)
+    return Shape(points=points[used], faces=compact.reshape(-1, 3), labels=classes, measure=measure, source=source)
 
 
 def _check_range(content: Content, faces: Polygons, source: str) -> None:

@@ -11,16 +11,22 @@ from symrefine.load.content import Content, polygons
 from symrefine.load.text import Line, count, numbered_lines, parse_table, shorten
 
 # Looks, names and smoothing: nothing of the shape.
-_IGNORED = frozenset("vt o g s usemtl usemap mtllib lod".split())
+_IGNORED = frozenset("vt o g s usemap mtllib lod".split())
 # Corners of a face, each a vertex, vertex/texture, vertex//normal or vertex/texture/normal.
 _CORNERS = re.compile(r"(\s+[+-]?[0-9]{1,18}(/[+-]?[0-9]*){0,2})+")
 
 
 def read_obj(data: bytes, source: str) -> Content:
-    """Content of an OBJ file; colours behind the coordinates, texture and materials are not part of a shape."""
+    """Content of an OBJ file.
+
+    Fields are `color`, behind the coordinates of the points, and `material`, the name after `usemtl` for each face.
+    Textures are not read.
+    """
     vertices: list[Line] = []
     normals: list[Line] = []
     faces: list[tuple[int, list[int]]] = []
+    materials: list[str] = []
+    material = ""
     other: dict[str, int] = {}
     for number, text in _statements(numbered_lines(data, source, comment="#")):
         keyword, _, rest = text.replace("\t", " ").partition(" ")
@@ -30,19 +36,25 @@ def read_obj(data: bytes, source: str) -> Content:
             normals.append((number, rest))
         elif keyword == "f":
             faces.append((number, _face((number, rest), len(vertices), source)))
+            materials.append(material)
+        elif keyword == "usemtl":
+            material = rest.strip()
         elif keyword in ("l", "p"):
             other.setdefault(keyword, number)
         elif keyword not in _IGNORED:
             raise InputError(
                 f"{source}: line {number}: {shorten(keyword)} is no statement of a polygonal OBJ file; expected "
-                f"v vn f l p {' '.join(sorted(_IGNORED))}"
+                f"v vn f l p usemtl {' '.join(sorted(_IGNORED))}"
             )
     if not faces and "l" in other:
         raise InputError(f"{source}: line {other['l']}: lines but no faces; expected faces, or vertices alone")
+    table = _vertices(vertices, source)
     return Content(
-        points=_vertices(vertices, source),
+        points=table[:, :3],
         normals=_normals(normals, len(vertices), source) if normals and not faces else None,
         faces=polygons(corners for _, corners in faces) if faces else None,
+        point_fields={"color": table[:, 3:]} if table.shape[1] == 6 else {},
+        face_fields={"material": np.array(materials)} if any(materials) else {},
         point_lines=[number for number, _ in vertices],
         face_lines=[number for number, _ in faces],
         first_index=1,
@@ -64,6 +76,7 @@ def _statements(lines: Iterable[Line]) -> Iterator[Line]:
 
 
 def _vertices(lines: list[Line], source: str) -> Array:
+    """[N, 3], or [N, 6] with a colour."""
     table = parse_table(
         lines, source, columns=(3, 4, 6), layout="v x y z, a weight of 1 or a colour of three numbers behind it"
     )
@@ -71,7 +84,7 @@ def _vertices(lines: list[Line], source: str) -> Array:
         raise InputError(
             f"{source}: line {lines[bad[0]][0]}: weight {table[bad[0], 3]} of a rational vertex; expected 1 or none"
         )
-    return table[:, :3]
+    return table if table.shape[1] == 6 else table[:, :3]
 
 
 def _normals(lines: list[Line], points: int, source: str) -> Array:

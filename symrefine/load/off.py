@@ -3,6 +3,7 @@
 import re
 
 from symrefine.errors import InputError
+from symrefine.geometry import Array
 from symrefine.load.content import Content, polygons
 from symrefine.load.text import Line, numbered_lines, parse_integers, parse_table, shorten
 
@@ -13,7 +14,7 @@ _LAYOUT = {"OFF": "x y z", "COFF": "x y z and a colour of three or four numbers"
 
 
 def read_off(data: bytes, source: str) -> Content:
-    """Content of an OFF file; colours of vertices and faces are not part of a shape."""
+    """Content of an OFF file; the colours of vertices, or those of faces where every face has one, are fields."""
     lines = numbered_lines(data, source, comment="#")
     kind, lines = _keyword(lines, source)
     vertices, faces = _counts(lines, source)
@@ -30,6 +31,8 @@ def read_off(data: bytes, source: str) -> Content:
         points=table[:, :3],
         normals=table[:, 3:] if kind == "NOFF" and not faces else None,
         faces=polygons([_face(line, source) for line in rest]) if faces else None,
+        point_fields={"color": table[:, 3:6]} if kind == "COFF" else {},
+        face_fields=_face_colours(rest, source),
         point_lines=[number for number, _ in rows],
         face_lines=[number for number, _ in rest],
     )
@@ -64,3 +67,12 @@ def _face(line: Line, source: str) -> list[int]:
     if size < 0 or not size + 1 <= len(fields) <= size + 5:
         raise InputError(f"{source}: line {number}: {shorten(text)}; expected {expected}")
     return parse_integers((number, " ".join(fields[1 : size + 1])), source, expected)
+
+
+def _face_colours(lines: list[Line], source: str) -> dict[str, Array]:
+    """Colours [F, 3] behind the corners, if every face has three or four numbers there."""
+    behind = [text.split()[int(text.split()[0]) + 1 :] for _, text in lines]
+    if not behind or not all(len(fields) in (3, 4) for fields in behind):
+        return {}
+    rows = [(number, " ".join(fields[:3])) for (number, _), fields in zip(lines, behind, strict=True)]
+    return {"color": parse_table(rows, source, columns=(3,), layout="a colour of three or four numbers")}

@@ -19,6 +19,7 @@ _ENCODINGS = ("ascii", "binary", "binary_compressed")
 _TYPES = frozenset({"F4", "F8", "I1", "I2", "I4", "I8", "U1", "U2", "U4", "U8"})
 _COORDINATES = ("x", "y", "z")
 _NORMAL = ("normal_x", "normal_y", "normal_z")
+_NOT_FIELDS = frozenset({*_COORDINATES, *_NORMAL, "_", "rgb", "rgba"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,16 +44,35 @@ class _Header:
 
 
 def read_pcd(data: bytes, source: str) -> Content:
-    """Content of a PCD file; the viewpoint is where the sensor stood and moves no point."""
+    """Content of a PCD file; the viewpoint is where the sensor stood and moves no point.
+
+    Fields are those of one value a point beside places, normals and colours (which PCD packs into one number); of
+    compressed files, none.
+    """
     header = _parse_header(data, source)
     normals = set(_NORMAL) <= set(header.names)
     wanted = [*_COORDINATES, *(_NORMAL if normals else ())]
+    places, others = len(wanted), _others(header)
     if header.encoding == "ascii":
-        table, lines = _read_text(data, header, wanted, source)
+        table, lines = _read_text(data, header, [*wanted, *others], source)
+    elif header.encoding == "binary":
+        table, lines = _read_binary(data, header, [*wanted, *others], source), None
     else:
-        read = _read_binary if header.encoding == "binary" else _read_compressed
-        table, lines = read(data, header, wanted, source), None
-    return Content(points=table[:, :3], normals=table[:, 3:] if normals else None, point_lines=lines)
+        table, lines = _read_compressed(data, header, wanted, source), None
+    return Content(
+        points=table[:, :3],
+        normals=table[:, 3:6] if normals else None,
+        point_fields={name: table[:, k] for k, name in enumerate(others, start=places)},
+        point_lines=lines,
+    )
+
+
+def _others(header: _Header) -> list[str]:
+    """Names of the fields that may label the points."""
+    if header.encoding == "binary_compressed":
+        return []
+    names = [name for name, size in zip(header.names, header.counts, strict=True) if size == 1]
+    return [name for name in names if name not in _NOT_FIELDS and header.names.count(name) == 1]
 
 
 def _parse_header(data: bytes, source: str) -> _Header:

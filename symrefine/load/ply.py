@@ -4,17 +4,23 @@ import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
-from symrefine.load.content import Content, Polygons, as_float64
+from symrefine.load.content import Content, Polygons, Values, as_float64
 from symrefine.load.ply_body import Rows, read_rows
 from symrefine.load.ply_header import Element, parse_header
 
 _COORDINATES = ("x", "y", "z")
 _NORMAL = ("nx", "ny", "nz")
 _CORNERS = ("vertex_indices", "vertex_index")
+_COLOUR = ("red", "green", "blue")
+_PLACE = frozenset({*_COORDINATES, *_NORMAL})
 
 
 def read_ply(data: bytes, source: str) -> Content:
-    """Content of a PLY file; colours and other properties, edges and camera data are not part of a shape."""
+    """Content of a PLY file; edges and camera data are not part of a shape.
+
+    Fields are the properties of vertices and faces that are no coordinates, normals or lists, and `color` for red,
+    green and blue.
+    """
     header = parse_header(data, source)
     elements = {element.name: element for element in header.elements}
     vertex = elements.get("vertex", Element(name="vertex", count=0))
@@ -27,6 +33,8 @@ def read_ply(data: bytes, source: str) -> Content:
         points=_stack(vertices, _COORDINATES),
         normals=_stack(vertices, _NORMAL) if not corners and set(_NORMAL) <= _scalars(vertex) else None,
         faces=_polygons(rows["face"], corners, source) if corners else None,
+        point_fields=_fields(vertex, vertices),
+        face_fields=_fields(face, rows["face"]) if face is not None and corners else {},
         point_lines=vertices.lines,
         face_lines=rows["face"].lines if corners else None,
     )
@@ -56,6 +64,23 @@ def _corner_property(face: Element, source: str) -> str:
             return p.name
     names = ", ".join(p.name for p in face.properties)
     raise InputError(f"{source}: element 'face' has properties {names}; expected a list {' or '.join(_CORNERS)}")
+
+
+def _fields(element: Element, rows: Rows) -> dict[str, Values]:
+    """What the rows of an element hold beside places and lists, whole numbers as such where the header says so."""
+    # Text is read as floating-point numbers, whatever the header says.
+    columns = {p.name: _typed(rows.columns[p.name].values, p.type) for p in element.properties if not p.length_type}
+    fields = {name: values for name, values in columns.items() if name not in _PLACE}
+    if set(_COLOUR) <= set(fields):
+        colour = np.stack([fields[name] for name in _COLOUR], axis=1)
+        fields = {name: values for name, values in fields.items() if name not in (*_COLOUR, "alpha")}
+        fields["color"] = colour
+    return fields
+
+
+def _typed(values: Values, type_: str) -> Values:
+    whole = values.dtype.kind == "f" and type_[0] in "iu" and bool((values == np.rint(values)).all())
+    return values.astype(np.int64) if whole else values
 
 
 def _stack(rows: Rows, names: tuple[str, ...]) -> Array:

@@ -3,6 +3,7 @@
 import io
 import re
 import zipfile
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -10,17 +11,21 @@ from numpy.typing import NDArray
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
-from symrefine.load.content import Content, Polygons, as_float64
-from symrefine.load.text import count, numbered_lines, parse_table, shorten
+from symrefine.load.content import Content, Polygons, Values, as_float64
+from symrefine.load.molecule import is_molecule, read_molecule
+from symrefine.load.text import Line, count, is_number, numbered_lines, parse_table, shorten
 
 _FIELDS = ("points", "normals", "weights", "faces")
+_COLOURS = (("red", "green", "blue"), ("r", "g", "b"))
 # Rounding of normals written with three digits; colours and coordinates are far from it.
 _UNIT = 1e-2
 
 
 def read_xyz(data: bytes, source: str) -> Content:
-    """Points of 3-space, with unit normals or without; `#` begins a remark."""
+    """Points of 3-space, with unit normals or without, where `#` begins a remark; or the atoms of chemical .xyz."""
     lines = numbered_lines(data, source, comment="#")
+    if is_molecule(lines):
+        return read_molecule(data, source)
     table = parse_table(lines, source, columns=(3, 6), layout="3 columns (x y z) or 6 (x y z and a unit normal)")
     normals = table[:, 3:] if table.shape[1] == 6 else None
     if normals is not None and (bad := np.flatnonzero(~_is_unit(normals))).size:
@@ -31,28 +36,67 @@ def read_xyz(data: bytes, source: str) -> Content:
     return Content(points=table[:, :3], normals=normals, point_lines=[number for number, _ in lines])
 
 
-def read_table(data: bytes, source: str) -> Content:
+def read_table(data: bytes, source: str, named: Collection[str] = ()) -> Content:
     """Points of n-space, one a line, between commas if the first line has any; `#` begins a remark.
 
     A first line of names may say which columns are coordinates and which a normal.
+
+    Args:
+        named: fields that the caller asks for: names of columns of numbers or texts, or `color` for those of red,
+            green and blue. Other columns are refused as ever.
     """
     lines = numbered_lines(data, source, comment="#")
     delimiter = "," if lines and "," in lines[0][1] else None
     names = [name.strip().strip('"').lower() for name in lines[0][1].split(delimiter)] if lines else []
     titled = bool(names) and not any(re.match(r"[+-]?\.?[0-9]|[+-]?(nan|inf)", name) for name in names)
     rows = lines[1:] if titled else lines
-    normals = _check_names(names, lines[0][0], source) if titled else False
+    fields = _field_columns(names if titled else [], named)
+    taken = {column for group in fields.values() for column in group}
+    places = [column for column in range(len(names)) if column not in taken]
+    normals = _check_names([names[k] for k in places], lines[0][0], source) if titled else False
     columns = (len(names),) if titled else ()
     layout = f"{count(len(names), 'column')} as in the first line" if titled else "as many numbers in every line"
-    table = parse_table(rows, source, columns=columns, layout=layout, delimiter=delimiter)
-    if not titled:
+    texts = {k: entries for k in taken if (entries := _texts(rows, k, delimiter, source))}
+    numeric = [_without(row, texts, delimiter) for row in rows] if texts else rows
+    table = parse_table(numeric, source, columns=columns, layout=layout, delimiter=delimiter)
+    values = {name: np.array(texts.get(group[0], table[:, group])) for name, group in fields.items()}
+    if titled:
+        table = table[:, places]
+    else:
         _refuse_hidden_normals(table, source, "name the columns in a first line: x,y,z,nx,ny,nz or x1,...,x6")
     _check_shape(table, source)
     return Content(
         points=table[:, :3] if normals else table,
         normals=table[:, 3:] if normals else None,
+        point_fields={name: v[:, 0] if v.shape[1:] == (1,) else v for name, v in values.items()},
         point_lines=[number for number, _ in rows],
     )
+
+
+def _field_columns(names: list[str], named: Collection[str]) -> dict[str, list[int]]:
+    """Columns of each field that was asked for and is there."""
+    fields = {name.lower(): [names.index(name.lower())] for name in named if name.lower() in names}
+    colours = next((c for c in _COLOURS if set(c) <= set(names)), None)
+    if "color" in named and "color" not in fields and colours is not None:
+        fields["color"] = [names.index(name) for name in colours]
+    return fields
+
+
+def _texts(rows: list[Line], column: int, delimiter: str | None, source: str) -> list[str]:
+    """Entries of a column that holds anything but numbers; none of a column of numbers, or where a row is short."""
+    entries = [fields[column].strip().strip('"') for _, text in rows if len(fields := text.split(delimiter)) > column]
+    if len(entries) < len(rows) or all(is_number(entry) for entry in entries):
+        return []
+    if "" in entries:
+        raise InputError(f"{source}: line {rows[entries.index('')][0]}, column {column + 1}: is empty")
+    return entries
+
+
+def _without(row: Line, columns: Collection[int], delimiter: str | None) -> Line:
+    """The row with a number in place of texts, so that columns keep their places in messages."""
+    number, text = row
+    fields = ["0" if k in columns else field for k, field in enumerate(text.split(delimiter))]
+    return number, (delimiter or " ").join(fields)
 
 
 def _check_names(names: list[str], line: int, source: str) -> bool:
@@ -64,7 +108,8 @@ def _check_names(names: list[str], line: int, source: str) -> bool:
         return False
     raise InputError(
         f"{source}: line {line}: columns {shorten(','.join(names))}; expected x,y or x,y,z or x,y,z,nx,ny,nz or "
-        "x1,...,xn: keep only these, or remove the line of names if every column is a coordinate"
+        "x1,...,xn: keep only these, name one as labels or weights, or remove the line of names if every column is a "
+        "coordinate"
     )
 
 
@@ -76,14 +121,20 @@ def read_npy(data: bytes, source: str) -> Content:
     return Content(points=points)
 
 
-def read_npz(data: bytes, source: str) -> Content:
-    """Arrays named as the fields of a shape: points, and normals, weights or faces [F, 3] if there are any."""
+def read_npz(data: bytes, source: str, named: Collection[str] = ()) -> Content:
+    """Arrays named as the fields of a shape: points, and normals, weights or faces [F, 3] if there are any.
+
+    Args:
+        named: further arrays that the caller asks for: numbers or texts [F] for faces, [N] for points (the faces have
+            them where both would do), or colours [F, 3] or [N, 3], [F, 4] or [N, 4]. Others are refused as ever.
+    """
     arrays = _read_archive(data, source)
+    fields = {name: arrays.pop(name) for name in named if name in arrays and name not in _FIELDS}
     unknown = sorted(set(arrays) - set(_FIELDS))
     if unknown or "points" not in arrays:
         raise InputError(
             f"{source}: holds arrays {', '.join(sorted(arrays)) or '(none)'}; expected points, and any of "
-            f"{', '.join(_FIELDS[1:])}"
+            f"{', '.join(_FIELDS[1:])}, and what you name as labels or weights"
         )
     numbers = {name: _numbers(array, name, source) for name, array in arrays.items() if name != "faces"}
     _check_shape(numbers["points"], source)
@@ -92,12 +143,34 @@ def read_npz(data: bytes, source: str) -> Content:
         raise InputError(f"{source}: weights and faces; a mesh takes its weights from its faces: remove one of them")
     if faces is not None and numbers["points"].shape[1] != 3:
         raise InputError(f"{source}: faces over points {numbers['points'].shape}; faces need points [N, 3]")
+    point_fields, face_fields = _sorted(fields, len(numbers["points"]), 0 if faces is None else len(faces), source)
     return Content(
         points=numbers["points"],
         normals=numbers.get("normals") if faces is None else None,
         weights=numbers.get("weights"),
         faces=faces,
+        point_fields=point_fields,
+        face_fields=face_fields,
     )
+
+
+def _sorted(
+    fields: dict[str, NDArray[Any]], points: int, faces: int, source: str
+) -> tuple[dict[str, Values], dict[str, Values]]:
+    """The fields of the points and those of the faces, by their lengths."""
+    of_points: dict[str, Values] = {}
+    of_faces: dict[str, Values] = {}
+    for name, array in fields.items():
+        fit = array.ndim == 1 or (array.ndim == 2 and array.shape[1] in (3, 4) and array.dtype.kind != "U")
+        if not fit or len(array) not in {points, faces or points} or array.dtype.kind not in "biufUS":
+            lengths = f"{points} points" + (f", {faces} faces" if faces else "")
+            raise InputError(
+                f"{source}: {name} is {array.dtype} of shape {array.shape}; expected numbers or texts, or colours "
+                f"[N, 3], for {lengths}"
+            )
+        values = array.astype(np.int64) if array.dtype.kind == "b" else array
+        (of_faces if len(array) == faces else of_points)[name] = values[:, :3] if array.ndim == 2 else values
+    return of_points, of_faces
 
 
 def _read_archive(data: bytes, source: str) -> dict[str, NDArray[Any]]:

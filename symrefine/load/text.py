@@ -87,7 +87,7 @@ def parse_numbers(line: Line, source: str, layout: str) -> list[float]:
             return [float(field) for field in fields]
     except ValueError:
         pass
-    column, field = next((k, field) for k, field in enumerate(fields, start=1) if not _is_number(field))
+    column, field = next((k, field) for k, field in enumerate(fields, start=1) if not is_number(field))
     raise InputError(f"{source}: line {number}, column {column}: {shorten(field)} is not a number; expected {layout}")
 
 
@@ -101,7 +101,7 @@ def _explain(lines: Sequence[Line], source: str, columns: Collection[int], layou
     for number, text in lines:
         fields = [field.strip() for field in text.split(delimiter)]
         for column, field in enumerate(fields, start=1):
-            if not _is_number(field):
+            if not is_number(field):
                 raise InputError(
                     f"{source}: line {number}, column {column}: {shorten(field)} is not a number; expected {layout}"
                 )
@@ -120,7 +120,8 @@ def count(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-def _is_number(field: str) -> bool:
+def is_number(field: str) -> bool:
+    """Whether NumPy reads it as a number."""
     try:
         float(field)
     except ValueError:

@@ -1,0 +1,102 @@
+"""Fields of a file to classes that a symmetry must keep, and to weights."""
+
+import numpy as np
+
+from symrefine.errors import InputError
+from symrefine.geometry import Array
+from symrefine.load.colours import colour_classes
+from symrefine.load.content import Content, Values
+from symrefine.shape import Index
+
+# Whole numbers up to here are exact as float64.
+_LARGEST = 2.0**53
+
+
+def point_classes(content: Content, name: str, source: str) -> Index:
+    """Classes [N] of the points of a cloud by a field of that name.
+
+    Raises:
+        InputError: no such field, or values that are neither whole numbers, texts nor colours.
+    """
+    key = _key(content, name, "labels", source)
+    weights = np.ones(len(content.points)) if content.weights is None else content.weights
+    return _classes(content, key, False, weights, source)
+
+
+def triangle_classes(content: Content, name: str, owner: Index, corners: Index, source: str) -> Index:
+    """Classes [T] of the triangles of a mesh by a field of its faces, or else of its vertices.
+
+    A triangle takes the class of two corners or more; where all three differ, that of the first.
+
+    Args:
+        owner: [T] face of the file that each triangle is part of.
+        corners: [T, 3] points of the file.
+
+    Raises:
+        InputError: as for `point_classes`.
+    """
+    key = _key(content, name, "labels", source)
+    a, b, c = (content.points[corners[:, k]] for k in range(3))
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    if key in content.face_fields:
+        covered = _sums(owner, areas, len(content.face_fields[key]))
+        return _classes(content, key, True, covered, source)[owner]
+    covered = _sums(corners.ravel(), np.repeat(areas, 3), len(content.points))
+    first, second, third = _classes(content, key, False, covered, source)[corners].T
+    chosen: Index = np.where(second == third, second, first)
+    return chosen
+
+
+def point_weights(content: Content, name: str, source: str) -> Array:
+    """Weights [N] of the points of a cloud by a field of that name; `Shape` judges the numbers.
+
+    Raises:
+        InputError: no such field, or values that are no numbers.
+    """
+    if name == "weights" and content.weights is not None:
+        return content.weights
+    key = _key(content, name, "weights", source)
+    values = content.point_fields.get(key)
+    if values is None or values.ndim != 1 or values.dtype.kind not in "iuf":
+        raise InputError(f"{source}: {key} cannot weigh points; expected one number for each point")
+    return values.astype(np.float64)
+
+
+def _key(content: Content, name: str, what: str, source: str) -> str:
+    """Name of the field as the file has it; titles of tables are in lower case."""
+    offered = sorted({*content.point_fields, *content.face_fields})
+    for key in (name, name.lower()):
+        if key in offered:
+            return key
+    told = f"the file offers {', '.join(offered)}" if offered else "the file offers none"
+    raise InputError(f"{source}: no {what} {name!r}; {told}")
+
+
+def _classes(content: Content, key: str, of_faces: bool, weights: Array, source: str) -> Index:
+    values = (content.face_fields if of_faces else content.point_fields)[key]
+    if values.dtype.kind not in "US" and (row := _unfit(values)) is not None:
+        where = content.face_name(row) if of_faces else content.point_name(row)
+        right = "whole numbers" if values.ndim == 1 else "finite colours from 0 on"
+        raise InputError(f"{source}: {key} of {where} is {values[row].tolist()}; labels are {right}")
+    if values.ndim == 2:
+        return colour_classes(values, weights)
+    if values.dtype.kind in "US":
+        return np.unique(values, return_inverse=True)[1].reshape(-1).astype(np.int64)
+    return values.astype(np.int64)
+
+
+def _sums(places: Index, amounts: Array, count: int) -> Array:
+    return np.bincount(places, amounts, minlength=count).astype(np.float64)
+
+
+def _unfit(values: Values) -> int | None:
+    """The first row that cannot be a class."""
+    with np.errstate(invalid="ignore"):
+        if values.ndim == 2:
+            fit = (np.isfinite(values) & (values >= 0) & (values <= 65535)).all(axis=1)
+        elif values.dtype.kind == "f":
+            fit = (values == np.rint(values)) & (np.abs(values) <= _LARGEST)
+        else:
+            fit = np.ones(len(values), dtype=bool)
+    bad = np.flatnonzero(~fit)
+    return int(bad[0]) if bad.size else None
