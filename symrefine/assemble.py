@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from symrefine.axis import fold_energy
 from symrefine.elements import Element, elements_of, mirror_element
 from symrefine.errors import DegenerateShapeError
 from symrefine.geometry import Array, frame_with_z, householder, rotation, rotoreflection, unit
@@ -46,6 +47,8 @@ APART_RAD = math.radians(1.0)
 MAX_OPERATIONS = 9
 # An object is called round only if it misses by less than this share of the limits; a nut with its eight sides is not.
 ROUND_LIMIT = 0.5
+# Azimuthal energy over its noise from which on a high order shows.
+SEEN = 12.0
 # Orders from which on a finite axis has to be better than a continuous one, and by what factor.
 CHANCE_FOLD = 5
 AS_GOOD = 1.5
@@ -165,9 +168,18 @@ def _from_parts(evidence: Evidence) -> Assembly:
     while True:
         group, held, turns = _closed(held, turns)
         done = _group_of(evidence, group, held, turns, near)
-        if all(e.verdict.excess <= 1.0 for e in done.elements) or not (held or turns):
+        good = all(e.verdict.excess <= 1.0 for e in done.elements) and _fold_is_seen(evidence, done.group)
+        if good or not (held or turns):
             return _unless_round(evidence, done)
         near.extend(mirror_element(m) for m in _without_worst(held, turns))
+
+
+def _fold_is_seen(evidence: Evidence, group: PointGroup) -> bool:
+    """Whether the surface shows the order of the main axis about it: nearly round, it has mirrors at any angle."""
+    main = [(u, int(k)) for u, k in group.rotation_axes()[:1] if CHANCE_FOLD < k < math.inf]
+    if evidence.judge.cloud.isolated:
+        return True
+    return all(fold_energy(evidence.points, evidence.weights, u, k) > SEEN for u, k in main)
 
 
 def _unless_round(evidence: Evidence, found: Assembly) -> Assembly:

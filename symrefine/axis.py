@@ -112,8 +112,7 @@ def fold_candidates(points: Array, weights: Array, axis: Array, *, leak_max: flo
     An empty list means a surface of revolution as far as the azimuthal spectrum can tell, or no axis at all.
     """
     c, sigma = azimuthal_spectrum(points, weights, axis)
-    sigma = np.where(sigma > 0, sigma, np.inf)  # a flat object has no height to weigh azimuths with
-    energy = np.clip(np.abs(c) ** 2 / sigma**2 - 1.0, 0.0, None).sum(axis=1)
+    energy = _energy_over_noise(c, sigma)
     energy[0] = 0.0
     k = np.arange(len(energy))
     if energy.max() < 12.0:
@@ -128,6 +127,16 @@ def fold_candidates(points: Array, weights: Array, axis: Array, *, leak_max: flo
             found.append(FoldCandidate(fold=b, frame=phase @ frame_with_z(axis), leak=float(leak)))
     # A divisor of the true fold leaks no more than it: prefer the largest fold among equals.
     return sorted(found, key=lambda f: (round(f.leak, 1), -f.fold))
+
+
+def fold_energy(points: Array, weights: Array, axis: Array, fold: int) -> float:
+    """Azimuthal energy at one order about an axis through the origin, over what random azimuths would show."""
+    return float(_energy_over_noise(*azimuthal_spectrum(points, weights, axis, fold))[fold])
+
+
+def _energy_over_noise(c: Array, sigma: Array) -> Array:
+    sigma = np.where(sigma > 0, sigma, np.inf)  # a flat object has no height to weigh azimuths with
+    return np.clip(np.abs(c) ** 2 / sigma**2 - 1.0, 0.0, None).sum(axis=1)
 
 
 def polish_frame(harmonics: dict[int, Array], frame: Array, fold: int, *, steps: int = 6) -> Array:

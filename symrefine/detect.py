@@ -349,7 +349,7 @@ def gather(
     planes = partial(
         local_planes, local, rng=rng, normals=normals, labels=labels, weights=chance, exact=exact, tree=tree
     )
-    filled = tree is not None and normals is None and fills_volume(local, tree, rng)
+    filled = tree is not None and normals is None and fills_volume(local, tree, np.random.default_rng(0))
     cloud = _volume(local, labels, rng) if filled else planes(LOCAL_PLANES)
     diagonal = tight_diagonal(cloud.points)
     floor = None if exact or filled or len(local) > LOCAL_PLANES else _sparse_floor(local, labels, diagonal, rng)

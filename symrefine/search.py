@@ -36,7 +36,7 @@ AXIS_HOPELESS = 0.15
 # Excesses between these are close calls.
 CLOSE = (0.5, 1.4)
 # A miss below this share of the limits is no compromise between parts.
-SURE = 0.3
+SURE = 0.5
 # Gate (spacings) of a refinement held to what agrees, and how much better its bulk has to be to be believed.
 LOCK = 0.5
 # Scale of its weights over the median absolute residual: what misses by more than most does hardly counts.
@@ -167,7 +167,7 @@ def locked(
     A detail out of place draws the fit of everything to a compromise in which nothing agrees exactly and nothing
     misses by much; held to what agrees, the same detail shows its whole miss.
     """
-    if verdict.bulk < SURE:
+    if verdict.excess < SURE:
         return history, verdict
     state = history[-1].state
     more = refined_closely(evidence, state, sources=max(LOOK, 12000 // len(state.standard)))
