@@ -4,11 +4,13 @@ import io
 import json
 import struct
 from collections.abc import Iterable
+from contextlib import suppress
 from itertools import permutations, product
 from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial.transform import Rotation
 
 from experiments.molecule_sets import MOLECULES, molecule
@@ -372,6 +374,25 @@ def test_fields_of_pcd(tmp_path: Path) -> None:
         assert "no labels 'color'; the file offers label" in refusal(path, labels="color")
 
 
+def test_colours_of_vertices_of_gltf(tmp_path: Path) -> None:
+    """Parts in their places; colours for all parts or none."""
+    points, quads, face = cube(1)
+    triangles = np.array(quads)[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    colours = np.array(CUBES["a lid"][0])[face]
+    halves = [trimesh.Trimesh(points, part, vertex_colors=colours, process=False) for part in np.split(triangles, 2)]
+    scene = trimesh.Scene(halves)
+    scene.apply_transform(np.block([[pose(4)[0], np.zeros((3, 1))], [np.eye(4)[3]]]))
+    scene.export(tmp_path / "a.glb")
+    shape = load(tmp_path / "a.glb", labels="color")
+    assert np.unique(shape.labels, return_counts=True)[1].tolist() == [10, 2]
+    assert len(shape.points) == 8
+    assert detect(shape).point_group == "C4v"
+    trimesh.Scene([halves[0], trimesh.creation.box()]).export(tmp_path / "b.glb")
+    assert "no labels 'color'; the file offers none" in refusal(tmp_path / "b.glb", labels="color")
+    trimesh.Scene(trimesh.PointCloud(points, colors=colours)).export(tmp_path / "c.glb")
+    assert len(set(load(tmp_path / "c.glb", labels="color").labels)) == 2
+
+
 def test_what_has_no_labels_says_so(tmp_path: Path) -> None:
     path = tmp_path / "a.stl"
     path.write_text("solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n"
@@ -385,6 +406,44 @@ def test_what_has_no_labels_says_so(tmp_path: Path) -> None:
     assert "is a picture: labels and weights apply to meshes and clouds only" in refusal(path, labels="color")
     path = ply(tmp_path / "b.ply", TETRA, of_points=rgb(np.full((4, 3), np.nan)), kind="float")
     assert "color of point 0 (line 11) is [nan, nan, nan]; labels are finite colours" in refusal(path, labels="color")
+
+
+def labelled_files(folder: Path) -> list[tuple[Path, str]]:
+    """A file of each kind that has labels, and their name."""
+    colours, classes = np.array([RED, RED, BLUE, GREEN]), np.array([1, 1, 2, 3])
+    rows = "".join(f"{x},{y},{z},{e}\n" for (x, y, z), e in zip(TETRA, "HOHN", strict=True))
+    corners = "".join(f"3 {a} {b} {c} 255 0 0\n" for a, b, c in FACES)
+    (folder / "a.xyz").write_text(WATER)
+    (folder / "a.csv").write_text("x,y,z,kind\n" + rows)
+    (folder / "a.off").write_text("OFF\n4 4 0\n" + "".join(f"{x} {y} {z}\n" for x, y, z in TETRA) + corners)
+    (folder / "a.obj").write_text(
+        "".join(f"v {x} {y} {z} 0 0 1\n" for x, y, z in TETRA) + "usemtl oak\nf 1 2 3\nusemtl steel\nf 1 4 3\n"
+    )
+    ply(folder / "a.ply", TETRA, FACES, of_points=rgb(colours))
+    ply(folder / "b.ply", TETRA, FACES, of_faces={"kind": classes}, kind="int")
+    npz(folder / "a.npz", points=TETRA, faces=FACES, kind=classes)
+    names = "element kind color material color kind kind".split()
+    files = ("a.xyz", "a.csv", "a.off", "a.obj", "a.ply", "b.ply", "a.npz")
+    return [(folder / file, name) for file, name in zip(files, names, strict=True)]
+
+
+def test_damage_never_shows_as_a_foreign_error(tmp_path: Path) -> None:
+    """Whatever bytes change or vanish: labels for all, or one of our own sentences."""
+    rng = np.random.default_rng(1)
+    for path, name in labelled_files(tmp_path):
+        sound = path.read_bytes()
+        assert load(path, labels=name).labels is not None
+        for _ in range(80):
+            data = bytearray(sound)
+            start = int(rng.integers(len(data)))
+            if rng.random() < 0.5:
+                data[start] = rng.integers(256)
+            else:
+                data[start : start + int(rng.integers(1, 20))] = rng.choice([b"", b"9" * 30, b"inf", b"-1", b"1e99"])
+            path.write_bytes(data)
+            with suppress(InputError):
+                shape = load(path, labels=name)
+                assert len(shape.labels) == len(shape.points if shape.faces is None else shape.faces)
 
 
 # Colours to classes.

@@ -79,9 +79,9 @@ def load(
         labels: what tells the classes that every symmetry must keep: a vertex or face property of .ply (`label`,
             `material_index`), a field of .pcd, a titled column of .csv or .txt (numbers or texts), an array of .npz
             ([F] for faces, [N] for points), `material` for what `usemtl` names in .obj, or `color` for the colours of
-            vertices or faces (.ply, .obj, .off, and columns red green blue). Colours closer than about a quarter of
-            the scale become one class (see `symrefine.load.colours`). A face whose vertices have labels takes that of
-            two corners, or of the first where all differ. Elements if None, for chemical .xyz.
+            vertices or faces (.ply, .obj, .off, .glb, and columns red green blue). Colours closer than about a quarter
+            of the scale become one class (see `symrefine.load.colours`). A face whose vertices have labels takes that
+            of two corners, or of the first where all differ. Elements if None, for chemical .xyz.
         weights: a property, column or array of numbers that are the masses of the points of a cloud.
         threshold: of a picture: grey value from 0 to 1 that makes it binary, or "otsu"; it is taken as it is if None.
         invert: of a picture: exchange object and background.

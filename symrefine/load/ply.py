@@ -79,8 +79,10 @@ def _fields(element: Element, rows: Rows) -> dict[str, Values]:
 
 
 def _typed(values: Values, type_: str) -> Values:
-    whole = values.dtype.kind == "f" and type_[0] in "iu" and bool((values == np.rint(values)).all())
-    return values.astype(np.int64) if whole else values
+    if values.dtype.kind != "f" or type_[0] not in "iu":
+        return values
+    whole = (values == np.rint(values)) & (np.abs(values) < 2.0**53)
+    return values.astype(np.int64) if whole.all() else values
 
 
 def _stack(rows: Rows, names: tuple[str, ...]) -> Array:
