@@ -19,7 +19,7 @@ from symrefine.shape import Index
 # mailbox's flag the last) and every true one but a posed ant stays below; the closest is a camera.
 LIMITS = (0.22, 0.75, 1.15, 1.6, 2.0)
 # The same for atoms, of mean, 95th percentile and the farthest: noise moves every one of them, and every one counts.
-ATOM_LIMITS = (0.7, 1.2, 1.5)
+ATOM_LIMITS = (0.9, 1.3, 1.6)
 TOLERANCE = 0.02
 DISCS = 4
 # Miss of a cloud against itself over that of its halves, whose points stand sqrt(2) times as far apart.
