@@ -205,10 +205,12 @@ def _group_of(
     history = refined_closely(evidence, start, sources=max(500, 12000 // len(start.standard)))
     state = history[-1].state
     done = _finish(evidence, PointGroup(name=group.name, frame=state.frame), state.center, history, near)
-    if any(e.verdict.excess > 1.0 for e in done.elements):
-        # Where the symmetry is only approximate, the closest fit of most points can be worse for the rest.
-        return _finish(evidence, group, center, history[:1], near)
-    return done
+    if all(e.verdict.excess <= 1.0 for e in done.elements):
+        return done
+    # Where the symmetry is only approximate, the closest fit of most points can be worse for the rest.
+    unrefined = _finish(evidence, group, center, history[:1], near)
+    cores = (max((e.verdict for e in d.elements), key=lambda v: v.core) for d in (done, unrefined))
+    return done if closer_core(*cores) else unrefined
 
 
 def _without_worst(held: list[Mirror], turns: list[Turn]) -> list[Mirror]:
