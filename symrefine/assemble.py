@@ -10,11 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from symrefine.acceptance import EXACT, Standard, compromise, standard_of
 from symrefine.axis import fold_energy
 from symrefine.elements import Element, elements_of, mirror_element
 from symrefine.errors import DegenerateShapeError
-from symrefine.geometry import Array, frame_with_z, householder, rotation, rotoreflection, unit
+from symrefine.geometry import Array, Isometry, Plane, frame_with_z, householder, rotation, rotoreflection, unit
 from symrefine.groups import PointGroup, from_elements
+from symrefine.lone import keeps, lone_part
 from symrefine.refine import Framed, Iterate
 from symrefine.search import (
     Bundle,
@@ -30,15 +32,9 @@ from symrefine.search import (
     refined_closely,
     turns_about,
 )
+from symrefine.shape import Index
 from symrefine.verify import Verdict
 
-# Beside an element that holds exactly, one that misses this many times more, and by this share of the limit, is not
-# the same kind of truth: a wheel maps onto itself nearly as well between its spokes.
-RIVAL = 4.0
-EXACT = 0.45
-# The same with the details: one leg of eight out of place shows in no bulk.
-RIVAL_DETAIL = 2.5
-EXACT_DETAIL = 0.55
 # Directions of elements are known to this before the joint refinement.
 DIRECTION_ERROR_RAD = math.radians(1.5)
 KNOWN_RAD = math.radians(4.0)
@@ -47,17 +43,17 @@ APART_RAD = math.radians(1.0)
 MAX_OPERATIONS = 9
 # An object is called round only if it misses by less than this share of the limits; a nut with its eight sides is not.
 ROUND_LIMIT = 0.5
+# Miss with the details from which on it is asked whether one part alone is to blame.
+SUSPECT = 0.4
 # Azimuthal energy over its noise from which on a high order shows.
 SEEN = 12.0
 # Orders from which on a finite axis has to be better than a continuous one, and by what factor.
 CHANCE_FOLD = 5
 AS_GOOD = 1.5
-# Planes closer than this (angle, RMS radii) may be fits of one and the same mirror.
-BESIDE_RAD = math.radians(8.0)
-BESIDE = 0.15
 # How many candidates are looked at for the list of near misses once the group is known.
 NEAR = 4
 NOTHING = np.zeros((0, 3))
+NO_PART = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -80,34 +76,15 @@ def assemble(evidence: Evidence) -> Assembly:
         return _round(evidence, bundle)
     group = PointGroup(name=f"C{int(bundle.fold)}v", frame=bundle.state.frame)
     others = list(mirrors(evidence, NOTHING, count=NEAR, known=_mirror_of(group), thorough=False))
-    if any(_standard([bundle.verdict]).admits(m.verdict) for m in others):
+    if any(standard_of([bundle.verdict]).admits(m.verdict) for m in others):
         # A mirror beside the bundle: the axis the n-tuples claimed by chance is not all there is.
         return assemble(replace(evidence, tuples=replace(evidence.tuples, kind="vanish")))
     near = [mirror_element(m) for m in others]
     done = _finish(evidence, group, bundle.state.center, bundle.history, near)
-    standard = _standard(e.verdict for e in done.elements)
+    standard = standard_of(e.verdict for e in done.elements)
     # Some of its mirrors may be exact and the others broken by a detail: then each is asked for by itself.
-    return done if all(standard.admits(e.verdict) for e in done.elements) else _from_parts(evidence)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Standard:
-    """Misses, of the bulk and with the details, up to which candidates are taken for true."""
-
-    bulk: float = 1.0
-    detail: float = 1.0
-
-    def admits(self, verdict: Verdict) -> bool:
-        """Whether an element holds by this standard."""
-        return verdict.excess <= 1.0 and verdict.bulk <= self.bulk and verdict.detail <= self.detail
-
-
-def _standard(verdicts: Iterable[Verdict]) -> _Standard:
-    """The standard that the best of the candidates sets."""
-    given = tuple(verdicts)
-    bulk = min((v.bulk for v in given), default=1.0)
-    detail = min((v.detail for v in given), default=1.0)
-    return _Standard(bulk=max(EXACT, RIVAL * bulk), detail=max(EXACT_DETAIL, RIVAL_DETAIL * detail))
+    good = all(standard.admits(e.verdict) for e in done.elements) and not len(_lone_part(evidence, done))
+    return done if good else _from_parts(evidence)
 
 
 def _axis_open(evidence: Evidence) -> Array:
@@ -132,7 +109,7 @@ def _best_bundle(evidence: Evidence) -> Bundle | None:
         found += [b for b in bundles if b.verdict.excess <= (ROUND_LIMIT if math.isinf(b.fold) else 1.0)]
         if any(b.verdict.bulk <= EXACT for b in found):
             break
-    standard = replace(_standard(b.verdict for b in found), bulk=EXACT)
+    standard = replace(standard_of(b.verdict for b in found), bulk=EXACT)
     return max((b for b in found if standard.admits(b.verdict)), key=lambda b: b.fold, default=None)
 
 
@@ -146,7 +123,7 @@ def _round(evidence: Evidence, bundle: Bundle) -> Assembly:
         mirror = evidence.judge(across.motions)
         if evidence.judge(tilted.motions).excess <= max(EXACT, bundle.verdict.excess):
             name, center = "Kh", tilted.center
-        elif _standard([bundle.verdict, mirror]).admits(mirror):
+        elif standard_of([bundle.verdict, mirror]).admits(mirror):
             name, center = "Dinfh", center + axis * float(axis @ (across.center - center))
     return _finish(evidence, PointGroup(name=name, frame=bundle.state.frame), center, bundle.history, [])
 
@@ -165,13 +142,47 @@ def _from_parts(evidence: Evidence) -> Assembly:
     """Mirrors one by one, skipping those that the group so far implies; then axes; then inversion and the improper."""
     held, near, group = _mirror_group(evidence)
     turns = _turns(evidence, held, group)
+    part: Index = NO_PART
     while True:
         group, held, turns = _closed(held, turns)
-        done = _group_of(evidence, group, held, turns, near)
+        done = _group_of(evidence, group, held, turns, near, part)
+        if len(out := _lone_part(evidence, done)):
+            kept = [e for e in done.elements if keeps(evidence, _motions(e), out)]
+            near.extend(e for e in done.elements if e.kind == "plane" and e not in kept)
+            held, turns, part = *_as_candidates(kept), out
+            continue
         good = all(e.verdict.excess <= 1.0 for e in done.elements) and _fold_is_seen(evidence, done.group)
         if good or not (held or turns):
             return _unless_round(evidence, done)
         near.extend(mirror_element(m) for m in _without_worst(held, turns))
+
+
+def _lone_part(evidence: Evidence, found: Assembly) -> Index:
+    """The part that is to blame alone for what the group misses, if there is one and some elements do not keep it."""
+    if max((e.verdict.detail for e in found.elements), default=0.0) < SUSPECT:
+        return NO_PART
+    part = lone_part(evidence, found.group, found.center)
+    return part if any(not keeps(evidence, _motions(e), part) for e in found.elements) else NO_PART
+
+
+def _motions(element: Element) -> list[Isometry]:
+    """The operation that stands for a discrete element."""
+    if element.kind == "plane":
+        return [Isometry.about(element.point, householder(element.direction))]
+    turned = rotation if element.kind == "axis" else rotoreflection
+    return [Isometry.about(element.point, turned(element.direction, 2.0 * np.pi / element.order))]
+
+
+def _as_candidates(elements: Iterable[Element]) -> tuple[list[Mirror], list[Turn]]:
+    """Elements of a group as candidates for another one."""
+    mirrors_kept, turns_kept = [], []
+    for e in elements:
+        if e.kind == "plane":
+            plane = Plane(normal=e.direction, offset=float(e.direction @ e.point))
+            mirrors_kept.append(Mirror(plane=plane, verdict=e.verdict))
+        elif e.kind == "axis":
+            turns_kept.append(Turn(point=e.point, direction=e.direction, order=e.order, verdict=e.verdict))
+    return mirrors_kept, turns_kept
 
 
 def _fold_is_seen(evidence: Evidence, group: PointGroup) -> bool:
@@ -187,18 +198,19 @@ def _unless_round(evidence: Evidence, found: Assembly) -> Assembly:
     main = [u for u, k in found.group.rotation_axes()[:1] if k >= CHANCE_FOLD]
     for bundle in (b for u in main for b in axis_bundle(evidence, u, mirrored=False)):
         worst = max((e.verdict.bulk for e in found.elements), default=0.0)
-        if _Standard(bulk=max(EXACT, AS_GOOD * worst)).admits(bundle.verdict):
+        if Standard(bulk=max(EXACT, AS_GOOD * worst)).admits(bundle.verdict):
             return _round(evidence, bundle)
     return found
 
 
 def _group_of(
-    evidence: Evidence, group: PointGroup, held: list[Mirror], turns: list[Turn], near: list[Element]
+    evidence: Evidence, group: PointGroup, held: list[Mirror], turns: list[Turn], near: list[Element], part: Index
 ) -> Assembly:
     """The group with what it may have of improper elements, refined as one frame and judged."""
     center = _common_point(held, turns)
     if evidence.tuples.kind == "vanish":
-        group = _with_improper(evidence, group, [*(m.verdict for m in held), *(t.verdict for t in turns)], center)
+        verdicts = [*(m.verdict for m in held), *(t.verdict for t in turns)]
+        group = _with_improper(evidence, group, verdicts, center, part)
     start = _joint(group, center)
     if start is None:
         return _finish(evidence, group, center, (), near)
@@ -236,27 +248,18 @@ def _mirror_group(evidence: Evidence) -> tuple[list[Mirror], list[Element], Poin
     for mirror in mirrors(evidence, evidence.tuples.directions[2:], known=known):
         if mirror.verdict.excess > 1.0:
             near.append(mirror)
-            near += [m for m in held if _compromise(m, mirror)]
-            group, held, _ = _closed([m for m in held if not _compromise(m, mirror)], [])
-        elif any(_compromise(mirror, m) for m in near):
+            near += [m for m in held if compromise(m, mirror)]
+            group, held, _ = _closed([m for m in held if not compromise(m, mirror)], [])
+        elif any(compromise(mirror, m) for m in near):
             near.append(mirror)
         else:
             held.append(mirror)
-            standard = _standard(m.verdict for m in held)
+            standard = standard_of(m.verdict for m in held)
             near += [m for m in held if not standard.admits(m.verdict)]
             group, held, _ = _closed([m for m in held if standard.admits(m.verdict)], [])
         if few and held and len(near) >= NEAR:
             break
     return held, [mirror_element(m) for m in near], group
-
-
-def _compromise(mirror: Mirror, other: Mirror) -> bool:
-    """Whether a mirror is only what the fit of a detail made of another one beside it, which most of the surface
-    keeps far better."""
-    apart = abs(float(mirror.plane.normal @ other.plane.normal)) < math.cos(BESIDE_RAD)
-    side = math.copysign(1.0, float(mirror.plane.normal @ other.plane.normal))
-    shifted = abs(mirror.plane.offset - side * other.plane.offset) > BESIDE
-    return not apart and not shifted and closer_core(other.verdict, mirror.verdict)
 
 
 def _mirror_of(group: PointGroup) -> Callable[[Array], bool]:
@@ -290,7 +293,7 @@ def _turns(evidence: Evidence, held: list[Mirror], group: PointGroup) -> list[Tu
         offered = _axis_open(evidence) if held or evidence.tuples.kind == "vanish" else axis_directions(evidence)
         directions = np.concatenate([np.array(normals).reshape(-1, 3), evidence.tuples.directions[:1], offered])
     found = [t for d in _apart(directions, KNOWN_RAD) if (t := turns_about(evidence, d, center)) is not None]
-    standard = _standard([*(m.verdict for m in held), *(t.verdict for t in found)])
+    standard = standard_of([*(m.verdict for m in held), *(t.verdict for t in found)])
     return [t for t in found if standard.admits(t.verdict)]
 
 
@@ -318,16 +321,20 @@ def _closed(held: list[Mirror], turns: list[Turn]) -> tuple[PointGroup, list[Mir
             _without_worst(held, turns)
 
 
-def _with_improper(evidence: Evidence, group: PointGroup, verdicts: list[Verdict], center: Array) -> PointGroup:
-    """The group with the inversion, or the rotoreflection of its main axis, where they hold as well as the rest."""
-    standard = _standard(verdicts)
+def _with_improper(
+    evidence: Evidence, group: PointGroup, verdicts: list[Verdict], center: Array, part: Index
+) -> PointGroup:
+    """The group with the inversion, or the rotoreflection of its main axis, where they hold as well as the rest and
+    keep the part that others are blamed for."""
+    standard = standard_of(verdicts)
+
+    def admitted(direction: Array, order: int) -> bool:
+        motion = Isometry.about(center, rotoreflection(direction, 2.0 * np.pi / order))
+        return standard.admits(improper_about(evidence, direction, center, order)) and keeps(evidence, [motion], part)
+
     axes = [(u, int(2 * k)) for u, k in group.rotation_axes()[:1] if k <= 12]
-    improper = (
-        [(u, k) for u, k in axes if standard.admits(improper_about(evidence, u, center, k))]
-        if not _has_all(group)
-        else []
-    )
-    inversion = group.has_inversion or standard.admits(improper_about(evidence, np.array([0.0, 0.0, 1.0]), center, 2))
+    improper = [(u, k) for u, k in axes if admitted(u, k)] if not _has_all(group) else []
+    inversion = group.has_inversion or admitted(np.array([0.0, 0.0, 1.0]), 2)
     if inversion == group.has_inversion and not improper:
         return group
     try:
