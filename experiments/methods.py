@@ -16,8 +16,9 @@ from experiments.peers import trimesh_symmetry
 from symrefine.axis import classify, fold_candidates
 from symrefine.baseline import SHIPPED, TUNED, Settings, ecins, estimated_normals
 from symrefine.baseline.starts import grid_normals
-from symrefine.detect import CLOSER_PLANES, LOCAL_PLANES, ORDER, PARTS, detect
+from symrefine.detect import detect
 from symrefine.errors import DegenerateShapeError
+from symrefine.gather import CLOSER_PLANES, LOCAL_PLANES, ORDER, PARTS
 from symrefine.gauss_newton import minimise
 from symrefine.geometry import Array, Isometry, Plane, tight_diagonal
 from symrefine.groups import from_elements

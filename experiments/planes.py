@@ -23,8 +23,6 @@ from symrefine.quadrature import sample_surface
 from symrefine.shape import Shape
 
 FOUND_REL = 0.02
-# MINPACK, in the baseline, is not reproducible to the last bit, and its count of evaluations magnifies that.
-MEASURED = ("evaluations",)
 # From here on a plane counts as settled in the trace.
 SETTLED_DEG = 0.5
 
@@ -151,14 +149,9 @@ def score(planes: Sequence[Plane], truth: Truth) -> dict[str, float | int | None
         "found": len(found) if truth.round_about is None else 0,
         "false": len(planes) - (len(found) if truth.round_about is None else len(right)),
         "all_found": len(found) == len(truth.planes) and truth.round_about is None,
-        "worst_deg": _rounded(max((angle for _, angle, _ in right), default=None), 6),
-        "worst_offset_rel": _rounded(max((offset for _, _, offset in right), default=None), 8),
+        "worst_deg": max((angle for _, angle, _ in right), default=None),
+        "worst_offset_rel": max((offset for _, _, offset in right), default=None),
     }
-
-
-def _rounded(value: float | None, digits: int) -> float | None:
-    """Without the digits that depend on where in memory the libraries' arrays lie."""
-    return None if value is None else round(value, digits)
 
 
 def _nearest(plane: Plane, truth: Truth) -> tuple[int, float, float] | None:
@@ -186,8 +179,8 @@ def _progress(normals: Sequence[Array], truth: Truth) -> dict[str, float | int |
     nearest = angles.min(axis=1) if angles.size else np.zeros(0)
     return {
         "settled_planes": int((nearest < SETTLED_DEG).sum()),
-        "worst_deg": _rounded(float(nearest.max()), 4) if nearest.size else None,
-        "mean_deg": _rounded(float(nearest.mean()), 4) if nearest.size else None,
+        "worst_deg": float(nearest.max()) if nearest.size else None,
+        "mean_deg": float(nearest.mean()) if nearest.size else None,
     }
 
 

@@ -1,9 +1,9 @@
-"""Refinement of one free plane: nearest partners, point to plane, MINPACK's Levenberg-Marquardt, until it stays.
+"""Refinement of one free plane: nearest partners, point to plane, Levenberg-Marquardt as in MINPACK, until it stays.
 
 With fixed partners the residual `(x_s - R(x_t)).R n_t = (R x_s - x_t).n_t` is linear in the thirteen numbers of
 `symrefine.residual`, so its squared norm is that of thirteen numbers `S phi` with `S'S` the Gram matrix of all pairs.
-MINPACK sees nothing of its residual but norms and products, so it takes the same steps on the thirteen as on the
-thousands, and one pass over the pairs does for the 40 to 50 evaluations of an outer iteration.
+Levenberg-Marquardt sees nothing of its residual but norms and products, so it takes the same steps on the thirteen as
+on the thousands, and one pass over the pairs does for the 40 to 50 evaluations of an outer iteration.
 """
 
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.baseline.clouds import LEAST_POINTS, Clouds
+from symrefine.baseline.levenberg import least_squares
 from symrefine.baseline.settings import Settings
 from symrefine.baseline.starts import best_of_each
 from symrefine.geometry import Array, Plane, line_angle_rad
@@ -89,39 +90,33 @@ def reflected_cosine(clouds: Clouds, plane: Plane, source: Index, target: Index)
 
 
 def mirror_coordinates(unknowns: Array) -> Array:
-    """`phi` [13] (see `symrefine.residual`) of the reflection across the plane of an origin and a normal [6]."""
-    origin, normal = unknowns[:3], unknowns[3:]
-    # Plain floats: this is called some fifty times for every outer iteration of every start.
-    length = np.sqrt(normal @ normal)
-    m = normal / length
-    phi = np.empty(SIZE)
-    np.multiply.outer(-2.0 * m, m, out=phi[:9].reshape(3, 3))
-    phi[:9:4] += 1.0
-    np.multiply(2.0 * (m @ origin), m, out=phi[9:12])
-    phi[12] = 1.0
+    """`phi` [..., 13] (see `symrefine.residual`) of reflections across planes of an origin and a normal [..., 6]."""
+    origin, normal = unknowns[..., :3], unknowns[..., 3:]
+    m = normal / np.sqrt((normal * normal).sum(axis=-1, keepdims=True))
+    phi = np.empty((*unknowns.shape[:-1], SIZE))
+    twice = 2.0 * m
+    phi[..., :9] = -(twice[..., :, None] * m[..., None, :]).reshape(*unknowns.shape[:-1], 9)
+    phi[..., :9:4] += 1.0
+    phi[..., 9:12] = (twice * origin).sum(axis=-1, keepdims=True) * m
+    phi[..., 12] = 1.0
     return phi
 
 
 def inner_minimum(gram13: Array, start: Plane, settings: Settings) -> tuple[Plane, int]:
-    """The plane at which MINPACK stops, and how often it evaluated the residual.
+    """The plane at which MINPACK's iteration stops, and how often it evaluates the residual.
 
     Unknowns are an origin and a normal, six for three: the length of the normal and the origin's place in the plane
     change nothing, as in the original. Differences are forward, their step that of single precision.
     """
-    from scipy.optimize import leastsq
-
     values, vectors = np.linalg.eigh(gram13)
     root = np.sqrt(np.clip(values, 0.0, None))[:, None] * vectors.T
-    x, _, info, _, _ = leastsq(
-        lambda unknowns: root @ mirror_coordinates(unknowns),
+    x, evaluations = least_squares(
+        # No matrix product: its last bits depend on how many rows there are.
+        lambda unknowns: (mirror_coordinates(unknowns)[:, None, :] * root).sum(axis=-1),
         np.concatenate([start.offset * start.normal, start.normal]),
-        full_output=True,
-        ftol=settings.tolerance,
-        xtol=settings.tolerance,
-        gtol=0.0,
-        maxfev=settings.max_evaluations,
-        epsfcn=settings.tolerance**2,
-        factor=settings.step_bound,
+        tolerance=settings.tolerance,
+        max_evaluations=settings.max_evaluations,
+        step_bound=settings.step_bound,
     )
     normal = x[3:] / np.linalg.norm(x[3:])
-    return Plane(normal=normal, offset=float(normal @ x[:3])), int(info["nfev"])
+    return Plane(normal=normal, offset=float(normal @ x[:3])), evaluations
