@@ -45,6 +45,8 @@ MAX_OPERATIONS = 9
 ROUND_LIMIT = 0.5
 # Miss with the details from which on it is asked whether one part alone is to blame.
 SUSPECT = 0.4
+# How often at most: every time the group gets smaller, but improper elements may come back.
+MAX_BLAMES = 4
 # Azimuthal energy over its noise from which on a high order shows.
 SEEN = 12.0
 # Orders from which on a finite axis has to be better than a continuous one, and by what factor.
@@ -143,14 +145,19 @@ def _from_parts(evidence: Evidence) -> Assembly:
     held, near, group = _mirror_group(evidence)
     turns = _turns(evidence, held, group)
     part: Index = NO_PART
+    blames = 0
     while True:
         group, held, turns = _closed(held, turns)
         done = _group_of(evidence, group, held, turns, near, part)
-        if len(out := _lone_part(evidence, done)):
+        if blames < MAX_BLAMES and len(out := _lone_part(evidence, done)):
+            blames += 1
             kept = [e for e in done.elements if keeps(evidence, _motions(e), out)]
-            near.extend(e for e in done.elements if e.kind == "plane" and e not in kept)
-            held, turns, part = *_as_candidates(kept), out
-            continue
+            less = _closed(*_as_candidates(kept))
+            if less[0].order < done.group.order:
+                near.extend(e for e in done.elements if e.kind == "plane" and e not in kept)
+                _, held, turns = less
+                part = out
+                continue
         good = all(e.verdict.excess <= 1.0 for e in done.elements) and _fold_is_seen(evidence, done.group)
         if good or not (held or turns):
             return _unless_round(evidence, done)

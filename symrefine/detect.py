@@ -29,6 +29,8 @@ LADDER = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08)
 SPARSE = 1500
 SUBSETS = 3
 SUBSET = 0.8
+# Share of the tolerance that such a cloud may miss itself by.
+SPARSE_FLOOR = 0.75
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -217,11 +219,13 @@ def _elsewhere(dim: int) -> str:
 def _doubt(evidence: Evidence) -> str:
     """Why the cloud supports no decision at this tolerance, or nothing if it does."""
     floor, tolerance = evidence.judge.floor.p95, evidence.judge.tolerance
-    if floor <= tolerance:
+    sparse = evidence.judge.cloud.body == "surface" and len(evidence.points) <= SPARSE
+    needed = (SPARSE_FLOOR if sparse else 1.0) * tolerance
+    if floor <= needed:
         return ""
     return (
-        f"the cloud does not even agree with itself: 5 % of its surface misses the rest by {floor:.1%} of the diagonal "
-        f"or more, against a tolerance of {tolerance:.1%}; give more points, less noise, or a larger tolerance"
+        f"the cloud does not even agree with itself: 5 % of it misses the rest by {floor:.1%} of the diagonal or more, "
+        f"and a tolerance of {tolerance:.1%} needs {needed:.1%}; give more points, less noise, or a larger tolerance"
     )
 
 
@@ -277,6 +281,8 @@ def _report(
     timings: dict[str, float],
 ) -> Detection:
     origin, scale = evidence.moments.center, evidence.moments.scale
+    # One figure for all elements of a group: they stand or fall together.
+    sure = confidence(max((e.verdict.excess for e in found.elements), default=0.0))
     planes = [e for e in found.elements if e.kind == "plane"]
     axes = [e for e in found.elements if e.kind != "plane"]
     return Detection(
@@ -287,7 +293,7 @@ def _report(
             FoundPlane(
                 plane=_plane(e, origin, scale),
                 residual=e.verdict.deviation,
-                confidence=confidence(e.verdict.excess),
+                confidence=sure,
                 sigma_rad=(known := _uncertainty(found.history, e))[0],
                 sigma=known[1] * scale,
             )
@@ -299,7 +305,7 @@ def _report(
                 order=e.order,
                 improper=e.kind == "improper",
                 residual=e.verdict.deviation,
-                confidence=confidence(e.verdict.excess),
+                confidence=sure,
                 sigma_rad=(known := _uncertainty(found.history, e))[0],
                 sigma=known[1] * scale,
             )

@@ -76,16 +76,16 @@ def check_consistent(found: Detection):
     """What every detection has to obey, whatever it found."""
     for plane in found.planes:
         assert plane.plane.signed_distance(found.center) == pytest.approx(0.0, abs=1e-9 * found.diagonal)
-        assert plane.confidence >= 0.5
+        assert 0.0 < plane.confidence <= 1.0
     for axis in found.axes:
         offset = found.center - axis.axis.point
         assert np.linalg.norm(np.cross(offset, axis.axis.direction)) < 1e-9 * found.diagonal
-        assert axis.confidence >= 0.5
+        assert axis.confidence == found.axes[0].confidence
     assert found.group.name == found.point_group
     assert found.inversion == found.group.has_inversion
     assert found.iterations == max(0, len(found.history) - 1)
     assert [i.index for i in found.history] == list(range(len(found.history)))
-    assert all(a.confidence >= b.confidence for a, b in pairwise(found.planes))
+    assert len({e.confidence for e in (*found.planes, *found.axes)}) <= 1
     assert all(a.order >= b.order for a, b in pairwise(found.axes))
     excesses = [m.excess for m in found.near_misses]
     assert excesses == sorted(excesses)

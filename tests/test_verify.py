@@ -152,10 +152,12 @@ def test_what_the_cloud_shows_against_itself_raises_the_limits():
     assert all(r == 0 for r in nothing.over_limits(0.02, own))
 
 
-def test_confidence_is_a_half_at_the_limit_and_falls():
+def test_confidence_falls_with_the_miss():
     excess = np.linspace(0, 5, 50)
     found = [confidence(e) for e in excess]
-    assert confidence(1.0) == 0.5
+    assert confidence(0.62) == pytest.approx(0.5)
+    assert confidence(0.43) == pytest.approx(0.95, abs=0.01)
+    assert confidence(1.0) < 0.05
     assert found[0] == 1.0
     assert np.all(np.diff(found) < 0)
     assert found[-1] > 0

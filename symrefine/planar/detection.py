@@ -13,13 +13,13 @@ from symrefine.groups import PointGroup2D
 from symrefine.moments import shape_moments
 from symrefine.ntuples.contract import NTuples
 from symrefine.planar.doublets import ORDER, DoubletClass, classify_doublets, planar_doublets
-from symrefine.planar.judge import LineDeviation
+from symrefine.planar.judge import LineDeviation, confidence
 from symrefine.planar.outline import Outlines, make_outlines
 from symrefine.planar.placed import Placed
 from symrefine.planar.search import Found, search, unclaimed
 from symrefine.planar.spectrum import FLOOR, angular_spectrum
 from symrefine.shape import Shape
-from symrefine.verify import TOLERANCE, confidence
+from symrefine.verify import TOLERANCE
 
 PARTS = 32
 NEAR = 8

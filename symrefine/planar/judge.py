@@ -113,3 +113,11 @@ def line_judge(
 def _summary(distances: Array, share: float) -> LineDeviation:
     p95, p99, detail = (float(q) for q in np.quantile(distances, [0.95, 0.99, 1.0 - share]))
     return LineDeviation(mean=float(distances.mean()), p95=p95, p99=p99, detail=detail, max=float(distances.max()))
+
+
+def confidence(excess: float) -> float:
+    """How sure the decision "holds" is, from the miss over its limit: 0.5 at the limit, towards 1 well below it.
+
+    Monotone, and not calibrated as that of objects in space is.
+    """
+    return float(1.0 / (1.0 + excess**4))
