@@ -9,7 +9,7 @@ import argparse
 import shutil
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -35,21 +35,26 @@ class Picture:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Config:
-    """The studies, in the order of the report, and the README's picture."""
+    """The studies, in the order of the report, and the README's picture.
+
+    `fetched` are those of them that need the meshes that `experiments.models` fetches.
+    """
 
     configs: list[str]
     picture: Picture
+    fetched: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """One study: what came of it, or why it could not be run."""
+    """One study: what came of it, or why it was left out or could not be run."""
 
     name: str
     title: str
     seconds: float
     outcome: "Outcome | None"
     error: str = ""
+    left_out: str = ""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -67,10 +72,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     from symrefine.study.typed import read_config
 
     config = read_config(options.config, Config)
-    fetch_models()
+    without = missing_models()
     parts = []
     for name in config.configs:
-        part = run_part(options.config.parent / name, options.out, full=options.full, workers=options.workers)
+        path = options.config.parent / name
+        if without and name in config.fetched:
+            part = Part(name=name, title=path.stem, seconds=0.0, outcome=None, left_out=without)
+        else:
+            part = run_part(path, options.out, full=options.full, workers=options.workers)
         print(_line(part), flush=True)
         parts.append(part)
     write(options.out / "report.md", report(parts, full=options.full))
@@ -80,14 +89,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     return int(any(part.error for part in parts))
 
 
-def fetch_models() -> None:
-    """Bring the real meshes into the cache if they are not there; without a network the rest runs."""
+def missing_models() -> str:
+    """Bring the real meshes into the cache if they are not there; why they could not be brought, else nothing."""
     from experiments.models import cache_folder, download_package, fetch
 
     try:
         fetch(cache_folder(), download_package)
     except InputError as error:
-        print(f"no real meshes: {error}", file=sys.stderr)
+        return f"no real meshes: {error}"
+    return ""
 
 
 def run_part(path: Path, out: Path, *, full: bool, workers: int) -> Part:
@@ -113,13 +123,18 @@ def run_part(path: Path, out: Path, *, full: bool, workers: int) -> Part:
 
 def _line(part: Part) -> str:
     if part.outcome is None:
-        return f"{part.title}: could not be run: {part.error}"
+        return f"{part.title}: {_why(part)}"
     missed = sum(v.met is False for v in part.outcome.verdicts)
     failed = f", {part.outcome.failed} failed" if part.outcome.failed else ""
     return (
         f"{part.title}: {len(part.outcome.rows)} runs{failed} in {part.seconds:.0f} s, "
         f"{len(part.outcome.verdicts)} claims, {missed} missed"
     )
+
+
+def _why(part: Part) -> str:
+    """Why a study has no outcome."""
+    return f"left out: {part.left_out}" if part.left_out else f"could not be run: {part.error}"
 
 
 def _verdicts(parts: Sequence[Part]) -> list["Verdict"]:
@@ -157,11 +172,11 @@ def main_table(verdicts: Sequence["Verdict"]) -> str:
 
 
 def misses(parts: Sequence[Part]) -> str:
-    """A line for each claim that is not met, each study that could not be run, and each with runs that failed."""
+    """A line for each claim that is not met, each study that has no outcome, and each with runs that failed."""
     lines = []
     for part in parts:
         if part.outcome is None:
-            lines.append(f"- **{part.title}** could not be run: {part.error}")
+            lines.append(f"- **{part.title}** {_why(part)}")
             continue
         lines += [f"- **{part.title}**: {_miss(v)}" for v in part.outcome.verdicts if v.met is False]
         errors = sorted({str(row["error"]) for row in part.outcome.rows if row["error"] is not None})
@@ -178,7 +193,7 @@ def _miss(verdict: "Verdict") -> str:
 
 def _chapter(part: Part) -> str:
     if part.outcome is None:
-        return f"## {part.title}\n\nCould not be run: {part.error}"
+        return f"## {part.title}\n\nThis study was {_why(part)}"
     folder = part.outcome.folder.name
     notes = [f"- {v.claim.claim}: {v.claim.note}" for v in part.outcome.verdicts if v.claim.note]
     figures = [f"![{title}]({folder}/{path.name})" for title, path in part.outcome.figures.items()]

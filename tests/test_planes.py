@@ -183,18 +183,23 @@ def test_reproduce_sets_side_by_side_and_names_misses(
     )
     (home / "configs" / "gone.yaml").write_text("experiment: nowhere\nout: x\n")
     config = home / "configs" / "reproduce.yaml"
-    config.write_text("configs: [halves.yaml, gone.yaml]\npicture: {config: halves.yaml, figure: Half}\n")
+    config.write_text(
+        "configs: [halves.yaml, gone.yaml, real.yaml]\nfetched: [real.yaml]\n"
+        "picture: {config: halves.yaml, figure: Half}\n"
+    )
     out = tmp_path / "out"
     arguments = ["--config", str(config), "--out", str(out), "--docs", str(home), "--workers", "1"]
     assert reproduce.main(arguments) == 1
     printed, err = capsys.readouterr()
-    assert err == "no real meshes: no network\n"
+    assert err == ""
+    assert "real: left out: no real meshes: no network\n" in printed
     assert re.search(r"^Halves: 3 runs in \d+ s, 2 claims, 1 missed$", printed, re.MULTILINE)
     assert "gone: could not be run:" in printed
     report = (out / "report.md").read_text()
     assert "| halves | 0.5 m | **0.5 m** | two 1 m |" in report
     assert "- **Halves**: too much: ours 1, expected >= 9; paper: 9 (on purpose)" in report
     assert "- **gone** could not be run:" in report
+    assert "- **real** left out: no real meshes: no network" in report
     assert "![Half](halves/half.png)" in report
     readme = (home / "README.md").read_text()
     assert readme.startswith(f"before\n{reproduce.BEGIN}\n|")
@@ -202,6 +207,8 @@ def test_reproduce_sets_side_by_side_and_names_misses(
     assert "| halves | 0.5 m | **0.5 m** | two 1 m |" in (home / "docs" / "reproduce_table.md").read_text()
     assert reproduce.main(arguments) == 1
     assert (home / "README.md").read_text() == readme
+    config.write_text("configs: [real.yaml]\nfetched: [real.yaml]\npicture: {config: halves.yaml, figure: Half}\n")
+    assert reproduce.main(arguments) == 0  # without a network nothing is wrong
 
 
 @pytest.mark.parametrize(
