@@ -1,7 +1,6 @@
 """`symrefine batch`: every file of a directory, one row each; a run that was killed goes on where it ended."""
 
 import argparse
-import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,8 +12,6 @@ from symrefine.cli.values import add_class_options, add_detection_options, count
 from symrefine.errors import InputError, SymrefineError
 
 if TYPE_CHECKING:
-    from multiprocessing.process import BaseProcess
-
     from symrefine.detect import Detection
     from symrefine.planar import PlanarDetection
     from symrefine.shape import Shape
@@ -137,39 +134,9 @@ def _rows(jobs: list[Job], workers: int) -> Iterator[Row]:
     if workers == 1 or len(jobs) < 2:
         yield from map(examine_file, jobs)
         return
-    from concurrent.futures import ProcessPoolExecutor, as_completed
-    from concurrent.futures.process import BrokenProcessPool
-    from multiprocessing import get_context
+    from symrefine.study.work import in_processes
 
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")  # the workers share the cores already
-    pool = ProcessPoolExecutor(min(workers, len(jobs)), get_context("spawn"), _start_worker)
-    try:
-        for done in as_completed([pool.submit(examine_file, job) for job in jobs]):
-            yield done.result()
-    except BrokenProcessPool:
-        raise SymrefineError(
-            "a worker process died, perhaps out of memory; finished rows are kept, run it again"
-        ) from None
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _start_worker() -> None:
-    """Make a worker end with an interrupt, and with the process that started it."""
-    import signal
-    import threading
-    from multiprocessing import parent_process
-
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    parent = parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-
-
-def _end_with(parent: "BaseProcess") -> None:
-    parent.join()
-    os._exit(1)
+    yield from in_processes(examine_file, jobs, workers)
 
 
 def examine_file(job: Job) -> Row:

@@ -2,12 +2,12 @@
 
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from symrefine.errors import SymrefineError
 from symrefine.study.experiment import Experiment, load_experiment
@@ -17,6 +17,8 @@ from symrefine.study.versions import LIBRARIES
 if TYPE_CHECKING:
     from multiprocessing.process import BaseProcess
 
+P = TypeVar("P")
+R = TypeVar("R")
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 TIMING = "_s"
 WALL = "wall_s"
@@ -44,15 +46,24 @@ def finish(experiment: Experiment, jobs: Sequence[Job], workers: int) -> Iterato
     if workers == 1 or len(jobs) < 2:
         yield from (attempt(experiment, index, case) for index, case in jobs)
         return
+    parcels = [(experiment.name, str(experiment.root), index, asdict(case)) for index, case in jobs]
+    yield from in_processes(_unpack, parcels, workers)
+
+
+def in_processes(work: Callable[[P], R], parcels: Sequence[P], workers: int) -> Iterator[R]:
+    """What `work` makes of each parcel, as soon as it is done, in that many processes of one thread each.
+
+    Raises:
+        SymrefineError: a process died.
+    """
     from concurrent.futures import ProcessPoolExecutor, as_completed
     from concurrent.futures.process import BrokenProcessPool
     from multiprocessing import get_context
 
     one_thread_each()
-    parcels = [(experiment.name, str(experiment.root), index, asdict(case)) for index, case in jobs]
-    pool = ProcessPoolExecutor(min(workers, len(jobs)), get_context("spawn"), _start_worker)
+    pool = ProcessPoolExecutor(min(workers, len(parcels)), get_context("spawn"), _start_worker)
     try:
-        for done in as_completed([pool.submit(_unpack, parcel) for parcel in parcels]):
+        for done in as_completed([pool.submit(work, parcel) for parcel in parcels]):
             yield done.result()
     except BrokenProcessPool:
         raise SymrefineError(
