@@ -20,8 +20,9 @@ SOURCES = 2000
 # A point is out of place if it misses by so many tolerances under all but this share of the operations ...
 ASTRAY = 0.65
 EXCUSED = 0.25
-# ... and a part is, if it holds this share of the surface and misses under most of the operations.
+# ... and a part is, if it holds this share of the surface, and a quarter of it misses by so many tolerances.
 PART = 0.004
+FAR = 1.0
 # Fewer operations than these cannot tell a part from its counterpart.
 LEAST = 3
 
@@ -40,7 +41,9 @@ def lone_part(evidence: Evidence, group: PointGroup, center: Array) -> Index:
     misses = [miss_distances(judge.cloud, Isometry.about(center, m), stride=stride) for m in chosen]
     usual = np.quantile(np.stack(misses) / judge.diagonal, EXCUSED, axis=0)
     astray = np.flatnonzero(usual > np.hypot(ASTRAY * judge.tolerance, judge.floor.p97))
-    return astray * stride if len(astray) > PART * len(usual) else nothing
+    if len(astray) <= PART * len(usual) or np.quantile(usual[astray], 0.75) < FAR * judge.tolerance:
+        return nothing
+    return astray * stride
 
 
 def keeps(evidence: Evidence, motions: Iterable[Isometry], part: Index) -> bool:

@@ -17,7 +17,7 @@ from symrefine.shape import Index
 # multiples of t = 2 % by default: a detail of 3 % of the surface may miss by 1.15 t, one of 0.6 % by any distance. On
 # the 52 catalogued meshes every false element passes at least one of them (a propeller's blades the first two, a
 # mailbox's flag the last) and every true one but a posed ant stays below; the closest is a camera.
-LIMITS = (0.22, 0.75, 1.15, 1.6, 2.0)
+LIMITS = (0.22, 0.75, 1.15, 1.6, 1.85)
 # The same for atoms, of mean, 95th percentile and the farthest: noise moves every one of them, and every one counts.
 ATOM_LIMITS = (0.9, 1.3, 1.6)
 TOLERANCE = 0.02
