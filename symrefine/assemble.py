@@ -151,7 +151,7 @@ def _from_parts(evidence: Evidence) -> Assembly:
         done = _group_of(evidence, group, held, turns, near, part)
         if blames < MAX_BLAMES and len(out := _lone_part(evidence, done)):
             blames += 1
-            kept = [e for e in done.elements if keeps(evidence, _motions(e), out)]
+            kept = [e for e in done.elements if keeps(evidence, e.motions, out)]
             less = _closed(*_as_candidates(kept))
             if less[0].order < done.group.order:
                 near.extend(e for e in done.elements if e.kind == "plane" and e not in kept)
@@ -169,15 +169,7 @@ def _lone_part(evidence: Evidence, found: Assembly) -> Index:
     if max((e.verdict.detail for e in found.elements), default=0.0) < SUSPECT:
         return NO_PART
     part = lone_part(evidence, found.group, found.center)
-    return part if any(not keeps(evidence, _motions(e), part) for e in found.elements) else NO_PART
-
-
-def _motions(element: Element) -> list[Isometry]:
-    """The operation that stands for a discrete element."""
-    if element.kind == "plane":
-        return [Isometry.about(element.point, householder(element.direction))]
-    turned = rotation if element.kind == "axis" else rotoreflection
-    return [Isometry.about(element.point, turned(element.direction, 2.0 * np.pi / element.order))]
+    return part if any(not keeps(evidence, e.motions, part) for e in found.elements) else NO_PART
 
 
 def _as_candidates(elements: Iterable[Element]) -> tuple[list[Mirror], list[Turn]]:

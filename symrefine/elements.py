@@ -27,6 +27,14 @@ class Element:
     order: float
     verdict: Verdict
 
+    @property
+    def motions(self) -> tuple[Isometry, ...]:
+        """The operation that stands for a discrete element."""
+        if self.kind == "plane":
+            return (Isometry.about(self.point, householder(self.direction)),)
+        turned = rotation if self.kind == "axis" else rotoreflection
+        return (Isometry.about(self.point, turned(self.direction, 2.0 * np.pi / self.order)),)
+
 
 def elements_of(evidence: Evidence, group: PointGroup, center: Array) -> tuple[Element, ...]:
     """Every discrete mirror, every axis and rotoreflection axis of the group about a centre, judged."""
