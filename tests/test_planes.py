@@ -222,10 +222,10 @@ def test_markers_must_stand_once_and_in_order(text: str) -> None:
 def test_every_study_of_the_report_is_there() -> None:
     config = read_config(reproduce.CONFIG, reproduce.Config)
     assert set(config.fetched) < set(config.configs)
-    for name in config.configs:
+    # The cases of the others can be made only where the meshes have been fetched.
+    for name in set(config.configs) - set(config.fetched):
         assert len(make_plan(CONFIGS / name, quick=True).cases) <= len(make_plan(CONFIGS / name).cases)
-        if name not in config.fetched:  # its cases can be checked only where the meshes have been fetched
-            assert runner._check(make_plan(CONFIGS / name))
+        assert runner._check(make_plan(CONFIGS / name))
     figures = make_plan(CONFIGS / config.picture.config).study.figures
     assert config.picture.config in config.configs
     assert config.picture.figure in [figure.title for figure in figures]
