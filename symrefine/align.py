@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.detect import Clock, detect
-from symrefine.errors import InputError
+from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array
 from symrefine.groups import PointGroup
 from symrefine.moments import Moments, central_moments, shape_moments
 from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
+from symrefine.planar import detect_planar
 from symrefine.quadrature import mesh_nodes
 from symrefine.registration.alignment import Alignment
 from symrefine.registration.coset import Coset, coset_of_group, coset_of_list, lifted
@@ -69,7 +70,13 @@ def align(
     with clock("moments"):
         parts = 0 if few(a, b) else PARTS
         sides = _side(a, parts), _side(b, parts)
-    if a.dim != 3 or max(_rank(s.moments) for s in sides) < 3:
+    ranks = [_rank(s.moments) for s in sides]
+    if max(ranks) - min(ranks) > 1:
+        lean, full = (a, b) if ranks[0] < ranks[1] else (b, a)
+        raise DegenerateShapeError(
+            f"{lean.source} spans {min(ranks)} of {a.dim} dimensions, {full.source} {max(ranks)}: no map takes one there"
+        )
+    if a.dim != 3 or max(ranks) < 3:
         return _align_moments(sides, scale, allow_reflection, clock)
     evidence = Evidence(
         source=sides[0], target=sides[1], scale=scale or _unlike(*sides), tolerance=tolerance, seed=seed
@@ -227,6 +234,8 @@ def _align_moments(sides: tuple[Side, Side], scale: bool, reflections: bool, clo
         status = OK if scale else _sizes(a, b)
         if found.misfit > MISFIT and not found.exact:
             status = f"the moments differ by {found.misfit:.0f} times what sampling explains"
+        if status == OK and not np.isfinite(found.sigma_rad) and not found.exact:
+            status = "not determined: the noise of the moments hides every direction; give more points"
         return _nearest(a.shape, b.shape, matrix, translation, factor), status
 
     return Alignment(
@@ -236,8 +245,32 @@ def _align_moments(sides: tuple[Side, Side], scale: bool, reflections: bool, clo
         sigma_rad=0.0 if found.exact else found.sigma_rad,
         exact=found.exact and (scale or _same_size(a, b)),
         timings=clock.seconds,
-        _coset=lambda: coset,
+        _coset=(lambda: _planar_coset(b.shape, coset, reflections)) if dim == rank == 2 else (lambda: coset),
         _miss=miss,
+    )
+
+
+def _planar_coset(target: Shape, known: Coset, reflections: bool) -> Coset:
+    """In the plane, the operations of the target that `detect_planar` finds, after the map that is known."""
+    found = detect_planar(target)
+    if (
+        found.undetermined
+        or not np.isfinite(found.group.order)
+        or found.group.order <= len(known.matrices)
+        or len(known.free)
+    ):
+        return known
+    operations = found.group.operations()
+    if not reflections:
+        operations = operations[np.linalg.det(operations) > 0]
+    first, shift = known.matrices[0], known.translations[0]
+    either = ", and the determinant is free" if np.linalg.det(operations).min() < 0 else ""
+    return Coset(
+        matrices=operations @ first,
+        translations=operations @ (shift - found.center) + found.center,
+        free=known.free,
+        symmetry=found.point_group,
+        observable=f"up to the {len(operations)} operations of {found.point_group}{either}",
     )
 
 

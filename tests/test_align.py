@@ -503,3 +503,29 @@ def test_moments_in_the_plane_agree_with_procrustes() -> None:
     closed = procrustes(*tuples)
     np.testing.assert_allclose(closed.matrix, matrix, atol=1e-11)
     np.testing.assert_allclose(moment_fit(source, target, tuples, closed).matrices, matrix[None], atol=1e-12)
+
+
+def regular(corners, turn):
+    angle = 2 * np.pi * np.arange(corners) / corners + turn
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+@pytest.mark.parametrize(("corners", "count"), [(3, 6), (4, 8), (5, 10)])
+def test_in_the_plane_the_turns_of_the_target_do_as_well(corners, count):
+    source, target = regular(corners, 0.3), 2.0 + regular(corners, 1.1)
+    found = align(source, target)
+    assert len(found.equivalents) == count
+    for m, t in zip(found.coset.matrices, found.coset.translations, strict=True):
+        moved = source @ m.T + t
+        assert np.linalg.norm(moved[:, None] - target, axis=2).min(axis=1).max() < 1e-6
+
+
+def test_points_on_a_line_are_no_pose_of_a_body():
+    with pytest.raises(DegenerateShapeError):
+        align([[0.0, 0, 0], [1, 0, 0]], np.random.default_rng(0).standard_normal((400, 3)))
+
+
+def test_noise_that_hides_every_direction_is_said():
+    corners = np.array(np.meshgrid(*[[-1.0, 1.0]] * 4)).reshape(4, -1).T
+    found = align(corners, np.random.default_rng(1).standard_normal((3000, 4)))
+    assert found.status != "ok"

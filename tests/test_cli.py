@@ -332,11 +332,12 @@ except AttributeError as error:
     [
         ({"point_group": "Kh"}, "Kh, sphere"),
         ({"point_group": "Cinfv"}, "Cinfv, surface of revolution"),
-        ({"point_group": "Cs", "planes": [{}], "axes": []}, "Cs, one mirror plane"),
+        ({"point_group": "Cs", "planes": [{"confidence": 0.5}], "axes": []}, "Cs, one mirror plane"),
         ({"point_group": "C1", "tolerance": 0.005}, "C1, no symmetry at tolerance 0.5 %"),
         ({"point_group": "C1", "undetermined": "40 points are too few"}, "undetermined: 40 points are too few"),
-        ({"point_group": "S4", "planes": [], "inversion": False, "axes": [{"improper": False}, {"improper": True}]},
-         "S4, 1 rotation axis, 1 rotoreflection axis; tolerance 2 %"),
+        ({"point_group": "S4", "planes": [], "inversion": False,
+          "axes": [{"improper": False, "confidence": 0.25}, {"improper": True, "confidence": 0.25}]},
+         "S4, 1 rotation axis, 1 rotoreflection axis; tolerance 2 %, confidence 0.25"),
     ],
 )  # fmt: skip
 def test_headlines(record: dict[str, Any], changes: dict[str, Any], part: str) -> None:

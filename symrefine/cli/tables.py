@@ -20,9 +20,9 @@ _NAMED = {
 }
 _TUPLES = {
     "none": "span space: no mirror plane and no axis is possible",
-    "plane": "lie in one plane: a mirror plane at most",
-    "axis": "lie on one line: an axis, with or without mirror planes through it",
-    "vanish": "all vanish: several axes, an inversion, or a mirror across an axis",
+    "plane": "lie in one plane, within their noise: a mirror plane at most",
+    "axis": "lie on one line, within their noise: where to look first",
+    "vanish": "all vanish, within their noise: every direction is looked at",
 }
 _DOUBLETS = {
     "none": "span the plane: no exact mirror line and no turn",
@@ -53,7 +53,10 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
     if record["planes"] or record["axes"] or record["near_misses"]:
         yield "Offsets in units of the file, misses in % of the diagonal; axes go through the centre."
     if record["near_misses"]:
-        yield "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows."
+        yield (
+            "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows, or, "
+            "below 1, by far more than what holds beside them."
+        )
     if record["staircase"]:
         yield f"Group by tolerance: {staircase(record)}"
     yield f"{_count(record['iterations'], 'iteration')}, {sum(record['timings'].values()):.2f} s"
@@ -76,7 +79,9 @@ def headline(record: Record) -> str:
         return f"undetermined: {record['undetermined']}"
     if name == "C1":
         return f"C1, no symmetry at tolerance {100 * record['tolerance']:g} %"
-    return f"{name}, {_NAMED.get(name) or _elements(record)}; tolerance {100 * record['tolerance']:g} %"
+    sure = [e["confidence"] for e in record["planes"] + record["axes"]]
+    told = f", confidence {sure[0]:.2f}" if sure else ""
+    return f"{name}, {_NAMED.get(name) or _elements(record)}; tolerance {100 * record['tolerance']:g} %{told}"
 
 
 def _elements(record: Record) -> str:
@@ -194,7 +199,8 @@ def alignment_lines(record: Record) -> Iterator[str]:
     kind = "rotation" if record["determinant"] > 0 else "reflection or rotoreflection"
     scale = "" if record["scale"] == 1.0 else f", scale {record['scale']:.8g}"
     yield f"matrix | translation in units of the target; determinant {record['determinant']:+d} ({kind}){scale}"
-    known = f"rotation known to {math.degrees(record['sigma_rad']):.2g} degrees"
+    sigma = record["sigma_rad"]
+    known = "rotation unknown" if isinstance(sigma, str) else f"rotation known to {math.degrees(sigma):.2g} degrees"
     known = "moments equal to rounding" if record["exact"] else known
     yield f"rms distance {_percent(record['rms'])} % of the diagonal, {known}"
     observable = record["observable"]

@@ -94,7 +94,8 @@ def coset_of_list(matrices: Array, source_center: Array, target_center: Array, s
         observable = "full"
     else:
         either = ", the determinant among them" if signs.min() < 0 < signs.max() else ""
-        observable = f"up to {len(matrices)} maps that do equally well{either}"
+        least = "" if dim <= 3 else "at least "
+        observable = f"up to {least}{len(matrices)} maps that do equally well{either}"
     return Coset(
         matrices=matrices,
         translations=target_center - scale * (matrices @ source_center),
