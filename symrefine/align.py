@@ -74,7 +74,7 @@ def align(
     if max(ranks) - min(ranks) > 1:
         lean, full = (a, b) if ranks[0] < ranks[1] else (b, a)
         raise DegenerateShapeError(
-            f"{lean.source} spans {min(ranks)} of {a.dim} dimensions, {full.source} {max(ranks)}: no map takes one there"
+            f"{lean.source} spans {min(ranks)} of {a.dim} dimensions, {full.source} {max(ranks)}: nothing maps them"
         )
     if a.dim != 3 or max(ranks) < 3:
         return _align_moments(sides, scale, allow_reflection, clock)

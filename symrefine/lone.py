@@ -23,6 +23,8 @@ EXCUSED = 0.25
 # ... and a part is, if it holds this share of the surface, and a quarter of it misses by so many tolerances.
 PART = 0.004
 FAR = 1.0
+# Under noise single points stand astray: so much more of the surface has to, were the floor as high as the tolerance.
+CHANCE = 0.012
 # Fewer operations than these cannot tell a part from its counterpart.
 LEAST = 3
 
@@ -41,7 +43,8 @@ def lone_part(evidence: Evidence, group: PointGroup, center: Array) -> Index:
     misses = [miss_distances(judge.cloud, Isometry.about(center, m), stride=stride) for m in chosen]
     usual = np.quantile(np.stack(misses) / judge.diagonal, EXCUSED, axis=0)
     astray = np.flatnonzero(usual > np.hypot(ASTRAY * judge.tolerance, judge.floor.p97))
-    if len(astray) <= PART * len(usual) or np.quantile(usual[astray], 0.75) < FAR * judge.tolerance:
+    chance = CHANCE * judge.floor.p97 / judge.tolerance
+    if len(astray) <= (PART + chance) * len(usual) or np.quantile(usual[astray], 0.75) < FAR * judge.tolerance:
         return nothing
     return astray * stride
 
