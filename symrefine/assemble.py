@@ -30,6 +30,7 @@ from symrefine.search import (
     mirrors,
     refined,
     refined_closely,
+    refined_if_promising,
     turns_about,
 )
 from symrefine.shape import Index
@@ -119,13 +120,14 @@ def _round(evidence: Evidence, bundle: Bundle) -> Assembly:
     """Cinfv, or with a mirror across the axis Dinfh, or the sphere."""
     axis, center = bundle.state.frame[2], bundle.state.center
     name = "Cinfv"
-    if evidence.tuples.kind == "vanish":
-        tilted = refined(evidence, _tilted(bundle.state), sources=1500, outer=4)[-1].state
-        across = refined(evidence, _plane_state(axis, center), sources=3000, outer=6)[-1].state
+    # Asked whatever the n-tuples say: by chance those of a sphere may seem to have a direction.
+    tilted = refined_if_promising(evidence, _tilted(bundle.state), sources=1500, outer=4)
+    across = refined_if_promising(evidence, _plane_state(axis, center), sources=3000, outer=6)
+    if tilted is not None and evidence.judge(tilted.motions).excess <= max(EXACT, bundle.verdict.excess):
+        name, center = "Kh", tilted.center
+    elif across is not None:
         mirror = evidence.judge(across.motions)
-        if evidence.judge(tilted.motions).excess <= max(EXACT, bundle.verdict.excess):
-            name, center = "Kh", tilted.center
-        elif standard_of([bundle.verdict, mirror]).admits(mirror):
+        if standard_of([bundle.verdict, mirror]).admits(mirror):
             name, center = "Dinfh", center + axis * float(axis @ (across.center - center))
     return _finish(evidence, PointGroup(name=name, frame=bundle.state.frame), center, bundle.history, [])
 

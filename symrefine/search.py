@@ -108,6 +108,13 @@ def refined(
     return tuple(refine(cloud, start, start_error_rad=error_rad, max_outer=outer, stride=stride))
 
 
+def refined_if_promising(evidence: Evidence, start: Framed, *, sources: int, outer: int) -> Framed | None:
+    """The refined state, or None where a first look finds nothing to refine."""
+    if _look(evidence, start.motions) > UNPROMISING:
+        return None
+    return refined(evidence, start, sources=sources, outer=outer)[-1].state
+
+
 def preferred(verdict: Verdict, other: Verdict) -> bool:
     """Whether a fit in which most of the surface agrees far better, or else one that misses by less, is this one."""
     if closer_core(verdict, other):
