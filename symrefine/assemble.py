@@ -28,7 +28,6 @@ from symrefine.search import (
     closer_core,
     improper_about,
     mirrors,
-    refined,
     refined_closely,
     refined_if_promising,
     turns_about,
