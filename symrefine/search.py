@@ -12,6 +12,7 @@ import numpy as np
 
 from symrefine.axis import FoldCandidate, TupleClass, fold_candidates, polish_frame
 from symrefine.geometry import Array, Isometry, Plane, frame_with_z, rotation, rotoreflection
+from symrefine.matching import ROBUST
 from symrefine.moments import Moments
 from symrefine.refine import Framed, Iterate, mirror_bundle, refine, single_plane
 from symrefine.spectrum import axis_misses, half_sphere, local_minima, mirror_candidates, whitened
@@ -37,10 +38,11 @@ AXIS_HOPELESS = 0.15
 CLOSE = (0.5, 1.4)
 # A miss below this share of the limits is no compromise between parts.
 SURE = 0.5
-# Gate (spacings) of a refinement held to what agrees, and how much better its bulk has to be to be believed.
+# Gate (spacings) of a refinement held to what agrees.
 LOCK = 0.5
 # Scale of its weights over the median absolute residual: what misses by more than most does hardly counts.
 STRICT = 1.5
+# How much better most of the surface has to agree for such a fit to be believed ...
 MUCH_BETTER = 0.75
 # ... beyond what sampling alone may show (tolerances).
 CORE_NOISE = 0.07
@@ -101,11 +103,17 @@ class Bundle:
 
 
 def refined(
-    evidence: Evidence, start: Framed, *, sources: int = 10**9, outer: int = 10, error_rad: float = 0.05
+    evidence: Evidence,
+    start: Framed,
+    *,
+    sources: int = 10**9,
+    outer: int = 10,
+    error_rad: float = 0.05,
+    robust: float = ROBUST,
 ) -> tuple[Iterate, ...]:
     """All iterates of a refinement from `start`."""
     cloud, stride = evidence.judge.cloud, evidence.stride(sources)
-    return tuple(refine(cloud, start, start_error_rad=error_rad, max_outer=outer, stride=stride))
+    return tuple(refine(cloud, start, start_error_rad=error_rad, max_outer=outer, stride=stride, robust=robust))
 
 
 def refined_if_promising(evidence: Evidence, start: Framed, *, sources: int, outer: int) -> Framed | None:
@@ -129,10 +137,8 @@ def closer_core(verdict: Verdict, other: Verdict) -> bool:
 
 def refined_closely(evidence: Evidence, start: Framed, *, sources: int) -> tuple[Iterate, ...]:
     """All iterates from a start that is known to less than the spacing of the points."""
-    cloud = evidence.judge.cloud
-    gate = LOCK * cloud.spacing
-    stride = evidence.stride(sources)
-    return tuple(refine(cloud, start, start_error_rad=gate, max_outer=8, stride=stride, robust=STRICT))
+    gate = LOCK * evidence.judge.cloud.spacing
+    return refined(evidence, start, sources=sources, outer=8, error_rad=gate, robust=STRICT)
 
 
 def axis_bundle(evidence: Evidence, direction: Array, *, mirrored: bool = True) -> Iterator[Bundle]:

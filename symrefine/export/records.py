@@ -10,7 +10,8 @@ import numpy as np
 
 from symrefine.align import Alignment
 from symrefine.detect import Detection, FoundAxis, FoundPlane, NearMiss
-from symrefine.geometry import Array
+from symrefine.geometry import Array, Plane
+from symrefine.planar.judge import LineDeviation
 from symrefine.shape import Shape
 from symrefine.verify import Deviation
 
@@ -40,14 +41,10 @@ def detection_record(
     d, scale = detection, detection.diagonal
     timings = ({} if load_s is None else {"load": load_s}) | dict(d.timings)
     return {
-        "schema": SCHEMA,
-        "source": shape.source,
-        "version": version("symrefine"),
-        "options": dict(options),
-        "measure": shape.measure,
+        **opening(SCHEMA, shape, options),
         "classes": _classes(shape),
         "point_group": d.point_group,
-        "center": _numbers(d.center, scale),
+        "center": numbers(d.center, scale),
         "diagonal": number(d.diagonal),
         "tolerance": number(d.tolerance),
         "planes": [_plane(p, scale) for p in d.planes],
@@ -65,10 +62,21 @@ def detection_record(
         "undetermined": d.undetermined or None,
         "ntuples": {
             "kind": d.tuples.kind,
-            "singular_values": _numbers(d.tuples.singular_values, 1.0),
-            "significance": _numbers(d.tuples.significance, 1.0),
+            "singular_values": numbers(d.tuples.singular_values, 1.0),
+            "significance": numbers(d.tuples.significance, 1.0),
         },
-        "timings": _seconds(timings),
+        "timings": seconds(timings),
+    }
+
+
+def opening(schema: str, shape: Shape, options: Mapping[str, Any]) -> Record:
+    """How every record of a detection begins: what it is, of what, by which version, and what was asked."""
+    return {
+        "schema": schema,
+        "source": shape.source,
+        "version": version("symrefine"),
+        "options": dict(options),
+        "measure": shape.measure,
     }
 
 
@@ -93,7 +101,7 @@ def alignment_record(
         "status": a.status,
         "determinant": a.determinant,
         "matrix": _matrix(a.matrix),
-        "translation": _numbers(a.translation, size),
+        "translation": numbers(a.translation, size),
         "scale": number(a.scale),
         "rms": number(a.rms, 1.0),
         "sigma_rad": number(a.sigma_rad),
@@ -102,12 +110,12 @@ def alignment_record(
         "symmetry": a.coset.symmetry or None,
         "free": _matrix(a.coset.free),
         "equivalents": [
-            {"matrix": _matrix(m), "translation": _numbers(t, size)}
+            {"matrix": _matrix(m), "translation": numbers(t, size)}
             for m, t in zip(a.coset.matrices, a.coset.translations, strict=True)
         ],
     }
     timings["equivalents"] = time.perf_counter() - start
-    return record | {"timings": _seconds(timings)}
+    return record | {"timings": seconds(timings)}
 
 
 def _classes(shape: Shape) -> Record | None:
@@ -134,28 +142,34 @@ def number(value: float, scale: float = 0.0) -> float | str | None:
     return 0.0 if abs(value) <= 10.0**-_DIGITS * scale else float(f"{value:.{_DIGITS}g}")
 
 
-def _numbers(values: Iterable[float], scale: float) -> list[float | str | None]:
+def numbers(values: Iterable[float], scale: float) -> list[float | str | None]:
+    """Each value as `number` writes it."""
     return [number(v, scale) for v in values]
 
 
 def _matrix(rows: Array) -> list[list[float | str | None]]:
-    return [_numbers(row, 1.0) for row in rows]
+    return [numbers(row, 1.0) for row in rows]
 
 
-def _seconds(timings: Mapping[str, float]) -> dict[str, float]:
-    return {stage: round(seconds, 6) for stage, seconds in timings.items()}
+def seconds(timings: Mapping[str, float]) -> dict[str, float]:
+    """Seconds by stage, to the microsecond."""
+    return {stage: round(spent, 6) for stage, spent in timings.items()}
+
+
+def placed(plane: Plane, scale: float) -> Record:
+    """Where a mirror stands: `normal . x = offset`, the normal with the sign that all records give it."""
+    sign = toward_positive(plane.normal)
+    return {"normal": _direction(plane.normal), "offset": number(sign * plane.offset, scale)}
 
 
 def _direction(direction: Array) -> list[float | str | None]:
-    return _numbers(toward_positive(direction) * direction, 1.0)
+    return numbers(toward_positive(direction) * direction, 1.0)
 
 
 def _plane(found: FoundPlane, scale: float) -> Record:
-    sign = toward_positive(found.plane.normal)
     return {
-        "normal": _direction(found.plane.normal),
-        "offset": number(sign * found.plane.offset, scale),
-        "residual": _residual(found.residual),
+        **placed(found.plane, scale),
+        "residual": residual(found.residual),
         "confidence": number(found.confidence),
         "sigma": {"direction_rad": number(found.sigma_rad), "offset": number(found.sigma)},
     }
@@ -164,10 +178,10 @@ def _plane(found: FoundPlane, scale: float) -> Record:
 def _axis(found: FoundAxis, scale: float) -> Record:
     return {
         "direction": _direction(found.axis.direction),
-        "point": _numbers(found.axis.point, scale),
-        "order": _order(found.order),
+        "point": numbers(found.axis.point, scale),
+        "order": order(found.order),
         "improper": bool(found.improper),
-        "residual": _residual(found.residual),
+        "residual": residual(found.residual),
         "confidence": number(found.confidence),
         "sigma": {"direction_rad": number(found.sigma_rad), "position": number(found.sigma)},
     }
@@ -178,17 +192,19 @@ def _near_miss(miss: NearMiss, scale: float) -> Record:
     return {
         "kind": miss.kind,
         "direction": _direction(miss.direction),
-        "point": _numbers(miss.point, scale),
-        "order": _order(miss.order),
-        "residual": _residual(miss.residual),
+        "point": numbers(miss.point, scale),
+        "order": order(miss.order),
+        "residual": residual(miss.residual),
         "excess": number(miss.excess),
     }
 
 
-def _order(order: float) -> int | str:
-    return "inf" if math.isinf(order) else round(order)
+def order(value: float) -> int | str:
+    """An order of rotation as JSON can hold it."""
+    return "inf" if math.isinf(value) else round(value)
 
 
-def _residual(deviation: Deviation) -> Record:
+def residual(deviation: Deviation | LineDeviation) -> Record:
+    """The distribution of a miss, fractions of the diagonal."""
     names = ("mean", "p95", "p99", "max")
     return {name: number(getattr(deviation, name), 1.0) for name in names}

@@ -1,10 +1,9 @@
 """Detections in spaces of four and more dimensions as plain data."""
 
 from collections.abc import Mapping
-from importlib.metadata import version
 from typing import Any
 
-from symrefine.export.records import number, toward_positive
+from symrefine.export.records import number, numbers, opening, placed, seconds
 from symrefine.shape import Shape
 from symrefine.subspace import Hyperplane, SubspaceDetection
 
@@ -24,31 +23,25 @@ def subspace_record(
     """
     d = detection
     return {
-        "schema": SCHEMA,
-        "source": shape.source,
-        "version": version("symrefine"),
-        "options": dict(options),
-        "measure": shape.measure,
+        **opening(SCHEMA, shape, options),
         "dimension": shape.dim,
-        "center": [number(x, d.diameter) for x in d.center],
+        "center": numbers(d.center, d.diameter),
         "diameter": number(d.diameter),
         "hyperplanes": [_hyperplane(h, d.diameter) for h in d.hyperplanes],
         "rejected": [_hyperplane(h, d.diameter) for h in d.rejected],
         "undetermined": d.undetermined or None,
         "ntuples": {
             "rank": d.fixed.rank,
-            "singular_values": [number(s, 1.0) for s in d.fixed.singular_values],
-            "significance": [number(s, 1.0) for s in d.fixed.significance],
+            "singular_values": numbers(d.fixed.singular_values, 1.0),
+            "significance": numbers(d.fixed.significance, 1.0),
         },
-        "timings": {stage: round(seconds, 6) for stage, seconds in timings.items()},
+        "timings": seconds(timings),
     }
 
 
 def _hyperplane(candidate: Hyperplane, scale: float) -> Record:
-    sign = toward_positive(candidate.plane.normal)
     return {
-        "normal": [number(sign * x, 1.0) for x in candidate.plane.normal],
-        "offset": number(sign * candidate.plane.offset, scale),
+        **placed(candidate.plane, scale),
         "asymmetry": number(candidate.asymmetry, 1.0),
         "noise": number(candidate.noise, 1.0),
         "miss": number(candidate.miss, 1.0),
