@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from experiments import group_shapes
 from experiments.measure import bundle_normals, score_planes
 from experiments.shapes import SHAPES, box, join, mug, random_pose, revolve, sample, table
 from symrefine import Detection, Shape, detect
@@ -589,3 +590,10 @@ def test_the_group_as_a_function_of_the_tolerance():
     ]
     with pytest.raises(InputError, match=r"tolerance is 0\.3; expected"):
         detect(TABLE, ladder=(0.3,))
+
+
+@pytest.mark.parametrize(("name", "truth"), [("swivel_base7", "C1"), ("snub_balls", "C1")])
+def test_a_part_out_of_place_is_told_from_its_counterparts(name, truth):
+    """One part of many, 3 % of the diagonal out of place, at the default tolerance."""
+    cloud = sample(group_shapes.shape(name, True), 20000, 0.0, np.random.default_rng(0))
+    assert detect(cloud).point_group == truth
