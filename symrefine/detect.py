@@ -98,7 +98,8 @@ class Detection:
         axes: rotation and rotoreflection axes, highest order first.
         inversion: whether the inversion about the centre is a symmetry.
         near_misses: candidates turned down, best first.
-        iterations: outer iterations of the refinement of all planes together.
+        iterations: outer iterations of the refinement of all planes together; where they had to be found one by one,
+            those of the element that took most come on top (coarse looks at a tenth of the points do not count).
         tolerance: the tolerance the decisions were made at, as a fraction of `diagonal`.
         diagonal: diagonal of the smallest bounding box over all orientations, input units.
         undetermined: why the data support no decision; empty when they do.
@@ -323,7 +324,7 @@ def _report(
             )
             for e in found.rejected[:8]
         ),
-        iterations=max(0, len(found.history) - 1),
+        iterations=found.before + max(0, len(found.history) - 1),
         tolerance=evidence.judge.tolerance,
         diagonal=evidence.judge.diagonal * scale,
         undetermined=doubt,

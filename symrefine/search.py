@@ -28,6 +28,8 @@ CLEAR = 0.5
 BARELY_ROUND = 1.5
 # Sources of a first look: enough to tell hopeless from possible.
 LOOK = 400
+# How far a candidate may be off (radians) where the spectrum proposes it.
+COARSE_RAD = 0.1
 # Excess beyond which a candidate is not worth refining: at the start, after a first coarse fit, after a second.
 HOPELESS = 12.0
 UNPROMISING = 3.5
@@ -76,20 +78,22 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Mirror:
-    """A refined candidate plane and by how much it misses."""
+    """A refined candidate plane, by how much it misses, and the outer iterations beyond coarse looks it took."""
 
     plane: Plane
     verdict: Verdict
+    iterations: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Turn:
-    """A refined candidate axis with its order (inf for revolution) and by how much it misses."""
+    """A refined candidate axis with its order (inf for revolution), by how much it misses, and its iterations."""
 
     point: Array
     direction: Array
     order: float
     verdict: Verdict
+    iterations: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -235,10 +239,11 @@ def mirrors(
             continue
         mirror = _judged(evidence, plane, stride=evidence.stride(LOOK))
         if thorough and mirror.verdict.excess <= PROMISING:
-            plane = _settle(evidence, plane, sources=3000, outer=6)
+            fine = refined(evidence, single_plane(plane), sources=3000, outer=6, error_rad=COARSE_RAD)
+            plane = fine[-1].state.planes[0]
             if known(plane.normal) or any(_same_plane(plane, p) for p in found):
                 continue
-            mirror = _held(evidence, _judged(evidence, plane))
+            mirror = _held(evidence, fine)
             if 1.0 < mirror.verdict.excess < PROMISING:
                 other = _judged(evidence, _polished(evidence, normal))
                 mirror = other if preferred(other.verdict, mirror.verdict) else mirror
@@ -250,10 +255,10 @@ def _judged(evidence: Evidence, plane: Plane, *, stride: int = 1) -> Mirror:
     return Mirror(plane=plane, verdict=evidence.verdict([Isometry.reflection(plane)], stride=stride))
 
 
-def _held(evidence: Evidence, mirror: Mirror) -> Mirror:
-    history = refined(evidence, single_plane(mirror.plane), outer=0)
-    history, verdict = locked(evidence, history, mirror.verdict, 1)
-    return Mirror(plane=history[-1].state.planes[0], verdict=verdict)
+def _held(evidence: Evidence, history: tuple[Iterate, ...]) -> Mirror:
+    """The mirror at the end of a refinement, or of one that went on with narrow gates."""
+    history, verdict = locked(evidence, history, evidence.verdict(history[-1].state.motions), 1)
+    return Mirror(plane=history[-1].state.planes[0], verdict=verdict, iterations=len(history) - 1)
 
 
 def _polished(evidence: Evidence, normal: Array) -> Plane:
@@ -264,7 +269,7 @@ def _polished(evidence: Evidence, normal: Array) -> Plane:
 
 
 def _settle(evidence: Evidence, plane: Plane, *, sources: int, outer: int) -> Plane:
-    last = refined(evidence, single_plane(plane), sources=sources, outer=outer, error_rad=0.1)[-1]
+    last = refined(evidence, single_plane(plane), sources=sources, outer=outer, error_rad=COARSE_RAD)[-1]
     return last.state.planes[0]
 
 
@@ -298,14 +303,17 @@ def turns_about(evidence: Evidence, direction: Array, center: Array) -> Turn | N
         start = Framed(standard=rotation([0, 0, 1], 2 * np.pi / fold)[None], frame=frame, center=center)
         if _look(evidence, start.motions) > HOPELESS:
             continue
-        start = refined(evidence, start, sources=LOOK, outer=3, error_rad=0.1)[-1].state
+        start = refined(evidence, start, sources=LOOK, outer=3, error_rad=COARSE_RAD)[-1].state
         if _look(evidence, start.motions) > PROMISING:
             continue
         history = refined(evidence, start, sources=2000, outer=6)
         history, verdict = locked(evidence, history, evidence.verdict(history[-1].state.motions), 1)
         state = history[-1].state
         if verdict.excess <= 1.0 and (best is None or fold > best.order):
-            best = Turn(point=state.center, direction=state.frame[2], order=float(fold), verdict=verdict)
+            best = Turn(
+                point=state.center, direction=state.frame[2], order=float(fold), verdict=verdict,
+                iterations=len(history) - 1,
+            )  # fmt: skip
     return best
 
 

@@ -84,7 +84,7 @@ def check_consistent(found: Detection):
         assert axis.confidence == found.axes[0].confidence
     assert found.group.name == found.point_group
     assert found.inversion == found.group.has_inversion
-    assert found.iterations == max(0, len(found.history) - 1)
+    assert found.iterations >= max(0, len(found.history) - 1)
     assert [i.index for i in found.history] == list(range(len(found.history)))
     assert len({e.confidence for e in (*found.planes, *found.axes)}) <= 1
     assert all(a.order >= b.order for a, b in pairwise(found.axes))
@@ -569,6 +569,13 @@ def test_the_uncertainty_of_a_plane_is_what_samples_show():
             ratios.append(min(line_angle_rad(p.plane.normal, n) for n in truth) / p.sigma_rad)
             assert 0 < p.sigma < 1e-3 * found.diagonal
     assert 0.5 < np.sqrt(np.mean(np.square(ratios))) < 3.0  # two directions, one of them the less certain one
+
+
+def test_iterations_that_found_elements_one_by_one_count_too():
+    together, one_by_one = detect(posed(table(), 3)[0]), detect(posed(join([box((0, 0, 0), (3, 2, 1))]), 3)[0])
+    assert (together.point_group, one_by_one.point_group) == ("C4v", "D2h")
+    assert together.iterations == len(together.history) - 1 > 0
+    assert one_by_one.iterations > len(one_by_one.history) - 1 > 0
 
 
 def test_no_uncertainty_is_claimed_where_nothing_was_refined_together():
