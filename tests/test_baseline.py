@@ -498,9 +498,10 @@ def test_scale_and_shift_change_nothing_and_a_turn_only_what_the_cells_do():
     moved = ecins(7.3 * points + [40.0, -3.0, 2.0], normals, settings=TUNED)
     turn = random_orthogonal(np.random.default_rng(2))
     turned = ecins(points @ turn.T, normals @ turn.T, settings=TUNED)
-    assert len(plain.planes) == 3
     # Where a start that slides along a face comes to rest is up to rounding: there may be false planes more.
-    for plane in plain.planes:
+    true = [p for p in plain.planes if np.abs(p.normal).max() > np.cos(np.radians(0.5)) and abs(p.offset) < 0.01]
+    assert len(true) == 3
+    for plane in true:
         angles = [degrees(plane.normal, p.normal) for p in moved.planes]
         same = moved.planes[int(np.argmin(angles))]
         sign = np.sign(same.normal @ plane.normal)
