@@ -1,4 +1,7 @@
-"""Files that are whole or absent: written beside their place under another name, then moved there in one step."""
+"""Files that are whole or absent: written beside their place under another name, then moved there in one step.
+
+A file that grows row by row has one writer at a time.
+"""
 
 import os
 import secrets
@@ -58,6 +61,24 @@ def whole(path: Path) -> Iterator[Path]:
             yield draft
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def is_only_writer(descriptor: int) -> bool:
+    """Lock an open file for one writer; False if another process has it. The lock ends with the process that holds it.
+
+    Where the system or the file system knows no such locks, it trusts.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        return True
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def _is_replaceable(path: Path) -> bool:

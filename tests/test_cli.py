@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import symrefine
-from symrefine.cli import batch, invoke, values
+from symrefine.cli import batch, invoke, journal, values
 from symrefine.cli.tables import batch_table, detection_lines, headline
 from symrefine.detect import detect
 from symrefine.errors import InputError
@@ -471,6 +471,37 @@ def test_batch_goes_on_and_resumes(run: Run, shelf: Path, tmp_path: Path, monkey
     (shelf / "c.ply").unlink()
     assert run("batch", shelf, "--out", out, "--seed", 1)[0] == 0
     assert done == ["c.ply", "A.PLY", "A.PLY", "b.ply"]
+
+
+def test_two_batches_cannot_write_to_one_file(run: Run, shelf: Path, tmp_path: Path) -> None:
+    pytest.importorskip("fcntl")
+    out = tmp_path / "rows.jsonl"
+    with journal.locked(out):
+        assert_refused(run("batch", shelf, "--out", out), str(out), "another `symrefine batch` is writing")
+        assert out.read_bytes() == b""
+    assert run("batch", shelf, "--out", out)[0] == 1
+    assert len(rows(out)) == 3
+
+
+def test_a_batch_that_was_killed_leaves_no_lock(run: Run, shelf: Path, tmp_path: Path) -> None:
+    pytest.importorskip("fcntl")
+    out = tmp_path / "rows.jsonl"
+    hold = f"""
+from pathlib import Path
+from symrefine.cli import journal
+with journal.locked(Path({str(out)!r})):
+    print("held", flush=True)
+    input()
+"""
+    line = [sys.executable, "-c", hold]
+    with subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as holder:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == "held\n"
+        assert_refused(run("batch", shelf, "--out", out), "another `symrefine batch` is writing")
+        holder.kill()
+        holder.wait(60)
+    assert run("batch", shelf, "--out", out)[0] == 1
+    assert len(rows(out)) == 3
 
 
 def counting(function: Callable[[batch.Job], batch.Row], done: list[str]) -> Callable[[batch.Job], batch.Row]:

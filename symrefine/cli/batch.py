@@ -3,6 +3,7 @@
 import argparse
 import re
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -56,15 +57,16 @@ def run(args: argparse.Namespace) -> int:
     scale = _check_bop(args, files)
     options = {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed}
     options |= {name: given for name in ("labels", "weights") if (given := getattr(args, name)) is not None}
-    rows = journal.finished(Path(args.out), Path(args.dir), files, options) if args.out else {}
-    rows = {name: row for name, row in rows.items() if _serves_bop(row, scale)}
-    jobs = [(args.dir, name, options, scale) for name in files if name not in rows]
-    with progress("detecting", len(files), len(rows)) as advance:
-        for row in _rows(jobs, args.workers):
-            if args.out:
-                journal.append(Path(args.out), row)
-            rows[row["file"]] = row
-            advance()
+    with journal.locked(Path(args.out)) if args.out else nullcontext():
+        rows = journal.finished(Path(args.out), Path(args.dir), files, options) if args.out else {}
+        rows = {name: row for name, row in rows.items() if _serves_bop(row, scale)}
+        jobs = [(args.dir, name, options, scale) for name in files if name not in rows]
+        with progress("detecting", len(files), len(rows)) as advance:
+            for row in _rows(jobs, args.workers):
+                if args.out:
+                    journal.append(Path(args.out), row)
+                rows[row["file"]] = row
+                advance()
     _print([rows[name] for name in files], len(files) - len(jobs))
     left_out = _write_bop(args.bop, rows) if args.bop else 0
     return int(left_out > 0 or any(row["error"] is not None for row in rows.values()))

@@ -3,13 +3,15 @@
 import errno
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from symrefine.cli.outputs import note
 from symrefine.errors import InputError
+from symrefine.files import is_only_writer
 
 Row = dict[str, Any]
 
@@ -27,6 +29,19 @@ def head(path: Path, name: str, options: dict[str, Any]) -> Row:
     except OSError as error:
         row["error"] = f"{path}: cannot be read: {error.strerror}"
     return row
+
+
+@contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Keep other batches from `path`, which is made if it is not there, until the end or the death of this process.
+
+    Raises:
+        InputError: another batch is writing to it.
+    """
+    with path.open("ab", buffering=0) as stream:
+        if not is_only_writer(stream.fileno()):
+            raise InputError(f"{path}: another `symrefine batch` is writing to it; wait, or name another file")
+        yield
 
 
 def append(path: Path, row: Row) -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from symrefine.errors import InputError
+from symrefine.files import is_only_writer
 
 _FIRST_KEY = b'{"config": '
 
@@ -49,7 +50,8 @@ def opened(path: Path, stamp: Stamp, *, replace: bool) -> Iterator[tuple[dict[in
         InputError: another run is writing, rows with another stamp, or something else than rows.
     """
     with path.open("ab", buffering=0) as stream:
-        _lock(stream.fileno(), path)
+        if not is_only_writer(stream.fileno()):
+            raise InputError(f"{path.parent}: another run is writing there; wait, or name another directory")
         data = path.read_bytes()
         whole = data[: data.rfind(b"\n") + 1]
         if not _is_ours(whole, data[len(whole) :]):
@@ -84,18 +86,6 @@ class Journal:
         if os.write(self.descriptor, line) != len(line):
             raise OSError(28, os.strerror(28))
         os.fsync(self.descriptor)
-
-
-def _lock(descriptor: int, path: Path) -> None:
-    """Refuse a second writer; where the system knows no such locks, trust."""
-    try:
-        import fcntl
-    except ImportError:
-        return
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        raise InputError(f"{path.parent}: another run is writing there; wait, or name another directory") from None
 
 
 def _is_ours(whole: bytes, rest: bytes) -> bool:
