@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from symrefine.cli import journal
-from symrefine.cli.outputs import check_outputs, console, note, progress, text_writer, write_all
+from symrefine.cli.outputs import check_beside, check_outputs, console, note, progress, text_writer, write_all
 from symrefine.cli.values import add_class_options, add_detection_options, count, positive
 from symrefine.errors import InputError, SymrefineError
 
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="FILE.jsonl", help="append the rows to this file (default: print only)")
     parser.add_argument("--bop", metavar="FILE", help="put the symmetries of all into this models_info.json of BOP")
     parser.add_argument(
-        "--bop-scale", type=positive, default=1.0, metavar="X", help="millimetres in one unit of the files (default: 1)"
+        "--bop-scale", type=positive, metavar="X", help="millimetres in one unit of the files (default: 1)"
     )
     parser.add_argument("--recursive", action="store_true", help="directories inside DIR too")
     parser.add_argument(
@@ -54,6 +54,7 @@ def run(args: argparse.Namespace) -> int:
     """Detect in every file, print the table, tell whether all went well."""
     files = _files(Path(args.dir), recursive=args.recursive)
     check_outputs({"--out": args.out, "--bop": args.bop}, [Path(args.dir, name) for name in files])
+    check_beside("--bop", args.bop, {"--bop-scale": args.bop_scale})
     scale = _check_bop(args, files)
     options = {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed}
     options |= {name: given for name in ("labels", "weights") if (given := getattr(args, name)) is not None}
@@ -91,7 +92,7 @@ def _check_bop(args: argparse.Namespace, files: list[str]) -> float | None:
         other = owners.setdefault(int(match[1]), name)
         if other != name:
             raise InputError(f"{Path(args.dir, name)}: is object {int(match[1])}, and so is {other}; --bop takes one")
-    return float(args.bop_scale)
+    return float(args.bop_scale or 1.0)
 
 
 def _serves_bop(row: Row, scale: float | None) -> bool:

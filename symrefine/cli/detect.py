@@ -7,7 +7,17 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from symrefine.cli.outputs import STDOUT, Writer, check_outputs, note, say, text_writer, waiting, write_all
+from symrefine.cli.outputs import (
+    STDOUT,
+    Writer,
+    check_beside,
+    check_outputs,
+    note,
+    say,
+    text_writer,
+    waiting,
+    write_all,
+)
 from symrefine.cli.values import add_class_options, add_detection_options, grey, natural, positive
 from symrefine.errors import InputError
 
@@ -30,13 +40,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("path", metavar="PATH", help="mesh, point cloud or picture")
     parser.add_argument("--json", metavar="FILE|-", help="write the whole report as JSON; - is stdout, with no table")
     parser.add_argument("--bop", metavar="FILE", help="put the symmetries into this models_info.json of BOP")
-    parser.add_argument(
-        "--bop-id", type=natural, default=1, metavar="N", help="number of the object there (default: %(default)s)"
-    )
+    parser.add_argument("--bop-id", type=natural, metavar="N", help="number of the object there (default: 1)")
     parser.add_argument(
         "--bop-scale",
         type=positive,
-        default=1.0,
         metavar="X",
         help="millimetres in one unit of PATH: 1000 if it is in metres (default: 1)",
     )
@@ -58,6 +65,7 @@ def run(args: argparse.Namespace) -> int:
     """Detect, write the files that were asked for, print."""
     outputs = {"--json": args.json, "--bop": args.bop, "--recording": args.recording, "--report": args.report}
     check_outputs(outputs, [Path(args.path)])
+    check_beside("--bop", args.bop, {"--bop-id": args.bop_id, "--bop-scale": args.bop_scale})
     if args.bop is not None:
         _check_bop(Path(args.bop))
     with waiting("detecting"):
@@ -177,8 +185,9 @@ def _spatial_writers(args: argparse.Namespace, shape: "Shape", detection: "Detec
 def _bop_writer(args: argparse.Namespace, shape: "Shape", detection: "Detection") -> Writer:
     from symrefine.export.bop import bop_entry, bop_text
 
-    entry = bop_entry(detection, shape, scale=args.bop_scale)
-    return text_writer(bop_text(Path(args.bop), args.bop_id, entry))
+    entry = bop_entry(detection, shape, scale=args.bop_scale or 1.0)
+    number = 1 if args.bop_id is None else args.bop_id
+    return text_writer(bop_text(Path(args.bop), number, entry))
 
 
 def _note_limits(detection: "Detection") -> None:

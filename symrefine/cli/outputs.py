@@ -41,6 +41,17 @@ def check_outputs(outputs: dict[str, str | None], inputs: list[Path]) -> None:
             taken[path.resolve()] = f"that of {option}"
 
 
+def check_beside(option: str, name: str | None, details: dict[str, object]) -> None:
+    """Refuse details of an output that is not asked for, which would be ignored.
+
+    Args:
+        details: option to value, None where it is not given.
+    """
+    given = [detail for detail, value in details.items() if value is not None]
+    if name is None and given:
+        raise InputError(f"{given[0]}: says how to write {option} FILE, which is not given; add it or leave this out")
+
+
 def write_all(writers: dict[str, Writer]) -> None:
     """Write every file under another name first; only when all are complete does each take its place."""
     from symrefine.export.files import replacing
