@@ -16,7 +16,7 @@ from symrefine.moments import Moments, central_moments, shape_moments
 from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
 from symrefine.planar import detect_planar
 from symrefine.quadrature import mesh_nodes
-from symrefine.registration.alignment import Alignment
+from symrefine.registration.alignment import OK, OPEN, Alignment
 from symrefine.registration.coset import Coset, coset_of_group, coset_of_list, lifted
 from symrefine.registration.moment_fit import moment_fit
 from symrefine.registration.pair import Evidence, Side, few
@@ -36,7 +36,6 @@ HIGH_DIMENSION, HIGHEST_DIMENSION = 7, 10
 FLAT = 1e-12
 # Radii that differ by more than this factor are no matter of sampling.
 RADII = 1.2
-OK = "ok"
 
 
 def align(
@@ -235,7 +234,7 @@ def _align_moments(sides: tuple[Side, Side], scale: bool, reflections: bool, clo
         if found.misfit > MISFIT and not found.exact:
             status = f"the moments differ by {found.misfit:.0f} times what sampling explains"
         if status == OK and not np.isfinite(found.sigma_rad) and not found.exact:
-            status = "not determined: the noise of the moments hides every direction; give more points"
+            status = f"{OPEN}: the noise of the moments hides every direction; give more points"
         return _nearest(a.shape, b.shape, matrix, translation, factor), status
 
     return Alignment(

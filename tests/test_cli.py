@@ -392,6 +392,7 @@ def test_align_finds_the_map(run: Run, data: Path, tmp_path: Path, det: int) -> 
     found = json.loads(out, parse_constant=not_json)
     assert found["schema"] == "symrefine.alignment/1"
     assert (found["status"], found["determinant"], found["observable"]) == ("ok", det, "full")
+    assert found["misfit"] is False
     moved = np.array(SCALENE) @ np.transpose(found["matrix"]) + found["translation"]
     np.testing.assert_allclose(moved, corners, atol=1e-6)
     assert found["equivalents"] == [{k: found[k] for k in ("matrix", "translation")}]
@@ -405,6 +406,30 @@ def test_align_says_it_in_words(run: Run, data: Path, tmp_path: Path) -> None:
     assert "determinant +1 (rotation)" in out
     assert "determined: everything" in out
     assert json.loads((tmp_path / "a.json").read_text())["determinant"] == 1
+
+
+@pytest.mark.parametrize(
+    ("option", "told"),
+    [
+        ((), "no orthogonal map takes the one onto the other within 2 % of the diagonal: the objects differ by"),
+        (("--tolerance", 0.01, "--rotations-only"), "no rotation takes the one onto the other within 1 % of the diag"),
+        (("--scale",), "no orthogonal map with any scale takes the one onto the other within 2 % of the diagonal"),
+    ],
+)
+def test_align_does_not_tell_a_misfit_as_an_answer(
+    run: Run, data: Path, tmp_path: Path, option: tuple[object, ...], told: str
+) -> None:
+    (tmp_path / "other.ply").write_text(ply([[0, 0, 0], [6, 3, 0], [1, -3, 1], [3, 1, 3]], SCALENE_SIDES))
+    line = ("align", data / "scalene.ply", tmp_path / "other.ply", *option)
+    status, out, err = run(*line, "--json", tmp_path / "a.json")
+    assert (status, err) == (0, "")
+    assert out.splitlines()[0].startswith(f"{data / 'scalene.ply'} onto {tmp_path / 'other.ply'}: {told}")
+    assert "The closest map that was found, and no answer:" in out
+    for claim in ("known", "equal to rounding", "determined"):
+        assert claim not in out
+    found = json.loads((tmp_path / "a.json").read_text())
+    assert found["misfit"] is True
+    assert {"status", "matrix", "sigma_rad", "exact", "observable"} <= set(found)
 
 
 # --- derive -----------------------------------------------------------------------------------------------------------

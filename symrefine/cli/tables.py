@@ -190,8 +190,13 @@ def _hyperplanes(title: str, candidates: Sequence[Record], record: Record) -> Ta
 
 
 def alignment_lines(record: Record) -> Iterator[str]:
-    """Everything a person wants to know about one alignment."""
-    yield f"{record['source']} onto {record['target']}: {record['status']}"
+    """Everything a person wants to know about one alignment; of a misfit nothing that sounds like an answer."""
+    if record["misfit"]:
+        yield misfit(record)
+        yield ""
+        yield "The closest map that was found, and no answer:"
+    else:
+        yield f"{record['source']} onto {record['target']}: {record['status']}"
     yield ""
     rows = list(zip(record["matrix"], record["translation"], strict=True))
     yield from (f"  {' '.join(f'{x + 0.0:11.8f}' for x in row)}  |  {t:.8g}" for row, t in rows)
@@ -199,13 +204,32 @@ def alignment_lines(record: Record) -> Iterator[str]:
     kind = "rotation" if record["determinant"] > 0 else "reflection or rotoreflection"
     scale = "" if record["scale"] == 1.0 else f", scale {record['scale']:.8g}"
     yield f"matrix | translation in units of the target; determinant {record['determinant']:+d} ({kind}){scale}"
-    sigma = record["sigma_rad"]
-    known = "rotation unknown" if isinstance(sigma, str) else f"rotation known to {math.degrees(sigma):.2g} degrees"
-    known = "moments equal to rounding" if record["exact"] else known
-    yield f"rms distance {_percent(record['rms'])} % of the diagonal, {known}"
-    observable = record["observable"]
-    yield f"determined: {'everything' if observable == 'full' else observable}"
+    distance = f"rms distance {_percent(record['rms'])} % of the diagonal"
+    if record["misfit"]:
+        yield distance
+    else:
+        yield f"{distance}, {_known(record)}"
+        observable = record["observable"]
+        yield f"determined: {'everything' if observable == 'full' else observable}"
     yield f"{sum(record['timings'].values()):.2f} s"
+
+
+def misfit(record: Record) -> str:
+    """That the objects do not agree, and why not."""
+    options, reason = record["options"], record["status"]
+    maps = "rotation" if options["rotations_only"] else "orthogonal map"
+    maps += " with any scale" if options["scale"] else ""
+    # Elsewhere than in space the sampling noise of the moments decides, not the tolerance.
+    within = f" within {100 * options['tolerance']:g} % of the diagonal" if "tolerance" in reason else ""
+    return f"{record['source']} onto {record['target']}: no {maps} takes the one onto the other{within}: {reason}"
+
+
+def _known(record: Record) -> str:
+    """How well the rotation is known."""
+    if record["exact"]:
+        return "moments equal to rounding"
+    sigma = record["sigma_rad"]
+    return "rotation unknown" if isinstance(sigma, str) else f"rotation known to {math.degrees(sigma):.2g} degrees"
 
 
 def batch_table(rows: Sequence[Record]) -> Table:

@@ -86,7 +86,8 @@ def alignment_record(
     """What `symrefine align --json` writes: `target ~ scale * matrix @ source + translation`, and its equivalents.
 
     `rms` is a fraction of the target's diagonal; `free` spans the directions of the target within which any orthogonal
-    map does as well.
+    map does as well. Where `misfit` is true no map takes the one onto the other, `status` says why, and all the rest
+    is about the closest map that was found.
     """
     a = alignment
     size = float(np.abs(target.points).max())
@@ -99,6 +100,7 @@ def alignment_record(
         "version": version("symrefine"),
         "options": dict(options),
         "status": a.status,
+        "misfit": bool(a.is_misfit),
         "determinant": a.determinant,
         "matrix": _matrix(a.matrix),
         "translation": numbers(a.translation, size),

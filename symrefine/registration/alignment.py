@@ -10,6 +10,10 @@ from numpy.typing import ArrayLike
 from symrefine.geometry import Array, read_only
 from symrefine.registration.coset import Coset
 
+OK = "ok"
+# How a status begins that leaves open whether the objects agree.
+OPEN = "not determined"
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Alignment:
@@ -95,6 +99,11 @@ class Alignment:
     def status(self) -> str:
         """ "ok", or why the result should not be relied upon."""
         return self._fit[1]
+
+    @property
+    def is_misfit(self) -> bool:
+        """Whether no map that was admitted takes the source onto the target: then `matrix` is the closest found."""
+        return not self.status.startswith((OK, OPEN))
 
 
 def _homogeneous(matrix: Array, shift: Array) -> Array:
