@@ -60,7 +60,7 @@ def whole(path: Path) -> Iterator[Path]:
         with replacing(path) as draft:
             yield draft
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
 def is_only_writer(descriptor: int) -> bool:

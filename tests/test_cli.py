@@ -17,6 +17,7 @@ from symrefine.cli import batch, invoke, journal, values
 from symrefine.cli.tables import batch_table, detection_lines, headline
 from symrefine.detect import detect
 from symrefine.errors import InputError
+from symrefine.files import whole
 from symrefine.geometry import random_orthogonal
 from symrefine.ntuples import notation
 from symrefine.ntuples.affine import derive_affine
@@ -295,6 +296,21 @@ def test_a_full_disk_is_told() -> None:
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(line, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
     assert (done.returncode, done.stderr) == (2, "symrefine: No space left on device\n")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_a_full_disk_is_told_with_the_file(run: Run, data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    told = "symrefine: /dev/full: cannot be written: No space left on device\n"
+    assert run("derive", "--dim", 3, "--orders", 3, "--json", "/dev/full") == (2, "", told)
+    with pytest.raises(InputError, match=r"^/dev/full: cannot be written: No space left on device$"):
+        journal.append(Path("/dev/full"), {"file": "a.ply"})
+
+    def fail(*_: object) -> None:
+        with whole(data / "draft.html"):
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("symrefine.report.write_html", fail)
+    assert_refused(run("detect", data / "box.ply", "--report", data / "b.html"), f"{data / 'b.html'}: cannot be writ")
 
 
 # --- help, version, package -------------------------------------------------------------------------------------------

@@ -513,6 +513,15 @@ BAD_TEXT = [
     ("a.npz", npz(points=TETRA[:, :2], faces=[[0, 1, 2]]), "faces need points [N, 3]"),
     ("a.npz", npz(points=TETRA, normals=NORMALS[:2]), "normals have shape (2, 3); expected (4, 3)"),
     ("a.npz", npz(points=TETRA, faces=FACES, weights=[1, 1, 1, 1]), "weights and faces"),
+    ("a.npy", npy(1e-200 * TETRA), "coordinates differ by"),
+    ("a.off", off(1e-70 * TETRA, FACES), "a shape needs 1e-60: give them in a smaller unit"),
+    ("a.csv", TETRA_TEXT.replace(" ", ";"), "is not a number; expected as many numbers in every line; semicolons"),
+    ("a.csv", "x;y;z\n1;2;3\n", "semicolons separate nothing: put commas (.csv, .txt) or white space there"),
+    ("a.csv", "1,5;2,5;3,5\n", "points into decimals"),
+    ("a.txt", "1 2 3\n4;5;6\n", "line 2, column 1: '4;5;6' is not a number; expected as many numbers in every line; s"),
+    ("a.xyz", TETRA_TEXT.replace(" ", "; "), "semicolons separate nothing"),
+    ("a.xyz", TETRA_TEXT.replace(" ", ","), "commas separate columns of .csv and .txt only"),
+    ("a.xyz", "1,5 2,5 3,5\n", "decimals have a point"),
     ("a.glb", b"garbage that is long enough", "not a GLB file: begins with b'garbage '"),
     ("a.glb", trimesh.creation.box().export(file_type="glb")[:-9], "cut off or added to"),
     ("a.gltf", "garbage", "not a glTF file: its JSON text is not valid"),
@@ -524,6 +533,11 @@ BAD_TEXT = [
 @pytest.mark.parametrize(("name", "data", "part"), BAD_TEXT, ids=[f"{n}-{p[:40]}" for n, _, p in BAD_TEXT])
 def test_bad_files_are_refused_with_their_place(tmp_path: Path, name: str, data: bytes | str, part: str) -> None:
     assert part in refusal(tmp_path, name, data)
+
+
+@pytest.mark.parametrize(("name", "data"), [("a.npy", npy(1e-58 * TETRA)), ("a.off", off(1e-52 * TETRA, FACES))])
+def test_small_units_are_no_fault(tmp_path: Path, name: str, data: bytes) -> None:
+    assert load_bytes(tmp_path, name, data).points.shape == TETRA.shape
 
 
 @pytest.mark.parametrize("suffix", READERS)

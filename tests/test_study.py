@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -241,6 +242,25 @@ def test_what_is_made_of_the_rows_is_checked_before_the_runs(
     with pytest.raises(InputError, match=message):
         run_study(plan, lab / "out")
     assert not (lab / "out").exists()
+
+
+def test_a_config_that_is_not_there_is_told_with_those_that_are(
+    make: Make, lab: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make()
+    configs = lab / "configs"
+    (configs / "other.yaml").write_text("seeds: 10\n")
+    (configs / "folder.yaml").mkdir()
+    there = re.escape(f"in {configs} there are toy.yaml")
+    for path in (configs / "tyo.yaml", configs / "folder.yaml", lab / "nowhere" / "toy.yaml"):
+        monkeypatch.chdir(lab / "lab")
+        with pytest.raises(InputError, match=f"{path.name}: no such config file; {there}$"):
+            make_plan(path)
+    with pytest.raises(InputError, match=f"other.yaml:1: config: missing experiment, .*; {there}$"):
+        make_plan(configs / "other.yaml")
+    (configs / "toy.yaml").unlink()
+    with pytest.raises(InputError, match="in the directory configs of symrefine's repository"):
+        make_plan(configs / "toy.yaml")
 
 
 def test_experiments_that_are_none_are_refused(make: Make, lab: Path) -> None:

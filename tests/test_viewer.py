@@ -188,6 +188,20 @@ def test_rerun_switched_off_is_told(shapeless: Case, tmp_path: Path, monkeypatch
         record(*shapeless[:2], tmp_path / "x.rrd")
 
 
+def test_a_full_disk_is_no_bug_of_ours(shapeless: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError(text)
+
+    monkeypatch.setattr("symrefine.viewer.recording._log", fail)
+    text = "Failed to encode LogMsg: Failed to write: No space left on device (os error 28)"
+    with pytest.raises(InputError, match=r"x.rrd: cannot be written: No space left on device$"):
+        record(*shapeless[:2], tmp_path / "x.rrd")
+    text = "something else"
+    with pytest.raises(RuntimeError, match="something else"):
+        record(*shapeless[:2], tmp_path / "x.rrd")
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_recording_takes_the_place_of_another(shapeless: Case, tmp_path: Path) -> None:
     detection, shape, path = shapeless
     (tmp_path / "x.rrd").write_text("old")

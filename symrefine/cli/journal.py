@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from symrefine.cli.outputs import note
+from symrefine.cli.outputs import naming, note
 from symrefine.errors import InputError
 from symrefine.files import is_only_writer
 
@@ -48,10 +48,10 @@ def append(path: Path, row: Row) -> None:
     """Append a row in one write, so that a reader or a killed run never sees half of one.
 
     Raises:
-        OSError: no room.
+        InputError: no room.
     """
     line = json.dumps(row, allow_nan=False).encode("ascii") + b"\n"
-    with path.open("ab", buffering=0) as stream:
+    with naming(str(path)), path.open("ab", buffering=0) as stream:
         if stream.write(line) != len(line):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 

@@ -58,7 +58,26 @@ def write_all(writers: dict[str, Writer]) -> None:
 
     with ExitStack() as stack:
         for name, write in writers.items():
+            stack.enter_context(naming(name))
             write(stack.enter_context(replacing(Path(name))))
+
+
+@contextmanager
+def naming(name: str) -> Iterator[None]:
+    """Name the file that could not be written: the system names none, or its draft.
+
+    Raises:
+        InputError: the disk is full, or the like.
+    """
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except (OSError, InputError) as error:
+        reason = error if isinstance(error, OSError) else error.__cause__
+        if not isinstance(reason, OSError):
+            raise
+        raise InputError(f"{name}: cannot be written: {reason.strerror or reason}") from None
 
 
 def text_writer(text: str) -> Writer:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from symrefine.cli.outputs import console, note, progress, say
+from symrefine.cli.outputs import console, naming, note, progress, say
 from symrefine.cli.values import count
 
 NAME = "run"
@@ -46,7 +46,10 @@ def run(args: argparse.Namespace) -> int:
 
     plan = make_plan(Path(args.config), args.set, quick=args.quick)
     folder = Path(args.out or plan.study.out)
-    outcome = run_study(plan, folder, workers=args.workers, limit=args.limit, replace=args.replace, progress=progress)
+    with naming(str(folder)):
+        outcome = run_study(
+            plan, folder, workers=args.workers, limit=args.limit, replace=args.replace, progress=progress
+        )
     if outcome.tables:
         say(outcome.tables + "\n")
     for row in [row for row in outcome.rows if row["error"] is not None][:5]:

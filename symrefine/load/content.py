@@ -16,6 +16,8 @@ Values = NDArray[Any]
 
 # Squares of areas of such triangles are still numbers; no unit of length asks for more.
 LARGEST = 1e60
+# Squares of areas of smaller triangles are 0.
+SMALLEST = 1e-60
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -105,7 +107,7 @@ def check_finite(content: Content, source: str) -> None:
 
 
 def check_distinct(content: Content, source: str) -> None:
-    """Refuse files without two distinct points."""
+    """Refuse files without two distinct points, or with points so close together that areas underflow."""
     points = content.points
     if len(points) == 0:
         raise InputError(f"{source}: no points; a shape needs at least two distinct points")
@@ -114,6 +116,12 @@ def check_distinct(content: Content, source: str) -> None:
     if (points == points[0]).all():
         raise InputError(
             f"{source}: all {len(points)} points are {points[0].tolist()}; a shape needs at least two distinct points"
+        )
+    spread = float(np.ptp(points, axis=0).max())
+    if spread < SMALLEST:
+        raise InputError(
+            f"{source}: coordinates differ by {spread:.3g} at most; a shape needs {SMALLEST:g}: give them in a smaller "
+            "unit"
         )
 
 

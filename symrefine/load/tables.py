@@ -13,7 +13,7 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.content import Content, Polygons, Values, as_float64
 from symrefine.load.molecule import is_molecule, read_molecule
-from symrefine.load.text import Line, count, is_number, numbered_lines, parse_table, shorten
+from symrefine.load.text import Line, count, is_number, numbered_lines, parse_table, separators, shorten
 
 _FIELDS = ("points", "normals", "weights", "faces")
 _COLOURS = (("red", "green", "blue"), ("r", "g", "b"))
@@ -109,7 +109,7 @@ def _check_names(names: list[str], line: int, source: str) -> bool:
     raise InputError(
         f"{source}: line {line}: columns {shorten(','.join(names))}; expected x,y or x,y,z or x,y,z,nx,ny,nz or "
         "x1,...,xn: keep only these, name one as labels or weights, or remove the line of names if every column is a "
-        "coordinate"
+        f"coordinate{separators(','.join(names), ',')}"
     )
 
 

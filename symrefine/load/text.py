@@ -104,6 +104,7 @@ def _explain(lines: Sequence[Line], source: str, columns: Collection[int], layou
             if not is_number(field):
                 raise InputError(
                     f"{source}: line {number}, column {column}: {shorten(field)} is not a number; expected {layout}"
+                    f"{separators(text, delimiter)}"
                 )
         if columns and len(fields) not in columns:
             raise InputError(f"{source}: line {number} has {count(len(fields), 'column')}; expected {layout}")
@@ -113,6 +114,15 @@ def _explain(lines: Sequence[Line], source: str, columns: Collection[int], layou
                 f"expected {layout}"
             )
         width = len(fields)
+
+
+def separators(text: str, delimiter: str | None) -> str:
+    """What a row of a table has between its columns instead of what belongs there, to end a message with."""
+    if ";" in text:
+        return "; semicolons separate nothing: put commas (.csv, .txt) or white space there, and points into decimals"
+    if "," in text and delimiter is None:
+        return "; commas separate columns of .csv and .txt only, from the first line on, and decimals have a point"
+    return ""
 
 
 def count(number: int, noun: str) -> str:

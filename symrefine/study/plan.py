@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields
 from itertools import product
@@ -15,6 +16,7 @@ from symrefine.study.schema import NOTHING, Study
 from symrefine.study.typed import mapping, scalar, typed
 
 _MANY = 100_000
+_EXPERIMENT = re.compile(rb"^experiment:", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,10 +49,14 @@ def make_plan(path: Path, settings: Sequence[str] = (), *, quick: bool = False) 
     Raises:
         InputError: whatever is wrong, with file, line and key path.
     """
+    if not path.is_file():
+        raise InputError(f"{path}: no such config file; {_elsewhere(path)}")
     root = read_document(path)
     if quick:
         root = _quick(root)
     root = override(root, settings)
+    if isinstance(root.value, dict) and "experiment" not in root.value:
+        raise root.error(f"missing experiment, so `symrefine run` can do nothing with it; {_elsewhere(path)}")
     study: Study = typed(root, Study)
     name = root.at("experiment")
     if not all(part.isidentifier() for part in study.experiment.split(".")):
@@ -67,6 +73,18 @@ def make_plan(path: Path, settings: Sequence[str] = (), *, quick: bool = False) 
         config_hash=_digest([experiment.name, [asdict(case) for case in cases]]),
         changed=bool(settings) or (quick and bool(study.quick)),
     )
+
+
+def _elsewhere(path: Path) -> str:
+    """Which configs there are, for messages: beside `path`, or in a directory `configs` here or above."""
+    here = Path.cwd()
+    for folder in (path.parent, *(above / "configs" for above in (here, *here.parents))):
+        names = sorted(
+            file.name for file in folder.glob("*.yaml") if file.is_file() and _EXPERIMENT.search(file.read_bytes())
+        )
+        if names:
+            return f"in {folder} there are {' '.join(names)}"
+    return "configs are YAML files with a key `experiment`, as in the directory configs of symrefine's repository"
 
 
 def _quick(root: Node) -> Node:

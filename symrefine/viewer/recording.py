@@ -6,7 +6,10 @@ the origin the object lies. The parent of all of them is scaled by a power of te
 
 import hashlib
 import math
+import os
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +54,7 @@ def record(detection: Detection, shape: Shape, path: Path | str) -> None:
     import rerun as rr
 
     scene = make_scene(detection, shape)
-    with whole(Path(path)) as draft:
+    with whole(Path(path)) as draft, _errors_of_the_system():
         stream = rr.RecordingStream(
             _application(shape), recording_id=_identity(detection, shape), send_properties=False
         )
@@ -64,6 +67,18 @@ def record(detection: Detection, shape: Shape, path: Path | str) -> None:
             stream.disconnect()
         if not draft.exists():
             raise InputError(f"{path}: rerun wrote nothing; is the environment variable RERUN set to off?")
+
+
+@contextmanager
+def _errors_of_the_system() -> Iterator[None]:
+    """Raise what the system told rerun (no room, say) as an error of the system."""
+    try:
+        yield
+    except RuntimeError as error:
+        told = re.search(r"\(os error ([0-9]+)\)", str(error))
+        if told is None:
+            raise
+        raise OSError(int(told[1]), os.strerror(int(told[1]))) from error
 
 
 def _log(stream: Any, detection: Detection, shape: Shape, scene: Scene) -> None:
