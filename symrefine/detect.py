@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from symrefine.assemble import Assembly, assemble
 from symrefine.axis import TupleClass
-from symrefine.elements import Element
+from symrefine.elements import Element, inversion_of
 from symrefine.errors import InputError
 from symrefine.gather import gather, is_few, measure, part
 from symrefine.geometry import Array, Axis, Plane, read_only
@@ -97,6 +97,8 @@ class Detection:
         planes: discrete mirror planes, best first.
         axes: rotation and rotoreflection axes, highest order first.
         inversion: whether the inversion about the centre is a symmetry.
+        inversion_residual: its miss as fractions of the diagonal; None where there is none.
+        inversion_confidence: how sure it is, from its own miss and those of the elements; None where there is none.
         near_misses: candidates turned down, best first.
         iterations: outer iterations of the refinement of all planes together; where they had to be found one by one,
             those of the element that took most come on top (coarse looks at a tenth of the points do not count).
@@ -117,6 +119,8 @@ class Detection:
     planes: tuple[FoundPlane, ...]
     axes: tuple[FoundAxis, ...]
     inversion: bool
+    inversion_residual: Deviation | None
+    inversion_confidence: float | None
     near_misses: tuple[NearMiss, ...]
     iterations: int
     tolerance: float
@@ -282,8 +286,10 @@ def _report(
     timings: dict[str, float],
 ) -> Detection:
     origin, scale = evidence.moments.center, evidence.moments.scale
-    # One figure for all elements of a group: they stand or fall together.
-    sure = confidence(max((e.verdict.excess for e in found.elements), default=0.0))
+    # One figure for all elements of a group: they stand or fall together. The inversion needs them all and itself.
+    worst = max((e.verdict.excess for e in found.elements), default=0.0)
+    sure = confidence(worst)
+    inverted = inversion_of(evidence, found.group, found.center)
     planes = [e for e in found.elements if e.kind == "plane"]
     axes = [e for e in found.elements if e.kind != "plane"]
     return Detection(
@@ -313,6 +319,8 @@ def _report(
             for e in axes
         ),
         inversion=found.group.has_inversion,
+        inversion_residual=None if inverted is None else inverted.deviation,
+        inversion_confidence=None if inverted is None else confidence(max(worst, inverted.excess)),
         near_misses=tuple(
             NearMiss(
                 kind=e.kind,

@@ -44,6 +44,13 @@ def elements_of(evidence: Evidence, group: PointGroup, center: Array) -> tuple[E
     return tuple(sorted(judged, key=lambda e: (-e.order, e.verdict.excess)))
 
 
+def inversion_of(evidence: Evidence, group: PointGroup, center: Array) -> Verdict | None:
+    """By how much the inversion about a centre misses; None if it is no operation of the group."""
+    if not group.has_inversion:
+        return None
+    return evidence.verdict([Isometry.about(center, -np.eye(3))], stride=evidence.stride(JUDGED))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Part:
     """An element to be judged: what it is, and matrices that stand for it."""

@@ -353,6 +353,8 @@ except AttributeError as error:
         ({"point_group": "Kh"}, "Kh, sphere"),
         ({"point_group": "Cinfv"}, "Cinfv, surface of revolution"),
         ({"point_group": "Cs", "planes": [{"confidence": 0.5}], "axes": []}, "Cs, one mirror plane"),
+        ({"point_group": "Ci", "planes": [], "axes": [], "inversion_confidence": 0.75},
+         "Ci, an inversion centre; tolerance 2 %, confidence 0.75"),
         ({"point_group": "C1", "tolerance": 0.005}, "C1, no symmetry at tolerance 0.5 %"),
         ({"point_group": "C1", "undetermined": "40 points are too few"}, "undetermined: 40 points are too few"),
         ({"point_group": "S4", "planes": [], "inversion": False,
@@ -393,6 +395,28 @@ def test_no_color_means_no_escape_codes(monkeypatch: pytest.MonkeyPatch) -> None
     with out.capture() as capture:
         out.print(batch_table([]))
     assert "\x1b" not in capture.get()
+
+
+def test_an_inversion_alone_has_its_line_and_its_place_in_a_batch(record: dict[str, Any]) -> None:
+    from symrefine.cli.outputs import console
+
+    miss = {"mean": 0.001, "p95": 0.00321, "p99": 0.004, "max": 0.005}
+    alone = record | {"point_group": "Ci", "planes": [], "axes": [], "near_misses": []}
+    alone |= {"inversion_residual": miss, "inversion_confidence": 0.75}
+    early = {name: value for name, value in alone.items() if not name.startswith("inversion_")}
+    out = console()
+    with out.capture() as capture:
+        for line in detection_lines(alone):
+            out.print(line)
+    lines = capture.get().splitlines()
+    assert ["about", "the", "centre", "0.100", "0.321", "0.500", "0.75"] in [line.split() for line in lines]
+    assert any("misses in % of the diagonal" in line for line in lines)
+    with out.capture() as capture:
+        out.print(batch_table([r | {"file": "a.ply", "error": None} for r in (alone, early)]))
+    told = [line.split() for line in capture.get().splitlines()[1:]]
+    assert told[0][:6] == ["a.ply", "Ci", "0", "0", "0.321", "0.75"]
+    assert told[1][:4] == ["a.ply", "Ci", "0", "0"]
+    assert len(told[1]) == 5
 
 
 # --- align ------------------------------------------------------------------------------------------------------------

@@ -84,6 +84,11 @@ def check_consistent(found: Detection):
         assert axis.confidence == found.axes[0].confidence
     assert found.group.name == found.point_group
     assert found.inversion == found.group.has_inversion
+    assert (found.inversion_residual is not None) is (found.inversion_confidence is not None) is found.inversion
+    if found.inversion:
+        assert (
+            0.0 < found.inversion_confidence <= min((e.confidence for e in (*found.planes, *found.axes)), default=1.0)
+        )
     assert found.iterations >= max(0, len(found.history) - 1)
     assert [i.index for i in found.history] == list(range(len(found.history)))
     assert len({e.confidence for e in (*found.planes, *found.axes)}) <= 1
@@ -368,6 +373,34 @@ def test_residuals_are_those_of_the_points():
         assert p.residual.p95 < np.quantile(distance, 0.95) + 0.002
         assert p.residual.p95 > 0
     assert found.diagonal == pytest.approx(np.linalg.norm(np.ptp(TABLE, axis=0)), rel=0.05)
+
+
+@pytest.mark.parametrize("name", ["Ci", "C2h", "S4"])
+def test_the_residual_of_the_inversion_is_that_of_the_points(name):
+    points = orbit(name)
+    points[0] += [0.03, -0.02, 0.01]
+    found = detect(points)
+    assert found.point_group == name
+    check_consistent(found)
+    if name == "S4":
+        assert (found.inversion_residual, found.inversion_confidence) == (None, None)
+        return
+    distance = cKDTree(points).query(2.0 * found.center - points)[0] / found.diagonal
+    assert found.inversion_residual.mean == pytest.approx(distance.mean(), rel=1e-6)
+    assert found.inversion_residual.max == pytest.approx(distance.max(), rel=1e-6)
+    assert found.inversion_residual.max > 0.003
+
+
+def test_an_inversion_that_holds_less_well_is_less_sure():
+    points = orbit("Ci")
+    exact = detect(points)
+    points[0] += [0.03, -0.02, 0.01]
+    bent = detect(points)
+    assert (exact.point_group, bent.point_group) == ("Ci", "Ci")
+    assert not exact.planes
+    assert not exact.axes
+    assert exact.inversion_residual.max < 1e-9
+    assert exact.inversion_confidence > 0.999 > bent.inversion_confidence + 0.001
 
 
 def test_normalised_points_go_back_to_the_input():

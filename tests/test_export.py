@@ -198,7 +198,11 @@ def test_a_record_says_what_was_found(box: tuple[Shape, Detection]) -> None:
     assert list(record)[-1] == "timings"
     assert sorted(np.argmax(p["normal"]) for p in record["planes"]) == [0, 1, 2]
     assert [a["order"] for a in record["axes"]] == [2, 2, 2]
-    for element in [*record["planes"], *record["axes"]]:
+    assert record["inversion_confidence"] == record["planes"][0]["confidence"]
+    nothing = replace(detection, inversion=False, inversion_residual=None, inversion_confidence=None)
+    told = detection_record(nothing, shape, options={})
+    assert (told["inversion"], told["inversion_residual"], told["inversion_confidence"]) == (False, None, None)
+    for element in [*record["planes"], *record["axes"], {"residual": record["inversion_residual"]}]:
         assert list(element["residual"]) == ["mean", "p95", "p99", "max"]
         assert element["residual"]["mean"] <= element["residual"]["max"]
 

@@ -24,6 +24,7 @@ from symrefine.picture.draw import picture_png, place_labels
 from symrefine.picture.measures import rms_series, theta_series_deg, turn_series_deg
 from symrefine.picture.painter import paint
 from symrefine.picture.raster import Raster
+from symrefine.picture.rows import found_rows
 from symrefine.picture.scene import Scene, make_scene, make_stage
 from symrefine.picture.surface import Surface, make_surface
 from symrefine.report import draw, write_html
@@ -340,6 +341,18 @@ def test_page_is_whole_and_names_the_group(any_case: Case) -> None:
     for found in detection.planes:
         assert words.direction(found.plane.normal) in text
         assert f"{100 * found.residual.p95:.2f}" in text
+
+
+def test_an_inversion_alone_has_its_row() -> None:
+    corners = np.array([[1.0, 0.35, 0.2], [0.3, 0.9, 0.6], [-0.5, 0.4, 1.1]])
+    shape = Shape(points=np.concatenate([corners, -corners]))
+    detection = detect(shape)
+    assert detection.point_group == "Ci"
+    assert [row.kind for row in found_rows(detection)] == ["inversion"]
+    text = text_of(html_page(detection, shape, b""))
+    assert "What was found, and how well it holds" in text
+    assert "about the centre" in text
+    assert "Under it, 95 % of the surface meets itself" in text
 
 
 def test_page_of_what_is_undetermined(shapeless: Case) -> None:

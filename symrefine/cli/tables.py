@@ -46,11 +46,14 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
     if record["axes"]:
         yield ""
         yield _axes(record)
+    if record["inversion_residual"]:
+        yield ""
+        yield _inversion(record)
     if record["near_misses"]:
         yield ""
         yield _near_misses(record)
     yield ""
-    if record["planes"] or record["axes"] or record["near_misses"]:
+    if record["planes"] or record["axes"] or record["inversion"] or record["near_misses"]:
         yield "Offsets in units of the file, misses in % of the diagonal; axes go through the centre."
     if record["near_misses"]:
         yield (
@@ -79,7 +82,7 @@ def headline(record: Record) -> str:
         return f"undetermined: {record['undetermined']}"
     if name == "C1":
         return f"C1, no symmetry at tolerance {100 * record['tolerance']:g} %"
-    sure = [e["confidence"] for e in record["planes"] + record["axes"]]
+    sure = [e["confidence"] for e in record["planes"] + record["axes"] + _inversions(record)]
     told = f", confidence {sure[0]:.2f}" if sure else ""
     return f"{name}, {_NAMED.get(name) or _elements(record)}; tolerance {100 * record['tolerance']:g} %{told}"
 
@@ -245,7 +248,7 @@ def batch_table(rows: Sequence[Record]) -> Table:
             table.add_row(row["file"], told, str(len(row["hyperplanes"])), "", "", "", seconds)
             continue
         mirrors, turns = _mirrors_and_turns(row)
-        elements = mirrors + turns
+        elements = mirrors + turns + _inversions(row)
         table.add_row(
             row["file"],
             "undetermined" if row["undetermined"] else row["point_group"],
@@ -265,6 +268,13 @@ def _mirrors_and_turns(row: Record) -> tuple[list[Record], list[Record]]:
     return row["planes"], row["axes"]
 
 
+def _inversions(record: Record) -> list[Record]:
+    """The inversion as an element, if there is one; rows of a batch in the plane, or of an early version, tell none."""
+    if not record.get("inversion_residual"):
+        return []
+    return [{"residual": record["inversion_residual"], "confidence": record["inversion_confidence"]}]
+
+
 def _planes(record: Record) -> Table:
     table = _table("mirror planes: normal", "offset", *_RESIDUALS, "confidence")
     for p in record["planes"]:
@@ -278,6 +288,13 @@ def _axes(record: Record) -> Table:
     for a in record["axes"]:
         kind = _turn("improper" if a["improper"] else "axis", a["order"])
         table.add_row(_direction(a["direction"]), kind, *_misses(a), f"{a['confidence']:.2f}")
+    return table
+
+
+def _inversion(record: Record) -> Table:
+    table = _table("inversion", *_RESIDUALS, "confidence")
+    for found in _inversions(record):
+        table.add_row("about the centre", *_misses(found), f"{found['confidence']:.2f}")
     return table
 
 

@@ -50,6 +50,8 @@ def detection_record(
         "planes": [_plane(p, scale) for p in d.planes],
         "axes": [_axis(a, scale) for a in d.axes],
         "inversion": bool(d.inversion),
+        "inversion_residual": None if d.inversion_residual is None else residual(d.inversion_residual),
+        "inversion_confidence": None if d.inversion_confidence is None else number(d.inversion_confidence),
         "staircase": [
             {
                 "tolerance": number(s.tolerance),

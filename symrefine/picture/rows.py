@@ -25,7 +25,7 @@ class Row:
 
 
 def found_rows(detection: Detection) -> list[Row]:
-    """Planes, then axes."""
+    """Planes, then axes, then the inversion."""
     planes = [
         Row(
             name=str(k + 1),
@@ -37,7 +37,7 @@ def found_rows(detection: Detection) -> list[Row]:
         )
         for k, p in enumerate(detection.planes)
     ]
-    return planes + [_axis_row(a) for a in detection.axes]
+    return planes + [_axis_row(a) for a in detection.axes] + _inversion_rows(detection)
 
 
 def _axis_row(found: FoundAxis) -> Row:
@@ -49,6 +49,13 @@ def _axis_row(found: FoundAxis) -> Row:
         residual=found.residual,
         score=found.confidence,
     )
+
+
+def _inversion_rows(detection: Detection) -> list[Row]:
+    miss, sure = detection.inversion_residual, detection.inversion_confidence
+    if miss is None or sure is None:
+        return []
+    return [Row(name="i", colour=AXIS, kind="inversion", vector="about the centre", residual=miss, score=sure)]
 
 
 def near_miss_rows(detection: Detection) -> list[Row]:

@@ -81,6 +81,7 @@ def _fold(n: int) -> str:
 def fit(detection: Detection) -> str:
     """How well what was found holds, in one sentence; empty when nothing was found."""
     misses = [p.residual.p95 for p in detection.planes] + [a.residual.p95 for a in detection.axes]
+    misses += [] if detection.inversion_residual is None else [detection.inversion_residual.p95]
     if not misses or detection.undetermined:
         return ""
     each = "it" if len(misses) == 1 else "each of them"

@@ -76,8 +76,6 @@ def _facts(d: Detection, shape: Shape) -> str:
 
 
 def _found(d: Detection) -> str:
-    if not d.planes and not d.axes:
-        return ""
     rows = [
         (
             _swatch(r),
@@ -89,9 +87,12 @@ def _found(d: Detection) -> str:
         )
         for r in found_rows(d)
     ]
+    if not rows:
+        return ""
     told = (
-        "Each plane and axis maps the surface onto an image of itself. The columns say by how much that image misses "
-        "the surface, in % of the diagonal: on average, for the best 95 % and 99 % of the surface, and at worst. "
+        "Each element maps the surface onto an image of itself. The columns say by how much "
+        "that image misses the surface, in % of the diagonal: on average, for the best 95 % and 99 % of the surface, "
+        "and at worst. "
         f"The bar shows the 95 % column against the {percent(LIMITS[1] * d.tolerance)} that is allowed."
     )
     heads = ("", "kind", "normal or direction", *_MISS_NAMES, "95 % and its limit", "confidence")
