@@ -20,7 +20,7 @@ from symrefine.ntuples.contract import NTuples
 from symrefine.refine import Iterate
 from symrefine.search import Evidence
 from symrefine.shape import Shape
-from symrefine.verify import TOLERANCE, Deviation, confidence
+from symrefine.verify import TOLERANCE, Deviation, Verdict, confidence
 
 LARGEST_TOLERANCE = 0.2
 # Tolerances of the staircase that the command line tells.
@@ -31,6 +31,8 @@ SUBSETS = 3
 SUBSET = 0.8
 # Share of the tolerance that such a cloud may miss itself by.
 SPARSE_FLOOR = 0.75
+# Miss over its limit from which on a group is in doubt.
+DOUBT = 0.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -287,9 +289,9 @@ def _report(
 ) -> Detection:
     origin, scale = evidence.moments.center, evidence.moments.scale
     # One figure for all elements of a group: they stand or fall together. The inversion needs them all and itself.
-    worst = max((e.verdict.excess for e in found.elements), default=0.0)
-    sure = confidence(worst)
     inverted = inversion_of(evidence, found.group, found.center)
+    sure = _confidence(evidence, [e.verdict for e in found.elements])
+    all_sure = None if inverted is None else min(sure, _confidence(evidence, [inverted]))
     planes = [e for e in found.elements if e.kind == "plane"]
     axes = [e for e in found.elements if e.kind != "plane"]
     return Detection(
@@ -320,7 +322,7 @@ def _report(
         ),
         inversion=found.group.has_inversion,
         inversion_residual=None if inverted is None else inverted.deviation,
-        inversion_confidence=None if inverted is None else confidence(max(worst, inverted.excess)),
+        inversion_confidence=all_sure,
         near_misses=tuple(
             NearMiss(
                 kind=e.kind,
@@ -345,6 +347,14 @@ def _report(
         scale=scale,
         timings=timings,
     )
+
+
+def _confidence(evidence: Evidence, verdicts: Sequence[Verdict]) -> float:
+    """Confidence in the worst of verdicts; where it is in doubt, noise is asked how much of it is its own."""
+    worst = max((v.excess for v in verdicts), default=0.0)
+    if worst > DOUBT:
+        worst = max(evidence.judge.beyond(v, evidence.halves()) for v in verdicts)
+    return confidence(worst)
 
 
 def _uncertainty(history: tuple[Iterate, ...], element: Element) -> tuple[float, float]:

@@ -14,15 +14,16 @@ from symrefine.verify import Judge, disc_distances, miss_distances
 
 # A point is astray from this miss on (tolerances, and the floor in squares).
 ASTRAY = 0.5
-# Points astray belong together if they stand as near as this (spacings), and are a part from this number on.
+# Points astray belong together if they stand as near as this (spacings), and are a part from this number and share of
+# the surface on: a smaller patch meets something wherever it is moved.
 LINK = 3.0
-PART = 8
+PART, PART_SHARE = 8, 0.002
 # Farthest that a part is moved in all and at once (tolerances), and in how many steps.
 REACH = 3.0
 STEP = 1.0
 STEPS = 12
 # A moved part meets the surface if four fifths of it miss by less than this (tolerances, and the floor).
-MET = 0.3
+MET = 0.2
 # Normals that agree (cosine).
 AGREE = 0.7
 # Ridge: what no normal sees is not moved.
@@ -41,7 +42,7 @@ def displacement(judge: Judge, motion: Isometry, share: float) -> float:
     miss = miss_distances(cloud, motion)
     astray = np.flatnonzero(miss > np.hypot(ASTRAY * unit, judge.floor.p97 * judge.diagonal))
     moved = motion.apply(cloud.points[astray])
-    part = _parts(moved, LINK * cloud.spacing)
+    part = _parts(moved, LINK * cloud.spacing, max(PART, int(PART_SHARE * len(cloud.points))))
     if not len(part) or part.max() < 0:
         return 0.0
     astray, moved, part = astray[part >= 0], moved[part >= 0], part[part >= 0]
@@ -58,17 +59,17 @@ def displacement(judge: Judge, motion: Isometry, share: float) -> float:
     return float(far[order[enough[0]]]) if len(enough) else 0.0
 
 
-def _parts(points: Array, link: float) -> Index:
-    """Number of the part [N] that each point belongs to, -1 for points in no part."""
+def _parts(points: Array, link: float, least: int) -> Index:
+    """Number of the part [N] that each point belongs to, -1 for points in no part of at least so many."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    if len(points) < PART:
+    if len(points) < least:
         return np.full(len(points), -1)
     i, j = cKDTree(points).query_pairs(link, output_type="ndarray").T
     _, label = connected_components(coo_matrix((np.ones(len(i)), (i, j)), shape=(len(points), len(points))))
-    large = np.bincount(label) >= PART
+    large = np.bincount(label) >= least
     number = np.where(large, np.cumsum(large) - 1, -1)
     return np.asarray(number[label])
 

@@ -110,11 +110,18 @@ def _surface(measured: Measured, tolerance: float, rng: np.random.Generator) -> 
     filled = tree is not None and normals is None and fills_volume(local, tree, np.random.default_rng(0))
     cloud = _volume(local, labels, rng) if filled else planes(LOCAL_PLANES)
     diagonal = tight_diagonal(cloud.points)
-    floor = None if exact or filled or len(local) > LOCAL_PLANES else _sparse_floor(local, labels, diagonal, rng)
+    floor = None if exact or filled or len(local) > LOCAL_PLANES else _split(local, labels, diagonal, rng)
+    judge = make_judge(cloud, diagonal, tolerance, floor)
 
     @cache
     def closer() -> Judge:
         return make_judge(cloud if filled else planes(CLOSER_PLANES), diagonal, tolerance, floor)
+
+    @cache
+    def halves() -> Deviation:
+        if exact or filled or floor is not None:
+            return judge.floor
+        return judge.floor.at_least(_split(local, labels, diagonal, np.random.default_rng(0)))
 
     return Evidence(
         moments=moments,
@@ -122,16 +129,17 @@ def _surface(measured: Measured, tolerance: float, rng: np.random.Generator) -> 
         tuples=classify(measured.vectors),
         points=local,
         weights=weights / weights.sum(),
-        judge=make_judge(cloud, diagonal, tolerance, floor),
+        judge=judge,
         closer=closer,
+        halves=halves,
     )
 
 
-def _sparse_floor(points: Array, labels: Index | None, diagonal: float, rng: np.random.Generator) -> Deviation:
-    """What two halves of a sparse cloud show against one another."""
+def _split(points: Array, labels: Index | None, diagonal: float, rng: np.random.Generator) -> Deviation:
+    """What two halves of a cloud show against one another."""
     order = rng.permutation(len(points))
     halves = [
-        local_planes(points[half], len(half), rng, labels=None if labels is None else labels[half])
+        local_planes(points[half], LOCAL_PLANES, rng, labels=None if labels is None else labels[half])
         for half in (np.sort(order[::2]), np.sort(order[1::2]))
     ]
     return split_floor(halves[0], halves[1], diagonal)
@@ -156,6 +164,7 @@ def _few_points(measured: Measured, tolerance: float) -> Evidence:
         weights=weights / weights.sum(),
         judge=judge,
         closer=lambda: judge,
+        halves=lambda: judge.floor,
     )
 
 

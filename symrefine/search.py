@@ -17,7 +17,7 @@ from symrefine.matching import ROBUST
 from symrefine.moments import Moments
 from symrefine.refine import Framed, Iterate, mirror_bundle, refine, single_plane
 from symrefine.spectrum import axis_misses, half_sphere, local_minima, mirror_candidates, whitened
-from symrefine.verify import Judge, Verdict
+from symrefine.verify import Deviation, Judge, Verdict
 
 # Turns that no finite fold below 36 shares; a surface of revolution survives them all.
 IRRATIONAL_TURNS = 2.0 * np.pi * np.array([0.0823, 0.1381966, 0.2360680, 0.4270510])
@@ -41,9 +41,9 @@ AXIS_HOPELESS = 0.15
 CLOSE = (0.5, 1.4)
 # Miss from which on it is asked whether parts stand out of place (of a volume only the outline shows): a detail that
 # holds this share of the surface may be shifted by so many tolerances. The buttons and connectors of a real camera are
-# at 1.1, parts shifted by 3 % of the diagonal at 1.3.
+# at 1.23 at most, parts shifted by 3 % of the diagonal at 1.47 at least.
 SUSPECT = {"surface": 0.5, "volume": 0.3, "atoms": 1.0}
-SHIFTED_SHARE, SHIFT_LIMIT = 0.009, 1.2
+SHIFTED_SHARE, SHIFT_LIMIT = 0.009, 1.3
 # A miss below this share of the limits is no compromise between parts.
 SURE = 0.5
 # Gate (spacings) of a refinement held to what agrees.
@@ -62,7 +62,11 @@ ROUND_FOLD = 10**6
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Evidence:
-    """What a search may use: moments, the class of the n-tuples, points, a judge with its cloud, and a closer judge."""
+    """What a search may use: moments, the class of the n-tuples, points, a judge with its cloud, and a closer judge.
+
+    `halves` tells what independent samples of the same surface would show against one another, if that is more than the
+    cloud shows against itself.
+    """
 
     moments: Moments
     harmonics: dict[int, Array]
@@ -71,6 +75,7 @@ class Evidence:
     weights: Array
     judge: Judge
     closer: Callable[[], Judge]
+    halves: Callable[[], Deviation]
 
     def verdict(self, motions: Sequence[Isometry], *, stride: int = 1) -> Verdict:
         """Verdict on operations together; a close call is judged again on a denser cloud, and asked for parts that
@@ -80,8 +85,7 @@ class Evidence:
             verdict = self.closer()(motions, stride=stride)
         if not SUSPECT[self.judge.cloud.body] < verdict.excess <= 1.0:
             return verdict
-        shifted = max(displacement(self.closer(), m, SHIFTED_SHARE) for m in motions) / SHIFT_LIMIT
-        return replace(verdict, excess=max(verdict.excess, shifted), detail=max(verdict.detail, shifted))
+        return verdict.with_shifted(max(displacement(self.closer(), m, SHIFTED_SHARE) for m in motions) / SHIFT_LIMIT)
 
     def stride(self, sources: int) -> int:
         """Stride that leaves about `sources` local planes."""

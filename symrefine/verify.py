@@ -5,7 +5,7 @@ distance is taken between denoised surfaces: each local plane, moved, against th
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -42,6 +42,10 @@ class Deviation:
     p994: float
     max: float
 
+    def at_least(self, other: "Deviation") -> "Deviation":
+        """The larger of the two in every statistic."""
+        return Deviation(**{f.name: max(getattr(self, f.name), getattr(other, f.name)) for f in fields(Deviation)})
+
     def over_limits(self, tolerance: float, floor: "Deviation") -> tuple[float, ...]:
         """Each statistic beyond `floor`, which is what the cloud shows against itself, over its limit; 0 at least.
 
@@ -65,6 +69,7 @@ class Verdict:
         bulk: the same from mean and 95th percentile alone: how well the object as a whole, but for details, agrees.
         detail: the same from all but the farthest percentile: with the details, but for specks.
         core: 80th percentile of the miss over the tolerance: how well most of it agrees.
+        shifted: how far parts stand out of place, over the limit for that; `excess` and `detail` count it in.
     """
 
     deviation: Deviation
@@ -72,6 +77,11 @@ class Verdict:
     bulk: float
     detail: float
     core: float
+    shifted: float = 0.0
+
+    def with_shifted(self, shifted: float) -> "Verdict":
+        """The same where parts stand out of place."""
+        return replace(self, excess=max(self.excess, shifted), detail=max(self.detail, shifted), shifted=shifted)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -101,6 +111,12 @@ class Judge:
             deviation=worst, excess=max(ratios), bulk=max(ratios[:2]), detail=max(ratios[: len(LIMITS) - 1]), core=core
         )
 
+    def beyond(self, verdict: Verdict, floor: Deviation) -> float:
+        """What would be left of an excess if the cloud showed this `floor` against itself."""
+        if self.cloud.body != "surface":
+            return verdict.excess
+        return min(verdict.excess, max(verdict.shifted, *verdict.deviation.over_limits(self.tolerance, floor)))
+
 
 def make_judge(cloud: LocalPlanes, diagonal: float, tolerance: float, floor: Deviation | None = None) -> Judge:
     """A judge that knows what the cloud shows against itself, unless it is told that `floor`."""
@@ -116,8 +132,8 @@ def make_judge(cloud: LocalPlanes, diagonal: float, tolerance: float, floor: Dev
 def split_floor(one: LocalPlanes, other: LocalPlanes, diagonal: float) -> Deviation:
     """What a cloud shows against itself, from two halves of it with planes of their own.
 
-    Where every point takes part in the planes of its neighbours, as in a sparse cloud, comparing it with those planes
-    says half of what independent points would show; halves say more than the whole would, by their wider spacing.
+    Where the same points take part in the planes of neighbours, as in a sparse or noisy cloud, comparing these planes
+    says less than independent points would show; halves say more than the whole would, by their wider spacing.
     """
     across = [disc_distances(a, b.points, b.labels) for a, b in ((one, other), (other, one))]
     return _summary(HALF_SPACING * np.concatenate(across) / diagonal)
