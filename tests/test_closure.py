@@ -10,7 +10,6 @@ import pytest
 from experiments.shapes import box, join, table
 from symrefine.axis import TupleClass
 from symrefine.closure import (
-    MAX_OPERATIONS,
     NEAR,
     Generators,
     apart,
@@ -26,6 +25,7 @@ from symrefine.gather import gather, measure
 from symrefine.geometry import Plane, householder, line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.groups import PointGroup, point_group
 from symrefine.search import Mirror, Turn
+from symrefine.shape import Shape
 from symrefine.verify import TOLERANCE, Deviation, Verdict
 
 NOTHING = Deviation(mean=0, p80=0, p95=0, p97=0, p99=0, p994=0, max=0)
@@ -171,12 +171,12 @@ def test_directions_near_an_earlier_one_are_left_out_whatever_their_sign():
 def test_what_is_refined_together_generates_the_group_about_its_centre(name):
     group = PointGroup(name=name, frame=random_orthogonal(np.random.default_rng(10)))
     state = joint(group, POINT)
-    assert 0 < len(state.motions) <= MAX_OPERATIONS
+    assert 0 < len(state.motions) <= 9
     for motion in state.motions:
         assert min(np.abs(motion.matrix - g).max() for g in group.operations()) < 1e-9
         np.testing.assert_allclose(motion.apply(POINT[None])[0], POINT, atol=1e-12)
     assert len({np.round(m.matrix, 6).tobytes() for m in state.motions}) == len(state.motions)
-    if len(group.mirrors()) <= MAX_OPERATIONS:
+    if len(group.mirrors()) <= 9:
         for n in group.mirrors():
             assert min(np.abs(householder(n) - m.matrix).max() for m in state.motions) < 1e-9
 
@@ -372,6 +372,16 @@ def test_the_inversion_of_a_cube_is_added_to_what_lacks_it(name, expected):
     frame = np.eye(3) if name != "D3" else np.stack([unit([1, -1, 0]), unit([1, 1, -2]), unit([1, 1, 1])])
     e = evidence("cube")
     found = with_improper(e, PointGroup(name=name, frame=frame), [verdict(0.1)], np.zeros(3), np.zeros(0, dtype=int))
+    assert found.name == expected
+
+
+@pytest.mark.parametrize(("name", "expected"), [("C2", "S4"), ("C3", "S6"), ("D2", "D2d"), ("D3", "D3d"), ("C4", "C4")])
+def test_the_rotoreflection_of_the_main_axis_is_added(name, expected):
+    """Points that have it, asked with the rotations alone."""
+    images = np.einsum("kij,pj->kpi", point_group(expected).operations(), [(1.0, 0.35, 0.2), (0.3, 0.9, 0.6)])
+    e = gather(measure(Shape(points=images.reshape(-1, 3))), TOLERANCE, np.random.default_rng(0))
+    center = -e.moments.center / e.moments.scale
+    found = with_improper(e, PointGroup(name=name), [verdict(0.0)], center, np.zeros(0, dtype=int))
     assert found.name == expected
 
 

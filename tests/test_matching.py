@@ -5,11 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
+from scipy.stats import norm
 
 from experiments.shapes import bottle, box, join, mug, sample, table
 from symrefine.geometry import Isometry, Plane, random_orthogonal, rotation, unit
 from symrefine.matching import (
+    ROBUST,
     choose_neighbours,
+    fills_volume,
     isolated_points,
     local_planes,
     match,
@@ -305,3 +308,98 @@ def test_equations_of_local_planes_are_one_for_each_pair():
     np.testing.assert_array_equal(targets, cloud.points[pairs.targets])
     np.testing.assert_array_equal(directions, cloud.normals[pairs.targets])
     np.testing.assert_array_equal(weights, pairs.weights)
+
+
+# What a neighbourhood says
+
+
+def sheet(rng, count, sigma=0.0):
+    return np.column_stack([rng.uniform(-1, 1, (count, 2)), sigma * rng.standard_normal(count)])
+
+
+def test_the_smallest_neighbourhood_that_looks_like_a_plane_is_large_enough():
+    """Larger ones would look flatter still, under noise of a tenth of the spacing."""
+    rng = np.random.default_rng(22)
+    points = sheet(rng, 6000, 0.0025)
+    assert choose_neighbours(points, cKDTree(points), rng) == 12
+
+
+def test_given_normals_say_across_what_the_thickness_is():
+    rng = np.random.default_rng(23)
+    points, tilt = sheet(rng, 4000), np.radians(30.0)
+    normals = np.broadcast_to([np.sin(tilt), 0, np.cos(tilt)], points.shape)
+    flat, tilted = (
+        local_planes(points, 400, rng, normals=n) for n in (np.broadcast_to([0.0, 0, 1], points.shape), normals)
+    )
+    assert flat.thickness.max() < 1e-9
+    # Neighbours spread alike along both sides of a sheet: across a plane tilted by t, by sin t of that.
+    width = tilted.thickness / tilted.flatness
+    assert np.median(tilted.thickness / width) == pytest.approx(np.sin(tilt), rel=0.2)
+
+
+def test_points_are_chosen_in_proportion_to_their_weights():
+    rng = np.random.default_rng(24)
+    points = sheet(rng, 8000)
+    weights = np.where(points[:, 0] > 0, 4.0, 1.0)
+    even, uneven = (local_planes(points, 1000, rng, weights=w) for w in (None, weights))
+    assert np.mean(even.points[:, 0] > 0) == pytest.approx(0.5, abs=0.06)
+    assert np.mean(uneven.points[:, 0] > 0) == pytest.approx(0.8, abs=0.06)
+
+
+BODIES = {
+    "noisy sheet": (lambda rng: sheet(rng, 6000, 0.02), False),
+    "noisy sphere": (lambda rng: unit(rng.standard_normal((6000, 3))) + 0.03 * rng.standard_normal((6000, 3)), False),
+    "clean sphere": (lambda rng: unit(rng.standard_normal((6000, 3))), False),
+    "cloud": (lambda rng: rng.standard_normal((6000, 3)), True),
+    "cube": (lambda rng: rng.random((6000, 3)), True),
+}
+
+
+@pytest.mark.parametrize(("make", "filled"), BODIES.values(), ids=BODIES)
+def test_points_of_a_volume_are_told_from_those_of_a_surface(make, filled):
+    """Under noise of a spacing and more only wide neighbourhoods tell."""
+    for seed in (1, 2):
+        points = normalised(make(np.random.default_rng(seed)))
+        assert fills_volume(points, cKDTree(points), np.random.default_rng(seed)) == filled
+
+
+# Classes and weights
+
+
+@pytest.mark.parametrize("isolated", [True, False])
+def test_points_meet_points_of_their_own_class_only(isolated):
+    rng = np.random.default_rng(25)
+    points, labels = sheet(rng, 600), rng.integers(0, 3, 600)
+    normals = np.broadcast_to([0.0, 0, 1], points.shape)
+    if isolated:
+        cloud = isolated_points(points, labels)
+    else:
+        cloud = local_planes(points, 600, rng, normals=normals, labels=labels, exact=True)
+    motion = mirror([1, 0, 0])
+    pairs = match(cloud, motion, 0.1)
+    assert pairs.sources.size > 500
+    np.testing.assert_array_equal(cloud.labels[pairs.targets], cloud.labels[pairs.sources])
+    # Each meets the nearest of its class, nearer ones of others or not.
+    images = motion.apply(cloud.points[pairs.sources])
+    between = np.linalg.norm(images[:, None] - cloud.points, axis=2)
+    between[cloud.labels[pairs.sources][:, None] != cloud.labels] = np.inf
+    np.testing.assert_array_equal(pairs.targets, between.argmin(axis=1))
+
+
+@pytest.mark.parametrize("robust", [1.5, 4.4])
+def test_a_residual_at_the_scale_counts_a_quarter(robust):
+    """Geman-McClure: (s^2 / (s^2 + e^2))^2 with s = robust * median |e|; the unit of the residuals does not matter."""
+    half = 12.0 * np.stack(np.meshgrid([4, 5, 6, 7, 8], [0, 1, 2, 3], [0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
+    # Images one apart from their counterparts, but for two of the upper layer: at the scale, and at twice that.
+    misses = np.ones(40)
+    misses[[1, 3]] = robust, 2.0 * robust
+    for size in (0.9, 1.1):
+        other = half * [-1, 1, 1] + size * misses[:, None] * [0, 0, 1]
+        pairs = match(isolated_points(np.concatenate([half, other])), mirror([1, 0, 0]), 0.0, robust=robust)
+        np.testing.assert_array_equal(pairs.targets[:40], np.arange(40) + 40)
+        np.testing.assert_allclose(pairs.weights[[1, 3]], [0.25, 0.04], rtol=1e-9)
+        np.testing.assert_allclose(pairs.weights[5], (1 / (1 + robust**-2)) ** 2, rtol=1e-9)
+
+
+def test_the_robust_scale_is_three_standard_deviations_of_gaussian_noise():
+    assert ROBUST * norm.ppf(0.75) == pytest.approx(3.0, rel=0.02)

@@ -18,7 +18,7 @@ from symrefine.geometry import (
 from symrefine.matching import isolated_points, local_planes
 from symrefine.moments import shape_moments
 from symrefine.quadrature import sample_surface
-from symrefine.refine import Framed, mirror_bundle, refine, single_plane
+from symrefine.refine import LONGEST, SETTLED, WITHIN_NOISE, Framed, _remaining, mirror_bundle, refine, single_plane
 
 BOX = join([box((0, 0, 0), (1, 0.7, 0.4))])
 ORIGIN = np.zeros(3)
@@ -246,6 +246,67 @@ def test_theta_of_each_plane_is_the_turn_it_asks_for(off_deg):
     # The first matches already ask for most of the way back; those of the last nothing any more.
     np.testing.assert_allclose(np.degrees(history[1].theta_rad), -off_deg, atol=0.4 * abs(off_deg))
     np.testing.assert_allclose(np.degrees(history[-1].theta_rad), 0.0, atol=0.05)
+
+
+# How far a step goes, and when it was the last
+
+
+@pytest.mark.parametrize("ratio", [0.1, 0.3, 0.5, 0.65])
+def test_shrinking_steps_are_extrapolated_to_their_sum(ratio):
+    """Steps x, q x, q^2 x, ... of which the second was found: what is left is q x / (1 - q)."""
+    x = np.array([0.01, -0.02, 0.03, 0.0, 0.01, 0.02])
+    assert _remaining(ratio * x, x) == pytest.approx(1.0 / (1.0 - ratio))
+    assert _remaining(ratio * x, 100.0 * ratio * x) < 1.02
+
+
+def test_steps_are_taken_as_they_are_where_they_turn_or_do_not_shrink():
+    x, across = np.array([1.0, 0, 0, 0, 0, 0]), np.array([0.0, 1, 0, 0, 0, 0])
+    assert _remaining(x, np.zeros(6)) == _remaining(np.zeros(6), x) == 1.0  # the first one, and none
+    for other in (across, -0.5 * x, 0.4 * across + 0.3 * x):
+        assert _remaining(other, x) == 1.0
+    for ratio in (0.96, 1.0, 3.0):
+        assert _remaining(ratio * x, x) == 1.0
+    assert _remaining(0.9 * x, x) == pytest.approx(1.0 / (1.0 - LONGEST))
+
+
+def test_the_last_step_is_small_or_within_the_noise():
+    """A refinement goes on until a step is negligible beside what the noise leaves uncertain, and no longer."""
+    steps = []
+    for seed in range(4):
+        history, _ = run("table", seed, noise=0.01, count=4000)
+        uncertain = np.sqrt(np.diag(history[-1].covariance)).max()
+        assert history[-1].step <= max(SETTLED, WITHIN_NOISE * uncertain) / (1.0 - LONGEST)
+        steps.append(history[-1].step)
+    # Noise ends most of them long before the step is as small as exact points would take.
+    assert np.median(steps) > SETTLED
+
+
+def test_the_gate_narrows_with_the_steps():
+    """No pair is farther apart than the spacing and what the last step may still move a point by, thrice."""
+    shape, operations = CASES["table"]
+    cloud, frame, rng = placed(shape, 14, 6000, 0.005)
+    history = tuple(refine(cloud, operations(tilted(frame, 3, rng)), start_error_rad=0.2))
+    assert len(history) > 3
+    widest = []
+    for before, now in pairwise(history):
+        reach = 3.0 * (cloud.spacing + min(0.2, 4.0 * before.step))
+        for motion, pairs in zip(before.state.motions, now.pairs, strict=True):
+            moved = motion.apply(cloud.points[pairs.sources])
+            apart = np.linalg.norm(moved - cloud.points[pairs.targets], axis=1)
+            assert apart.max() < reach * (1 + 1e-9)
+        widest.append(reach)
+    assert widest[-1] < 0.5 * widest[0]
+
+
+def test_the_cost_is_a_mean_over_the_pairs():
+    """Fewer sources or more make no difference but chance."""
+    shape, operations = CASES["table"]
+    cloud, frame, rng = placed(shape, 15, 8000, 0.01)
+    start = operations(tilted(frame, 1, rng))
+    costs = [tuple(refine(cloud, start, stride=s))[-1].cost for s in (1, 4)]
+    assert costs[1] == pytest.approx(costs[0], rel=0.2)
+    # Two noisy planes apart: of the order of the square of their thickness, which neighbours share.
+    assert 0.02 < costs[0] / np.median(cloud.thickness) ** 2 < 4
 
 
 # The covariance

@@ -16,6 +16,7 @@ from symrefine.refine import single_plane
 from symrefine.search import (
     CORE_NOISE,
     Mirror,
+    _polished,
     axis_bundle,
     axis_directions,
     closer_core,
@@ -141,6 +142,23 @@ def test_narrow_gates_keep_a_part_out_of_place_from_pulling():
     assert moved[1] < 0.2 * moved[0]
 
 
+def test_what_misses_by_more_than_most_hardly_counts_in_a_close_fit():
+    """Noise has no gap between what agrees and what does not: the weights fall from the median residual on."""
+    points = sample(BOX, 8000, 0.01, np.random.default_rng(5))
+    e = evidence_of(Shape(points=points))
+    start = single_plane(Plane(normal=X, offset=0.0))
+    falls = []
+    for history in (refined(e, start), refined_closely(e, start, sources=10**6)):
+        cloud, pairs, motion = e.judge.cloud, history[-1].pairs[0], history[-2].state.motions[0]
+        between = motion.apply(cloud.points[pairs.sources]) - cloud.points[pairs.targets]
+        error = np.abs(np.einsum("ij,ij->i", between, cloud.normals[pairs.targets]))
+        typical = np.median(error)
+        near, far = error < 0.3 * typical, (error > 3.0 * typical) & (error < 5.0 * typical)
+        assert far.sum() > 20
+        falls.append(pairs.weights[far].mean() / pairs.weights[near].mean())
+    assert falls[1] < 0.15 < falls[0]
+
+
 @pytest.mark.parametrize("off", [0.0, 0.3])
 def test_narrow_gates_end_where_they_should(off):
     """A start within the gate, half a spacing, ends at the truth."""
@@ -248,6 +266,20 @@ def test_a_mirror_of_a_shape_in_any_pose():
     assert line_angle_rad(best.plane.normal, matrix[:, 1]) < np.radians(3.0)
 
 
+def test_moments_alone_put_the_mirror_of_a_mug_where_it_is():
+    e = evidence("mug")
+    plane = _polished(e, unit([0.08, 1.0, -0.05]))
+    assert line_angle_rad(plane.normal, [0, 1, 0]) < np.radians(0.05)
+    assert plane.offset == 0.0
+
+
+def test_coarse_looks_judge_every_candidate_once():
+    found = list(mirrors(evidence("box"), np.zeros((0, 3)), thorough=False))
+    assert all(m.iterations == 0 for m in found)
+    for n in np.eye(3):
+        assert min(line_angle_rad(m.plane.normal, n) for m in found) < np.radians(3.0)
+
+
 # Turns
 
 
@@ -265,6 +297,11 @@ def test_the_highest_order_about_an_axis(name, direction, order):
 @pytest.mark.parametrize(("name", "direction"), [("stool5", [0.6, 0.4, 1]), ("box", [1, 1, 0]), ("mug", [0, 0, 1])])
 def test_no_turn_where_there_is_no_axis(name, direction):
     assert turns_about(evidence(name), unit(direction), ORIGIN) is None
+
+
+def test_a_round_axis_shows_no_fold_but_keeps_turns():
+    found = turns_about(evidence("bottle"), Z, ORIGIN)
+    assert found.verdict.excess < 0.5
 
 
 @pytest.mark.parametrize("fold", [2, 3, 4, 5, 6, 7])

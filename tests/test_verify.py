@@ -8,7 +8,17 @@ from symrefine.geometry import Isometry, Plane, householder, random_orthogonal, 
 from symrefine.matching import isolated_points, local_planes
 from symrefine.moments import shape_moments
 from symrefine.quadrature import sample_surface
-from symrefine.verify import TOLERANCE, Deviation, confidence, disc_distances, make_judge, miss_distances
+from symrefine.verify import (
+    LIMITS,
+    TOLERANCE,
+    Deviation,
+    confidence,
+    disc_distances,
+    make_judge,
+    miss_distances,
+    split_floor,
+    spread_distance,
+)
 
 Z = np.array([0.0, 0, 1])
 
@@ -150,6 +160,132 @@ def test_what_the_cloud_shows_against_itself_raises_the_limits():
     assert len(without) == len(raised)
     assert all(b < a for a, b in zip(without, raised, strict=True))
     assert all(r == 0 for r in nothing.over_limits(0.02, own))
+
+
+def test_noise_and_miss_add_up_in_squares():
+    """A miss m under noise s shows as the root of m^2 + s^2; what is over the limits is m alone."""
+    names, rng = ("mean", "p80", "p95", "p97", "p99", "p994", "max"), np.random.default_rng(8)
+    miss, noise = rng.uniform(0.001, 0.05, (2, 7))
+    shown = Deviation(**dict(zip(names, np.hypot(miss, noise), strict=True)))
+    floor = Deviation(**dict(zip(names, noise, strict=True)))
+    expected = miss[[0, 2, 3, 4, 5]] / (0.02 * np.array(LIMITS))
+    np.testing.assert_allclose(shown.over_limits(0.02, floor), expected, rtol=1e-9)
+
+
+def lifted(share, height):
+    """A judge of an exact sheet of which a share stands higher, by a fraction of the diagonal, and the shift up."""
+    flat = sheet(10000)
+    raised = flat.points.copy()
+    diagonal = tight_diagonal(raised)
+    some = np.random.default_rng(9).permutation(len(raised))[: round(share * len(raised))]
+    raised[some, 2] += height * diagonal
+    cloud = local_planes(raised, len(raised), np.random.default_rng(0), normals=flat.normals, exact=True)
+    nothing = Deviation(mean=0, p80=0, p95=0, p97=0, p99=0, p994=0, max=0)
+    return make_judge(cloud, diagonal, TOLERANCE, nothing)
+
+
+@pytest.mark.parametrize(
+    ("share", "bulk", "detail", "excess"),
+    [(0.08, True, True, True), (0.04, False, True, True), (0.02, False, True, True), (0.008, False, False, True)]
+    + [(0.003, False, False, False)],
+)
+def test_what_stands_out_shows_in_bulk_detail_or_specks_by_its_share(share, bulk, detail, excess):
+    """Isolated points of a sheet that the mirror of the sheet turns to its other side, 4.5 % of the diagonal away."""
+    judge = lifted(share, 0.045)
+    found = judge([about(householder(Z))])
+    assert (found.bulk > 1.0, found.detail > 1.0, found.excess > 1.0) == (bulk, detail, excess)
+    assert found.bulk <= found.detail <= found.excess
+    assert found.core < 0.01
+
+
+@pytest.mark.parametrize("shift", [0.002, 0.006])
+def test_where_all_miss_alike_the_mean_decides(shift):
+    judge = lifted(0.0, 0.0)
+    up = Isometry(matrix=np.eye(3), shift=shift * judge.diagonal * Z)
+    found = judge([up])
+    assert found.excess == found.bulk == pytest.approx(shift / (LIMITS[0] * TOLERANCE), rel=1e-6)
+    assert found.core == pytest.approx(shift / TOLERANCE, rel=1e-6)
+
+
+def test_the_core_is_beyond_what_the_cloud_shows_against_itself():
+    judge = judge_of(table(), 0.01)
+    motions = [mirror(0.0)]
+    found = judge(motions)
+    own = make_judge(judge.cloud, judge.diagonal, TOLERANCE, found.deviation)(motions)
+    assert own.core == own.excess == 0.0
+    none = make_judge(
+        judge.cloud, judge.diagonal, TOLERANCE, Deviation(mean=0, p80=0, p95=0, p97=0, p99=0, p994=0, max=0)
+    )
+    assert none(motions).core == pytest.approx(found.deviation.p80 / TOLERANCE)
+    assert 0.0 < found.core < none(motions).core
+
+
+def test_a_noisy_cloud_misses_itself_and_an_exact_sheet_does_not():
+    assert make_judge(sheet(), 3.0, TOLERANCE).floor.max < 1e-12
+    quiet, noisy = (judge_of(table(), noise).floor for noise in (0.0, 0.02))
+    assert noisy.p95 > 2 * quiet.p95 > 0
+
+
+@pytest.mark.parametrize("noise", [0.01, 0.03])
+def test_halves_of_a_sparse_cloud_say_what_another_sample_would(noise):
+    """Another sample as dense as the whole misses it by about what the halves promise."""
+    rng = np.random.default_rng(10)
+    points, another = (p / np.linalg.norm(p, axis=1, keepdims=True) for p in rng.standard_normal((2, 1600, 3)))
+    points, another = (p + noise * rng.standard_normal(p.shape) for p in (points, another))
+    halves = [local_planes(p, len(p), rng) for p in (points[::2], points[1::2])]
+    whole, other = (local_planes(p, len(p), rng) for p in (points, another))
+    promised = split_floor(halves[0], halves[1], 3.0)
+    found = disc_distances(whole, other.points) / 3.0
+    # Both are estimates: neighbouring planes of one sample share their points, those of two samples do not.
+    assert 0.6 < promised.mean / found.mean() < 1.6
+    assert 0.6 < promised.p95 / np.quantile(found, 0.95) < 1.6
+    swapped = split_floor(halves[1], halves[0], 3.0)
+    assert (promised.mean, promised.p99) == pytest.approx((swapped.mean, swapped.p99))
+
+
+def test_the_spread_of_a_body_tells_turns_that_its_outline_does_not():
+    """Covariances with common axes: the distance of the roots, sqrt(2) |a - b| for a quarter turn."""
+    rng = np.random.default_rng(11)
+    points = rng.standard_normal((4000, 3))
+    points -= points.mean(axis=0)
+    points = points @ np.linalg.inv(np.linalg.cholesky(np.cov(points.T))).T * [1.0, 0.6, 0.3]
+    turn = random_orthogonal(rng)
+    for r in (np.eye(3), turn):
+        quarter, half = (about(r @ rotation(Z, a) @ r.T) for a in (np.pi / 2, np.pi))
+        assert spread_distance(points @ r.T, quarter) == pytest.approx(np.sqrt(2) * 0.4, rel=1e-9)
+        assert spread_distance(points @ r.T, half) < 1e-6
+
+
+def test_of_a_volume_the_spread_counts():
+    rng = np.random.default_rng(12)
+    points = rng.standard_normal((6000, 3)) * [1.0, 0.8, 0.8]
+    cloud = isolated_points(points, body="volume")
+    judge = make_judge(cloud, tight_diagonal(points), TOLERANCE)
+    verdict = judge([about(rotation(Z, np.pi / 2))])
+    expected = np.sqrt(2) * 0.2 / judge.diagonal / (LIMITS[0] * TOLERANCE)
+    assert verdict.excess == pytest.approx(expected, rel=0.15)
+    assert verdict.bulk == verdict.excess > 2 * judge([about(rotation(Z, np.pi))]).bulk
+
+
+def test_only_the_discs_of_its_own_class_count():
+    """Two sheets of two classes, a query between: the distance to its own, however near the other is."""
+    flat = sheet()
+    points = np.concatenate([flat.points, flat.points + [0, 0, 0.5]])
+    labels, normals = np.repeat([0, 1], len(flat.points)), np.tile(Z, (2 * len(flat.points), 1))
+    cloud = local_planes(points, len(points), np.random.default_rng(0), normals=normals, labels=labels, exact=True)
+    queries = np.array([[0.1, 0.2, 0.1]] * 2)
+    np.testing.assert_allclose(disc_distances(cloud, queries, np.array([0, 1])), [0.1, 0.4], atol=1e-9)
+
+
+def test_the_only_point_of_its_class_has_nothing_to_miss():
+    flat = sheet()
+    points, labels = flat.points.copy(), np.zeros(len(flat.points), dtype=int)
+    points[17, 2], labels[17] = 1.0, 1
+    cloud = local_planes(points, len(points), np.random.default_rng(0), normals=flat.normals, labels=labels, exact=True)
+    found = disc_distances(cloud, points, labels, skip_self=True)
+    assert found[17] == 0.0
+    assert np.isfinite(found).all()
+    assert make_judge(cloud, 3.0, TOLERANCE).floor.max < 1e-9
 
 
 def test_confidence_falls_with_the_miss():
