@@ -8,12 +8,23 @@ import numpy as np
 import pytest
 
 from experiments.shapes import bottle, box, join, revolve, stool
-from symrefine.assemble import _best_bundle, _finish, _fold_is_seen, _round, _unless_round, assemble
-from symrefine.closure import with_turns
+from symrefine.assemble import (
+    _best_bundle,
+    _finish,
+    _fold_is_seen,
+    _from_parts,
+    _group_of,
+    _round,
+    _unless_round,
+    assemble,
+)
+from symrefine.axis import TupleClass
+from symrefine.closure import Generators, with_turns
 from symrefine.elements import Element, elements_of
 from symrefine.gather import gather, measure
-from symrefine.geometry import line_angle_rad, random_orthogonal, rotation, unit
+from symrefine.geometry import Plane, line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.groups import PointGroup
+from symrefine.search import Mirror
 from symrefine.shape import Shape
 from symrefine.verify import TOLERANCE, Deviation, Verdict
 
@@ -32,6 +43,23 @@ def astray():
     return join([seat, *(leg(j, 6, 0.05 if j == 0 else 0.0) for j in range(6))])
 
 
+def studs():
+    """Eight thin rods on a disc, each one per cent of the surface, the first farther out by twice the tolerance."""
+    disc = revolve([(0, 0), (0.4, 0), (0.4, 0.04), (0, 0.04)], 96)
+    rods = []
+    for j in range(8):
+        points, faces = revolve([(0, -0.2), (0.012, -0.2), (0.012, 0), (0, 0)], 24)
+        points = points + [0.33 + (0.038 if j == 0 else 0.0), 0, 0]
+        rods.append((points @ rotation([0, 0, 1], 2 * np.pi * j / 8).T, faces))
+    return join([disc, *rods])
+
+
+def stray():
+    """Two plates on a block, one of them farther out: most keeps the mirror across x, the plates do not."""
+    plates = [box((x, 0, 0), (0.1, 0.45, 0.45)) for x in (0.75, -0.81)]
+    return join([box((0, 0, 0), (1, 0.8, 0.8)), *plates])
+
+
 def sphere():
     t = np.linspace(0, np.pi, 61)
     return join([revolve(np.stack([np.sin(t), -np.cos(t)], axis=1), 120)])
@@ -43,6 +71,8 @@ MADE = {
     "cylinder": lambda: join([revolve([(0, -0.6), (0.4, -0.6), (0.4, 0.6), (0, 0.6)], 120)]),
     "sphere": sphere,
     "astray": astray,
+    "studs": studs,
+    "stray": stray,
     "box": lambda: join([box((0, 0, 0), (3, 2, 1))]),
 }
 
@@ -141,6 +171,91 @@ def test_a_leg_out_of_place_leaves_the_mirror_through_it():
         < np.radians(3.0)
     ]  # fmt: skip
     assert len(named) >= 3
+
+
+def test_a_detail_that_every_operation_nearly_keeps_is_to_blame_all_the_same():
+    """Each mirror by itself holds; the one rod that misses under all of them but one is a part out of place."""
+    e = evidence("studs")
+    whole = _finish(e, group("C8v"), placed(e), (), [])
+    assert max(x.verdict.excess for x in whole.elements) <= 1.0
+    found = assemble(e)
+    assert found.group.name == "Cs"
+    assert line_angle_rad(found.group.mirrors()[0], MATRIX[:, 1]) < np.radians(1.0)
+    # The mirrors that held but for the rod are listed with what they miss by.
+    others = [MATRIX @ [-np.sin(np.pi * k / 8), np.cos(np.pi * k / 8), 0] for k in range(1, 8)]
+    turned_down = [x.direction for x in found.rejected if x.kind == "plane"]
+    assert sum(min(line_angle_rad(n, d) for d in turned_down) < np.radians(2.0) for n in others) >= 2
+
+
+# Where the closest fit and the candidates disagree
+
+
+def mirror_at(e, normal, bulk=0.1):
+    """A mirror of the object as it is made, through its centroid, said to miss by `bulk`."""
+    n = MATRIX @ unit(normal)
+    verdict = Verdict(deviation=NOTHING, excess=bulk, bulk=bulk, detail=bulk, core=0.0)
+    return Mirror(plane=Plane(normal=n, offset=float(n @ placed(e))), verdict=verdict)
+
+
+def test_candidates_that_do_not_hold_together_go_one_by_one(monkeypatch):
+    """Two mirrors of a box and two that only seemed to hold: the group of all four is turned down, the two named."""
+    e = evidence("box")
+    false = tuple(mirror_at(e, n, b) for n, b in (([1, 1, 0], 0.9), ([1, -1, 0], 0.8)))
+    held = Generators(mirrors=(mirror_at(e, [1, 0, 0]), mirror_at(e, [0, 1, 0]), *false))
+    several = (held, [], held.closed()[0])
+    assert several[2].name == "C4v"
+    monkeypatch.setattr("symrefine.assemble.mirror_group", lambda _: several)
+    monkeypatch.setattr("symrefine.assemble.with_turns", lambda _, mirrors, __: mirrors)
+    found = _from_parts(replace(e, tuples=replace(e.tuples, kind="plane")))
+    assert found.group.name == "C2v"
+    assert line_angle_rad(found.group.frame[2], MATRIX[:, 2]) < np.radians(0.5)
+    for m in false:
+        assert min(line_angle_rad(m.plane.normal, r.direction) for r in found.rejected) < 1e-9
+
+
+def test_an_axis_that_the_tuples_claim_by_chance_is_not_all_there_is():
+    """A box said to have an axis: its mirrors through it hold, and so does the one across."""
+    e = evidence("box")
+    claimed = TupleClass(
+        kind="axis", singular_values=[0.1, 0, 0], significance=[50.0, 0, 0], directions=MATRIX.T[[2, 0, 1]]
+    )
+    assert assemble(replace(e, tuples=claimed)).group.name == "D2h"
+
+
+def test_of_two_fits_that_both_miss_the_one_that_most_keeps_is_taken():
+    """The block agrees exactly where the refinement ends, and nowhere near where it starts."""
+    e = evidence("stray")
+    center = placed(e)
+    off = MATRIX @ unit([1.0, 0.012, -0.012])
+    verdict = Verdict(deviation=NOTHING, excess=0.9, bulk=0.9, detail=0.9, core=0.0)
+    held = Generators(mirrors=(Mirror(plane=Plane(normal=off, offset=float(off @ center)), verdict=verdict),))
+    start = held.closed()[0]
+    found = _group_of(replace(e, tuples=replace(e.tuples, kind="plane")), start, held, [], np.zeros(0, dtype=int))
+    assert max(x.verdict.excess for x in found.elements) > 1.0
+    assert line_angle_rad(found.group.mirrors()[0], MATRIX[:, 0]) < np.radians(0.2)
+    assert len(found.history) > 1
+
+
+def test_a_fit_that_strays_is_not_taken(monkeypatch):
+    """If the refinement ends elsewhere, the group stays where its elements were found."""
+    e = replace(evidence("box"), tuples=replace(evidence("box").tuples, kind="plane"))
+    held = Generators(mirrors=(mirror_at(e, [1, 0, 0]), mirror_at(e, [0, 1, 0])))
+
+    def strays(evidence, start, *, sources):
+        from symrefine.search import refined_closely
+
+        history = refined_closely(evidence, start, sources=sources)
+        turned = replace(history[-1].state, frame=history[-1].state.frame @ rotation([1, 2, 3], 0.3))
+        return (*history, replace(history[-1], state=turned))
+
+    monkeypatch.setattr("symrefine.assemble.refined_closely", strays)
+    found = _group_of(e, held.closed()[0], held, [], np.zeros(0, dtype=int))
+    assert all(x.verdict.excess < 0.5 for x in found.elements)
+    assert line_angle_rad(found.group.frame[2], MATRIX[:, 2]) < np.radians(0.5)
+    assert len(found.history) == 1
+
+
+# What is reported
 
 
 def test_what_belongs_to_the_group_is_not_listed_as_turned_down():

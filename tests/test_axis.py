@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from experiments.shapes import asymmetric, bottle, box, join, mug, sample, stool, table
-from symrefine.axis import azimuthal_spectrum, classify, fold_candidates, polish_frame, to_polar_axis_rotation
+from symrefine.axis import (
+    _weights,
+    azimuthal_spectrum,
+    classify,
+    fold_candidates,
+    fold_energy,
+    polish_frame,
+    to_polar_axis_rotation,
+)
 from symrefine.geometry import line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.harmonics import harmonic_moments
 from symrefine.moments import central_moments, shape_moments
@@ -13,6 +21,7 @@ from symrefine.quadrature import sample_surface
 from symrefine.shape import Shape
 
 ORDER = 8
+Z_AXIS = np.array([0.0, 0, 1])
 RANKS = {"vanish": 0, "axis": 1, "plane": 2, "none": 3}
 SHAPES = {
     "table": (table(), 1),
@@ -145,6 +154,70 @@ def test_a_bottle_has_no_fold(noise):
         assert fold_candidates(points - points.mean(axis=0), np.ones(8000), np.array([0.0, 0, 1])) == []
 
 
+def drum(density, height=1.0):
+    """Points of a cylinder about z, weighted by a density over azimuth and height."""
+    phi, h = (a.ravel() for a in np.meshgrid(2 * np.pi * np.arange(360) / 360, np.linspace(-height, height, 9)))
+    return np.stack([np.cos(phi), np.sin(phi), h], axis=1), density(phi, h)
+
+
+def phase_of(candidate):
+    """Azimuth of the first mirror plane, modulo pi / b."""
+    x, y, _ = candidate.frame[0]
+    return np.arctan2(y, x) % (np.pi / candidate.fold)
+
+
+@pytest.mark.parametrize("fold", [2, 3, 7, 12, 13, 18])
+def test_fold_and_phase_of_a_density(fold):
+    found = fold_candidates(*drum(lambda phi, _: 1 + 0.5 * np.cos(fold * (phi - 0.1))), Z_AXIS)
+    # Its divisors have no energy of their own, so no phase.
+    assert [f.fold for f in found] == [fold]
+    assert found[0].leak == pytest.approx(0.0, abs=1e-9)
+    assert phase_of(found[0]) == pytest.approx(0.1 % (np.pi / fold), abs=1e-9)
+
+
+def test_the_phase_is_that_of_the_radial_function_that_sees_the_fold():
+    """Of a density odd in the height the sum over all heights says nothing."""
+    found = fold_candidates(*drum(lambda phi, h: 1 + 0.5 * h * np.cos(4 * (phi - 0.2))), Z_AXIS)
+    assert found[0].fold == 4
+    assert phase_of(found[0]) == pytest.approx(0.2, abs=1e-9)
+
+
+def test_of_folds_that_leak_alike_the_largest_comes_first():
+    """A little energy at a divisor of the fold, noise, makes the divisor leak least."""
+    found = fold_candidates(*drum(lambda phi, _: 1 + 0.5 * np.cos(6 * phi) + 0.08 * np.cos(2 * phi)), Z_AXIS)
+    assert [f.fold for f in found] == [6, 2]
+    assert found[0].leak > found[1].leak
+
+
+def test_folds_that_leave_much_energy_out_are_none():
+    density = drum(lambda phi, _: 1 + 0.4 * np.cos(3 * phi) + 0.4 * np.cos(4 * phi))
+    assert fold_candidates(*density, Z_AXIS) == []
+
+
+def test_what_random_azimuths_may_show_is_no_fold():
+    """Energies of all radial functions together: 9 times what random azimuths would show may be chance, 90 may not."""
+    for energy, folds in ((9.0, []), (90.0, [4])):
+        # 3240 points at the amplitude a: a^2 / 4 of them for f = rho and rho^2, five ninths of that for rho h^2.
+        amplitude = np.sqrt(4 * (energy + 3) / (23 / 9 * 3240))
+        points, weights = drum(lambda phi, _, a=amplitude: 1 + a * np.cos(4 * phi))
+        assert fold_energy(points, weights, Z_AXIS, 4) == pytest.approx(energy, rel=0.1)
+        assert [f.fold for f in fold_candidates(points, weights, Z_AXIS)] == folds
+
+
+def test_the_energy_of_a_fold_is_that_over_random_azimuths():
+    """Of noise about nothing is left on average; of a fold its square grows with the number of points."""
+    rng = np.random.default_rng(10)
+    drawn = []
+    for _ in range(200):
+        phi = 2 * np.pi * rng.random(400)
+        points = np.stack([np.cos(phi), np.sin(phi), rng.standard_normal(400)], axis=1)
+        drawn.append(fold_energy(points, np.ones(400), Z_AXIS, 5))
+    # Four radial functions, each of exponential energy less one, cut at zero: 4 / e.
+    assert np.mean(drawn) == pytest.approx(4 / np.e, rel=0.3)
+    points, weights = drum(lambda phi, _: 1 + 0.5 * np.cos(5 * phi))
+    assert fold_energy(points, weights, Z_AXIS, 5) > 50 > 1e-9 > fold_energy(points, weights, Z_AXIS, 4)
+
+
 # The polish
 
 FOLDED = {"table": (table(), 4), "stool3": (stool(3), 3), "stool6": (stool(6), 6), "stool8": (stool(8), 8)}
@@ -187,3 +260,37 @@ def test_polish_improves_on_samples(shape, fold, noise):
 @pytest.mark.parametrize("n", [[0.36, -0.48, 0.8], [1e-7, 0, 1], [0, 0, 1], [0, 0, -1], [0, -1, 0]])
 def test_to_polar_axis_rotation_ends_at_the_pole(n):
     np.testing.assert_allclose(to_polar_axis_rotation(unit(n)) @ unit(n), [0, 0, 1], atol=1e-15)
+
+
+def test_no_step_of_the_polish_leaves_what_a_linear_model_says():
+    """From far off it goes there by small turns, each less than nine degrees."""
+    harmonics = harmonic_moments(shape_moments(table(), ORDER))
+    frame = rotation([1, 2, 0.5], np.radians(30)) @ np.eye(3)
+    for _ in range(6):
+        turned = polish_frame(harmonics, frame, 4, steps=1)
+        assert np.arccos(np.clip((np.trace(turned @ frame.T) - 1) / 2, -1, 1)) < np.radians(9.0)
+        frame = turned
+
+
+def test_coefficients_count_by_the_inverse_of_their_variance():
+    """Jackknife replicates of known spread; the weight of an order is one over its variance, whatever the frame."""
+    rng = np.random.default_rng(12)
+    parts, sigma = 4000, np.array([0.1, 0.01])
+    # A replicate leaves out one part of many: it deviates by the root of parts - 1 less than a sample of its own.
+    replicates = sigma[:, None] * rng.standard_normal((parts, 2, 7)) / np.sqrt(parts - 1)
+    found = _weights(np.concatenate([np.ones((1, 2, 7)), replicates]))
+    np.testing.assert_allclose(found[:, 0], sigma**-2.0, rtol=0.05)
+    np.testing.assert_array_equal(_weights(np.ones((1, 2, 7))), np.ones((2, 1)))
+
+
+def test_a_noisy_order_does_not_turn_a_precise_one():
+    """The table's own moments, those of order 5 and more spoiled: the rest put the frame right."""
+    rng = np.random.default_rng(13)
+    clean = harmonic_moments(shape_moments(table(), ORDER))
+    noisy = {}
+    for l, c in clean.items():
+        size = 0.02 if l >= 5 else 1e-6
+        replicates = c + size * rng.standard_normal((16, *c.shape[1:])) / np.sqrt(15)
+        noisy[l] = np.concatenate([c + size * rng.standard_normal(c.shape), replicates])
+    start = rotation([1, 2, 0.5], np.radians(3)) @ np.eye(3)
+    assert np.degrees(line_angle_rad(polish_frame(noisy, start, 4)[2], Z_AXIS)) < 0.05

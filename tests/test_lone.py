@@ -49,17 +49,19 @@ def back(e, index):
     return (e.judge.cloud.points[index] * e.moments.scale + e.moments.center - CENTER) @ MATRIX
 
 
-def test_the_part_is_the_leg_that_stands_astray():
-    e = evidence()
+@pytest.mark.parametrize("out", [0.05, 0.3])
+def test_the_part_is_the_leg_that_stands_astray(out):
+    """However far out, and however far that puts the centroid from the axis."""
+    e = evidence(out)
     part = lone_part(e, group(), center(e))
     points = back(e, part)
     assert len(part) > 20
-    # All of them on the leg, whose axis stands at 0.38; they cover most of its height.
-    assert np.hypot(points[:, 0] - 0.38, points[:, 1]).max() < 0.05
+    # All of them on the leg; they cover most of its height.
+    assert np.hypot(points[:, 0] - 0.33 - out, points[:, 1]).max() < 0.05
     assert np.ptp(points[:, 2]) > 0.3
 
 
-@pytest.mark.parametrize("out", [0.0, 0.002])
+@pytest.mark.parametrize("out", [0.0, 0.002, 0.02])
 def test_nothing_is_to_blame_where_all_hold(out):
     e = evidence(out)
     assert len(lone_part(e, group(), center(e))) == 0
@@ -77,11 +79,12 @@ def test_points_that_stand_for_themselves_have_no_parts():
     assert len(lone_part(e, PointGroup(name="Oh"), np.zeros(3))) == 0
 
 
-def test_what_noise_scatters_is_no_part():
+@pytest.mark.parametrize(("count", "noise"), [(3000, 0.015), (1500, 0.03), (3000, 0.04)])
+def test_what_noise_scatters_is_no_part(count, noise):
     """A sample whose points scatter by as much as a detail may: single planes stand astray all over, no part does."""
-    points = sample(stool(0.0), 3000, 0.015, np.random.default_rng(3))
+    points = sample(stool(0.0), count, noise, np.random.default_rng(3))
     e = gather(measure(Shape(points=points)), TOLERANCE, np.random.default_rng(0))
-    assert e.judge.floor.p97 > 0.5 * TOLERANCE
+    assert e.judge.floor.p97 > TOLERANCE
     assert len(lone_part(e, group(), center(e))) == 0
 
 
@@ -120,10 +123,10 @@ def test_a_part_is_where_the_surface_is_of_its_own_class_only():
 
 
 def test_the_size_of_the_object_does_not_matter_to_what_is_kept():
-    """Misses are fractions of the diagonal: a part may move by half the tolerance of it, not by thrice that."""
+    """Misses are fractions of the diagonal: a part may move by some of the tolerance, not by four times that."""
     e = evidence()
     part = lone_part(e, group(), center(e))
     judge = make_judge(e.judge.cloud, e.judge.diagonal, TOLERANCE)
     away = judge.tolerance * judge.diagonal * MATRIX[:, 0]
-    kept = [keeps(e, [Isometry(matrix=np.eye(3), shift=share * away)], part) for share in (0.0, 0.3, 4.0)]
+    kept = [keeps(e, [Isometry(matrix=np.eye(3), shift=share * away)], part) for share in (0.0, 0.6, 4.0)]
     assert kept == [True, True, False]

@@ -349,6 +349,7 @@ def test_points_are_chosen_in_proportion_to_their_weights():
 BODIES = {
     "noisy sheet": (lambda rng: sheet(rng, 6000, 0.02), False),
     "noisy sphere": (lambda rng: unit(rng.standard_normal((6000, 3))) + 0.03 * rng.standard_normal((6000, 3)), False),
+    "thick sheet": (lambda rng: sheet(rng, 6000, 0.07), False),
     "clean sphere": (lambda rng: unit(rng.standard_normal((6000, 3))), False),
     "cloud": (lambda rng: rng.standard_normal((6000, 3)), True),
     "cube": (lambda rng: rng.random((6000, 3)), True),

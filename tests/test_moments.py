@@ -221,6 +221,17 @@ def test_replicates_do_not_depend_on_the_order_the_file_lists_its_points_in():
     assert (sorted_[:, 4:].std(axis=0) / shuffled[:, 4:].std(axis=0)).max() < 4
 
 
+def test_replicates_do_not_depend_on_a_rhythm_in_the_file():
+    """Rows of as many points as there are parts: dealt in the order of the file each part would be one column."""
+    rng = np.random.default_rng(10)
+    rows = np.stack(np.meshgrid(np.arange(250), np.linspace(-1, 1, 16), indexing="ij"), axis=-1).reshape(-1, 2)
+    points = np.column_stack([rows[:, 1], rng.standard_normal((4000, 2))])
+    order = rng.permutation(4000)
+    in_rows, anyhow = (central_moments(p, np.ones(4000), 2, parts=16).replicates for p in (points, points[order]))
+    ratio = in_rows[:, 4:].std(axis=0) / anyhow[:, 4:].std(axis=0)
+    assert ratio.max() < 4
+
+
 # Meshes
 
 

@@ -147,6 +147,29 @@ def test_hopeless_minima_are_kept_only_among_the_first_few():
     assert len(local_minima(0.1 * rough, count=50).directions) == 50
 
 
+@pytest.mark.parametrize("order", [[0, 1, 2], [1, 2, 0], [2, 0, 1]])
+def test_the_deepest_minima_are_kept_in_their_order(order):
+    """Wells of known depths: with few asked for, those of the least miss."""
+    wells = random_orthogonal(np.random.default_rng(4))[order]
+    depths = (0.05, 0.02, 0.08)
+    field = np.full(DIRECTIONS, 0.11)
+    for n, depth in zip(wells, depths, strict=True):
+        field -= depth * np.exp(-(1 - (half_sphere() @ n) ** 2) / 0.02)
+    for count in (1, 2, 3):
+        found = local_minima(field, count=count)
+        for n, d in zip(wells[[2, 0, 1]][:count], found.directions, strict=True):
+            assert np.degrees(np.arccos(min(1.0, abs(n @ d)))) < 1.0
+
+
+@pytest.mark.parametrize("size", [(3, 2, 1), (6, 0.5, 0.4), (20, 1, 0.9), (1, 0.8, 0.02)])
+def test_the_mirrors_of_long_and_flat_boxes_are_all_among_the_candidates(size):
+    """Of a long box the raw moments see little of what lies around its length; they may blur it by a few degrees."""
+    matrix = random_orthogonal(np.random.default_rng(5))
+    found = mirror_candidates(shape_moments(moved(join([box((0, 0, 0), size)]), matrix), ORDER))
+    for n in matrix.T:
+        assert np.degrees(np.arccos(np.abs(found.directions @ n).max())) < 6.0
+
+
 # Whitening
 
 

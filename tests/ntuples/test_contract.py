@@ -10,7 +10,7 @@ from experiments.shapes import asymmetric, box, join
 from symrefine.errors import InputError
 from symrefine.geometry import random_orthogonal
 from symrefine.moments import Moments, central_moments, exponents, raw_moments, shape_moments
-from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
+from symrefine.ntuples.contract import PAPER_ORDERS, NTuples, ntuples
 from symrefine.ntuples.derive import derive
 from symrefine.quadrature import sample_surface
 
@@ -206,6 +206,32 @@ def test_whitened_tuples_of_a_symmetric_body_follow_hotelling(dim):
     beyond = np.mean(np.array(statistic) > f_distribution.ppf(0.95, dim, parts - dim), axis=0)
     assert (beyond < 0.13).all()
     assert (beyond > 0.005).all()
+
+
+def test_what_all_replicates_share_is_no_noise():
+    """The jackknife's bias moves the mean of the replicates from the whole; their spread alone is the noise."""
+    rng = np.random.default_rng(10)
+    vectors, spread = rng.standard_normal((4, 3)), 0.01 * rng.standard_normal((12, 4, 3))
+    once, biased = (NTuples(vectors=vectors, replicates=vectors + b + spread, labels=tuple("abcd")) for b in (0.0, 0.5))
+    np.testing.assert_allclose(biased.covariance, once.covariance, atol=1e-12)
+    np.testing.assert_allclose(biased.noise, once.noise, atol=1e-12)
+    np.testing.assert_allclose(biased.joint_covariance, once.joint_covariance, atol=1e-12)
+    # The blocks along the diagonal of the joint covariance are those of the tuples.
+    blocks = once.joint_covariance.reshape(4, 3, 4, 3)[range(4), :, range(4)]
+    np.testing.assert_allclose(blocks, once.covariance, atol=1e-12)
+
+
+@pytest.mark.parametrize("dim", [2, 3, 5])
+def test_whitening_takes_more_replicates_than_components(dim):
+    rng = np.random.default_rng(11)
+    for parts in (0, 1, dim):
+        few = NTuples(vectors=np.ones((2, dim)), replicates=rng.standard_normal((parts, 2, dim)), labels=("a", "b"))
+        with pytest.raises(
+            InputError, match=f"{parts} replicates; whitening {dim} components takes at least {dim + 1}"
+        ):
+            few.whitened()
+    enough = NTuples(vectors=np.ones((2, dim)), replicates=rng.standard_normal((dim + 1, 2, dim)), labels=("a", "b"))
+    assert np.isfinite(enough.whitened()).all()
 
 
 def test_labels_name_each_tuple_once():
