@@ -14,6 +14,7 @@ from symrefine.assemble import (
     _fold_is_seen,
     _from_parts,
     _group_of,
+    _lone_part,
     _round,
     _unless_round,
     assemble,
@@ -147,6 +148,17 @@ def test_round_objects_and_where_their_centre_is(name, expected):
         assert line_angle_rad(found.group.frame[2], MATRIX[:, 2]) < np.radians(0.3)
 
 
+def test_mirrors_of_a_round_object_are_not_taken_for_a_fold(monkeypatch):
+    """Five mirrors at even angles hold on a bottle as any others do."""
+    e = evidence("bottle")
+    held = Generators(mirrors=(mirror_at(e, [0, 1, 0]), mirror_at(e, [-np.sin(np.pi / 5), np.cos(np.pi / 5), 0])))
+    several = (held, [], held.closed()[0])
+    assert several[2].name == "C5v"
+    monkeypatch.setattr("symrefine.assemble.mirror_group", lambda _: several)
+    monkeypatch.setattr("symrefine.assemble.with_turns", lambda _, mirrors, __: mirrors)
+    assert _from_parts(e).group.name == "Cinfv"
+
+
 def test_all_the_mirrors_through_the_axis_come_before_none():
     bundle = _best_bundle(evidence("stool8"))
     assert bundle.fold == 8
@@ -178,13 +190,21 @@ def test_a_detail_that_every_operation_nearly_keeps_is_to_blame_all_the_same():
     e = evidence("studs")
     whole = _finish(e, group("C8v"), placed(e), (), [])
     assert max(x.verdict.excess for x in whole.elements) <= 1.0
+    rod = _lone_part(e, whole)
+    points = (e.judge.cloud.points[rod] * e.moments.scale + e.moments.center - 2.0) @ MATRIX
+    assert len(rod) > 5
+    assert np.hypot(points[:, 0] - 0.368, points[:, 1]).max() < 0.02
     found = assemble(e)
     assert found.group.name == "Cs"
     assert line_angle_rad(found.group.mirrors()[0], MATRIX[:, 1]) < np.radians(1.0)
-    # The mirrors that held but for the rod are listed with what they miss by.
+    # Mirrors that held but for the rod are listed with what they miss by.
     others = [MATRIX @ [-np.sin(np.pi * k / 8), np.cos(np.pi * k / 8), 0] for k in range(1, 8)]
     turned_down = [x.direction for x in found.rejected if x.kind == "plane"]
     assert sum(min(line_angle_rad(n, d) for d in turned_down) < np.radians(2.0) for n in others) >= 2
+
+
+def test_where_all_hold_exactly_no_part_is_to_blame():
+    assert len(_lone_part(evidence("stool8"), _placed_group("stool8", "C8v"))) == 0
 
 
 # Where the closest fit and the candidates disagree

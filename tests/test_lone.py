@@ -79,11 +79,12 @@ def test_points_that_stand_for_themselves_have_no_parts():
     assert len(lone_part(e, PointGroup(name="Oh"), np.zeros(3))) == 0
 
 
-@pytest.mark.parametrize(("count", "noise"), [(3000, 0.015), (1500, 0.03), (3000, 0.04)])
+@pytest.mark.parametrize(("count", "noise"), [(1000, 0.018), (3000, 0.015)])
 def test_what_noise_scatters_is_no_part(count, noise):
     """A sample whose points scatter by as much as a detail may: single planes stand astray all over, no part does."""
     points = sample(stool(0.0), count, noise, np.random.default_rng(3))
     e = gather(measure(Shape(points=points)), TOLERANCE, np.random.default_rng(0))
+    assert not e.judge.cloud.isolated
     assert e.judge.floor.p97 > TOLERANCE
     assert len(lone_part(e, group(), center(e))) == 0
 

@@ -198,6 +198,14 @@ def test_what_stands_out_shows_in_bulk_detail_or_specks_by_its_share(share, bulk
     assert found.core < 0.01
 
 
+@pytest.mark.parametrize(("limit", "share"), [(1, 0.08), (2, 0.04), (3, 0.02), (4, 0.008)])
+def test_every_limit_decides_alone_about_what_it_is_there_for(limit, share):
+    """A share between two percentiles that misses by a little more, or less, than the limit of the upper one."""
+    flat = about(householder(Z))
+    below, above = (lifted(share, factor * LIMITS[limit] * TOLERANCE)([flat]).excess for factor in (0.95, 1.05))
+    assert (below, above) == pytest.approx((0.95, 1.05), rel=1e-2)
+
+
 @pytest.mark.parametrize("shift", [0.002, 0.006])
 def test_where_all_miss_alike_the_mean_decides(shift):
     judge = lifted(0.0, 0.0)
