@@ -173,6 +173,11 @@ def hyperplane_lines(record: Record) -> Iterator[Table | str]:
     told = _count(len(found), "hyperplane") + " of symmetry" if found else "no hyperplane of symmetry"
     doubt = record["undetermined"]
     yield f"{record['source']}: {f'undetermined: {doubt}' if doubt else f'{told} in {dim} dimensions'}"
+    order = record["reflection_group_order"]
+    if found and order is not None:
+        yield f"their reflections generate a group of order {order}"
+    if record["incomplete"]:
+        yield f"there may be more: {record['incomplete']}"
     yield f"n-tuples of rank {record['ntuples']['rank']}; turns are not looked for in {dim} dimensions"
     for title, candidates in (("hyperplanes: normal", found), ("turned down: normal", record["rejected"])):
         if candidates:

@@ -19,7 +19,8 @@ def subspace_record(
 
     Returns:
         Lengths in input units; a hyperplane is `normal.x = offset`; `asymmetry` and `noise` are fractions of moments,
-        `miss` is a fraction of `diameter`.
+        `miss` is a fraction of `diameter`; `incomplete` says why hyperplanes may be missing from the list;
+        `reflection_group_order` is that of the group that the listed reflections generate, None if it is not known.
     """
     d = detection
     return {
@@ -30,6 +31,8 @@ def subspace_record(
         "hyperplanes": [_hyperplane(h, d.diameter) for h in d.hyperplanes],
         "rejected": [_hyperplane(h, d.diameter) for h in d.rejected],
         "undetermined": d.undetermined or None,
+        "incomplete": d.incomplete or None,
+        "reflection_group_order": d.reflection_group_order,
         "ntuples": {
             "rank": d.fixed.rank,
             "singular_values": numbers(d.fixed.singular_values, 1.0),
