@@ -31,10 +31,14 @@ COARSE_PIXELS, QUIET, HIDDEN = 2.5, 0.25, 1.5
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FoundLine:
-    """A mirror line `normal.x = offset` in input units: its miss in fractions of the diagonal, and how sure it is."""
+    """A mirror line `normal.x = offset` in input units: its miss in fractions of the diagonal, and how sure it is.
+
+    `excess` is the miss over what the tolerance allows, at most 1.
+    """
 
     line: Plane
     residual: LineDeviation
+    excess: float
     confidence: float
 
 
@@ -44,6 +48,7 @@ class FoundRotation:
 
     order: float
     residual: LineDeviation
+    excess: float
     confidence: float
 
 
@@ -184,14 +189,23 @@ def _report(
     turns = found.turns
     rotation = None
     if turns is not None:
-        sure = confidence(turns.excess)
-        rotation = FoundRotation(order=found.placed.fold, residual=turns.deviation, confidence=sure)
+        rotation = FoundRotation(
+            order=found.placed.fold,
+            residual=turns.deviation,
+            excess=turns.excess,
+            confidence=confidence(turns.excess),
+        )
     return PlanarDetection(
         point_group=found.placed.group.name,
         group=found.placed.group,
         center=found.placed.center,
         lines=tuple(
-            FoundLine(line=c.placed.lines()[0], residual=c.verdict.deviation, confidence=confidence(c.verdict.excess))
+            FoundLine(
+                line=c.placed.lines()[0],
+                residual=c.verdict.deviation,
+                excess=c.verdict.excess,
+                confidence=confidence(c.verdict.excess),
+            )
             for c in found.lines
         ),
         rotation=rotation,
