@@ -161,7 +161,8 @@ def detect(
         normals: [N, 3] normals, any sign; estimated where absent. Not with a `Shape`.
         labels: [N] integers: classes (elements, colours, materials) that every symmetry must keep. Not with a `Shape`.
         tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal: 95 % of the
-            surface must come within it, 99 % within 1.4 of it, and the mean within 0.28 (see `verify`).
+            surface must come within 0.75 of it, 99 % within 1.6, the mean within 0.22 (see `verify`), and no part may
+            stand 1.3 of it from where its counterpart is (see `displaced`).
         ladder: other tolerances to tell the group at, from the same evidence; see `Detection.staircase`.
         seed: of the random choices (samples of a mesh, subsets of a cloud).
 

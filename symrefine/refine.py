@@ -88,7 +88,7 @@ class Iterate:
         theta_rad: [b] what each plane alone would turn about the shared axis (the paper's unknown); empty if no bundle.
         step: size of the last change, radians and RMS radii together.
         covariance: [6, 6] of the frame's rotation and shift (about and along its axes), zero where unobservable.
-        cost: mean weighted squared residual over the inliers, in units of their variance.
+        cost: mean weighted squared residual over the inliers, squared RMS radii.
         inliers: pairs used, over all operations.
         pairs: correspondences of each operation.
         inner_steps: accepted Gauss-Newton steps.
