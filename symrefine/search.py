@@ -39,11 +39,12 @@ PROMISING = 2.0
 AXIS_HOPELESS = 0.15
 # Excesses between these are close calls.
 CLOSE = (0.5, 1.4)
-# Miss from which on it is asked whether parts stand out of place (of a volume only the outline shows): a detail that
-# holds this share of the surface may be shifted by so many tolerances. The buttons and connectors of a real camera are
-# at 1.23 at most, parts shifted by 3 % of the diagonal at 1.47 at least.
+# Miss from which on it is asked whether parts stand out of place (of a volume only the outline shows).
 SUSPECT = {"surface": 0.5, "volume": 0.3, "atoms": 1.0}
-SHIFTED_SHARE, SHIFT_LIMIT = 0.009, 1.3
+# How much of the surface may be shifted by how many tolerances. Buttons and connectors of a real camera are at 1.23,
+# parts shifted by 3 % of the diagonal at 1.47 and more; in volumes nothing meets anything but a shifted part.
+SHIFTED_SHARE = {"surface": 0.009, "volume": 0.005, "atoms": 1.0}
+SHIFT_LIMIT = {"surface": 1.3, "volume": 1.0, "atoms": 1.0}
 # A miss below this share of the limits is no compromise between parts.
 SURE = 0.5
 # Gate (spacings) of a refinement held to what agrees.
@@ -83,9 +84,11 @@ class Evidence:
         verdict = self.judge(motions, stride=stride)
         if CLOSE[0] < verdict.excess < CLOSE[1]:
             verdict = self.closer()(motions, stride=stride)
-        if not SUSPECT[self.judge.cloud.body] < verdict.excess <= 1.0:
+        body = self.judge.cloud.body
+        if not SUSPECT[body] < verdict.excess <= 1.0:
             return verdict
-        return verdict.with_shifted(max(displacement(self.closer(), m, SHIFTED_SHARE) for m in motions) / SHIFT_LIMIT)
+        shifted = max(displacement(self.closer(), m, SHIFTED_SHARE[body]) for m in motions)
+        return verdict.with_shifted(shifted / SHIFT_LIMIT[body])
 
     def stride(self, sources: int) -> int:
         """Stride that leaves about `sources` local planes."""
