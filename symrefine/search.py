@@ -40,7 +40,7 @@ AXIS_HOPELESS = 0.15
 # Excesses between these are close calls.
 CLOSE = (0.5, 1.4)
 # Miss from which on it is asked whether parts stand out of place (of a volume only the outline shows).
-SUSPECT = {"surface": 0.5, "volume": 0.3, "atoms": 1.0}
+SUSPECT = {"surface": 0.5, "volume": 0.1, "atoms": 1.0}
 # How much of the surface may be shifted by how many tolerances. Buttons and connectors of a real camera are at 1.23,
 # parts shifted by 3 % of the diagonal at 1.47 and more; in volumes nothing meets anything but a shifted part.
 SHIFTED_SHARE = {"surface": 0.009, "volume": 0.005, "atoms": 1.0}
