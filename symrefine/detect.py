@@ -31,8 +31,8 @@ SUBSETS = 3
 SUBSET = 0.8
 # Share of the tolerance that such a cloud may miss itself by.
 SPARSE_FLOOR = 0.75
-# Miss over its limit from which on a group is in doubt.
-DOUBT = 0.3
+# Miss over its limit from which on a group is in doubt (97 % sure).
+DOUBT = 0.4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

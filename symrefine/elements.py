@@ -1,6 +1,7 @@
 """The elements of a group placed in space, each judged: its mirrors, its axes, its rotoreflection axes."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,7 +40,7 @@ class Element:
 def elements_of(evidence: Evidence, group: PointGroup, center: Array) -> tuple[Element, ...]:
     """Every discrete mirror, every axis and rotoreflection axis of the group about a centre, judged."""
     parts = _parts(group)
-    stride = evidence.stride(max(JUDGED_EACH, JUDGED // max(1, len(parts))))
+    stride = _stride(evidence, parts)
     judged = (_judged(evidence, part, center, stride) for part in parts)
     return tuple(sorted(judged, key=lambda e: (-e.order, e.verdict.excess)))
 
@@ -48,7 +49,11 @@ def inversion_of(evidence: Evidence, group: PointGroup, center: Array) -> Verdic
     """By how much the inversion about a centre misses; None if it is no operation of the group."""
     if not group.has_inversion:
         return None
-    return evidence.verdict([Isometry.about(center, -np.eye(3))], stride=evidence.stride(JUDGED))
+    return evidence.verdict([Isometry.about(center, -np.eye(3))], stride=_stride(evidence, _parts(group)))
+
+
+def _stride(evidence: Evidence, parts: Sequence["_Part"]) -> int:
+    return evidence.stride(max(JUDGED_EACH, JUDGED // max(1, len(parts))))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
