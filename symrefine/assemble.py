@@ -5,6 +5,7 @@ no symmetry but the identity, two a mirror, one an axis; only where all vanish i
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,11 +24,12 @@ from symrefine.closure import (
     with_turns,
 )
 from symrefine.elements import Element, elements_of, mirror_element
-from symrefine.geometry import Array, frame_with_z, rotation
+from symrefine.geometry import Array, Isometry, frame_with_z, householder, rotation, rotoreflection
 from symrefine.groups import PointGroup
 from symrefine.lone import keeps, lone_part
 from symrefine.refine import Framed, Iterate
 from symrefine.search import (
+    LOOK,
     Bundle,
     Evidence,
     axis_bundle,
@@ -37,6 +39,7 @@ from symrefine.search import (
     refined_if_promising,
 )  # fmt: skip
 from symrefine.shape import Index
+from symrefine.verify import Verdict
 
 # Directions closer than this are the same start for an axis, which is then polished.
 APART_RAD = math.radians(1.0)
@@ -79,8 +82,9 @@ def assemble(evidence: Evidence) -> Assembly:
         return _round(evidence, bundle)
     group = PointGroup(name=f"C{int(bundle.fold)}v", frame=bundle.state.frame)
     others = list(mirrors(evidence, np.zeros((0, 3)), count=NEAR, known=mirror_of(group), thorough=False))
-    if any(standard_of([bundle.verdict]).admits(m.verdict) for m in others):
-        # A mirror beside the bundle: the axis the n-tuples claimed by chance is not all there is.
+    beside = [*(m.verdict for m in others), *_across(evidence, bundle)]
+    if any(standard_of([bundle.verdict]).admits(v) for v in beside):
+        # Something beside the bundle: the axis the n-tuples claimed by chance is not all there is.
         return assemble(replace(evidence, tuples=replace(evidence.tuples, kind="vanish")))
     near = [mirror_element(m) for m in others]
     done = _finish(evidence, group, bundle.state.center, bundle.history, near)
@@ -88,6 +92,13 @@ def assemble(evidence: Evidence) -> Assembly:
     # Some of its mirrors may be exact and the others broken by a detail: then each is asked for by itself.
     good = all(standard.admits(e.verdict) for e in done.elements) and not len(_lone_part(evidence, done))
     return done if good else _from_parts(evidence)
+
+
+def _across(evidence: Evidence, bundle: Bundle) -> Iterator[Verdict]:
+    """A first look at what may turn the axis of finite C_bv over: the mirror across it, and S_2b, of D_bh and D_bd."""
+    axis = bundle.state.frame[2]
+    for matrix in (householder(axis), rotoreflection(axis, math.pi / bundle.fold)):
+        yield evidence.judge([Isometry.about(bundle.state.center, matrix)], stride=evidence.stride(LOOK))
 
 
 def _best_bundle(evidence: Evidence) -> Bundle | None:

@@ -1,7 +1,7 @@
 """Candidates that hold, and the group they generate: mirrors one by one, axes beside them, improper elements last."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -104,7 +104,15 @@ def mirror_group(evidence: Evidence) -> tuple[Generators, list[Element], PointGr
         return Generators(mirrors=tuple(candidates)).closed()
 
     few = evidence.tuples.kind != "vanish"
-    for mirror in mirrors(evidence, evidence.tuples.directions[2:], known=known):
+
+    def offered() -> Iterator[Mirror]:
+        yield from mirrors(evidence, evidence.tuples.directions[2:], known=known)
+        if not few:
+            # Mirrors through an axis may crowd out the one across it.
+            main = np.array([u for u, _ in group.rotation_axes()[:1]]).reshape(-1, 3)
+            yield from mirrors(evidence, main, count=0, known=known)
+
+    for mirror in offered():
         if mirror.verdict.excess > 1.0:
             near.append(mirror)
             near += [m for m in held.mirrors if compromise(m, mirror)]

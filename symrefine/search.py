@@ -40,7 +40,7 @@ AXIS_HOPELESS = 0.15
 # Excesses between these are close calls.
 CLOSE = (0.5, 1.4)
 # Miss from which on it is asked whether parts stand out of place (of a volume only the outline shows).
-SUSPECT = {"surface": 0.5, "volume": 0.1, "atoms": 1.0}
+SUSPECT = {"surface": 0.4, "volume": 0.1, "atoms": 1.0}
 # How much of the surface may be shifted by how many tolerances. Buttons and connectors of a real camera are at 1.23,
 # parts shifted by 3 % of the diagonal at 1.47 and more; in volumes nothing meets anything but a shifted part.
 SHIFTED_SHARE = {"surface": 0.009, "volume": 0.005, "atoms": 1.0}
@@ -240,14 +240,14 @@ def mirrors(
     known: Callable[[Array], bool] = lambda _: False,
     thorough: bool = True,
 ) -> Iterator[Mirror]:
-    """Candidate mirrors, the `extra` normals [E, 3] first, then those of the spectrum by falling promise.
+    """Candidate mirrors, the `extra` normals [E, 3] first, then `count` of the spectrum by falling promise.
 
     Each is refined as far as it deserves (coarsely only, unless `thorough`) and judged. Candidates that end up where
     `known` says so are passed over.
     """
     found: list[Plane] = []
-    directions = np.concatenate([extra.reshape(-1, 3), mirror_candidates(evidence.moments, count=count).directions])
-    for normal in directions:
+    proposed = mirror_candidates(evidence.moments, count=count).directions if count else np.zeros((0, 3))
+    for normal in np.concatenate([extra.reshape(-1, 3), proposed]):
         start = Plane(normal=normal, offset=0.0)
         if known(normal) or _look(evidence, (Isometry.reflection(start),)) > HOPELESS:
             continue

@@ -188,12 +188,13 @@ def test_without_operations_there_is_nothing_to_refine():
 # Mirrors one by one
 
 
-def grouped(monkeypatch, candidates, kind="vanish"):
-    """What comes of candidate mirrors in this order, and how many of them were asked for."""
+def grouped(monkeypatch, candidates, kind="vanish", across=()):
+    """What comes of candidate mirrors in this order, those across the main axis last, and which were asked for."""
     asked = []
 
-    def offered(_, __, *, known):
-        for m in candidates:
+    def offered(_, extra, *, known, count=16):
+        beside = [m for m in across if any(line_angle_rad(m.plane.normal, u) < 0.01 for u in extra)]
+        for m in candidates if count else beside:
             if not known(m.plane.normal):
                 asked.append(m)
                 yield m
@@ -213,6 +214,13 @@ def test_mirrors_that_those_held_imply_are_not_asked_for(monkeypatch):
     assert group.name == "C4v"
     assert asked == fan[:2]
     assert (held.mirrors, near) == (tuple(fan[:2]), [])
+
+
+def test_the_mirror_across_the_axis_is_asked_for_where_nothing_proposes_it(monkeypatch):
+    across = mirror([0, 0, 1])
+    held, _, group, asked = grouped(monkeypatch, [upright(0), upright(36)], across=[across])
+    assert (group.name, asked[-1], held.mirrors[-1]) == ("D5h", across, across)
+    assert grouped(monkeypatch, [upright(0), upright(36)], "axis", [across])[2].name == "C5v"
 
 
 def test_mirrors_that_miss_are_near_misses(monkeypatch):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from experiments import group_shapes
+from experiments import group_shapes, groups
 from experiments.measure import bundle_normals, score_planes
 from experiments.shapes import SHAPES, box, join, mug, random_pose, revolve, sample, table
 from symrefine import Detection, Shape, detect
@@ -637,3 +637,9 @@ def test_a_part_out_of_place_is_told_from_its_counterparts(name, truth):
     """One part of many, 3 % of the diagonal out of place, at the default tolerance."""
     cloud = sample(group_shapes.shape(name, True), 20000, 0.0, np.random.default_rng(0))
     assert detect(cloud).point_group == truth
+
+
+def test_mirrors_through_an_axis_do_not_crowd_out_the_one_across_it():
+    """Seven mirrors at equal angles leave the spectrum no room to propose the eighth."""
+    case = groups.Case(shape="wheel7", noise_rel=0.005, seed=2)
+    assert detect(groups.posed(case)[0]).point_group == "D7h"
