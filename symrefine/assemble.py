@@ -51,8 +51,10 @@ SUSPECT = 0.4
 MAX_BLAMES = 4
 # Azimuthal energy over its noise from which on a high order shows.
 SEEN = 12.0
-# Orders from which on a finite axis has to be better than a continuous one, and by what factor.
+# Orders from which on a finite axis has to be better than a continuous one, and by what factor. Of a volume the thin
+# outside shows any order by chance.
 CHANCE_FOLD = 5
+CHANCE_FOLD_VOLUME = 2
 AS_GOOD = 1.5
 NO_PART = np.zeros(0, dtype=np.int64)
 
@@ -122,7 +124,9 @@ def _round(evidence: Evidence, bundle: Bundle) -> Assembly:
     # Asked whatever the n-tuples say: by chance those of a sphere may seem to have a direction.
     tilted = refined_if_promising(evidence, _tilted(bundle.state), sources=1500, outer=4)
     across = refined_if_promising(evidence, _plane_state(axis, center), sources=3000, outer=6)
-    if tilted is not None and evidence.judge(tilted.motions).excess <= max(EXACT, bundle.verdict.excess):
+    # The thin outside of a volume misses every turn by chance, one a little more than another.
+    slack = AS_GOOD if evidence.judge.cloud.body == "volume" else 1.0
+    if tilted is not None and evidence.judge(tilted.motions).excess <= max(EXACT, slack * bundle.verdict.excess):
         name, center = "Kh", tilted.center
     elif across is not None:
         mirror = evidence.judge(across.motions)
@@ -184,7 +188,8 @@ def _fold_is_seen(evidence: Evidence, group: PointGroup) -> bool:
 
 def _unless_round(evidence: Evidence, found: Assembly) -> Assembly:
     """A high order about an axis that any turn keeps as well is chance: on a round object every mirror holds."""
-    main = [u for u, k in found.group.rotation_axes()[:1] if k >= CHANCE_FOLD]
+    least = CHANCE_FOLD_VOLUME if evidence.judge.cloud.body == "volume" else CHANCE_FOLD
+    main = [u for u, k in found.group.rotation_axes()[:1] if k >= least]
     for bundle in (b for u in main for b in axis_bundle(evidence, u, mirrored=False)):
         worst = max((e.verdict.bulk for e in found.elements), default=0.0)
         if Standard(bulk=max(EXACT, AS_GOOD * worst)).admits(bundle.verdict):
