@@ -37,7 +37,7 @@ from symrefine.search import (
     mirrors,
     refined_closely,
     refined_if_promising,
-)  # fmt: skip
+)
 from symrefine.shape import Index
 from symrefine.verify import Verdict
 

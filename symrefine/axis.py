@@ -53,14 +53,7 @@ def classify(tuples: NTuples) -> TupleClass:
     weighted = tuples.vectors * weights[:, None]
     _, values, directions = np.linalg.svd(weighted, full_matrices=True)
     values = np.pad(values, (0, 3 - len(values)))
-    parts = len(tuples.replicates)
-    if parts:
-        spread = (tuples.replicates - tuples.replicates.mean(axis=0)) * weights[:, None]
-        # Jackknife variance of the tuples along each singular direction, summed over tuples: the noise in sigma_k^2.
-        along = np.einsum("btn,kn->btk", spread, directions)
-        sigma = np.sqrt((parts - 1) / parts * (along**2).sum(axis=(0, 1)))
-    else:
-        sigma = np.zeros(3)
+    sigma = tuples.noise_along(directions, weights)
     significance = values / np.hypot(sigma, np.sqrt(len(weighted)) * FLOOR * weights.min() / 1.5)
     rank = int((significance > SIGNIFICANT).sum())
     kinds: tuple[TupleKind, ...] = ("vanish", "axis", "plane", "none")

@@ -85,8 +85,9 @@ def _shifts(
         distance, near = cloud.nearest(at, classes, distance_upper_bound=REACH * unit)
         use = np.flatnonzero(np.isfinite(distance))
         near, gap = near[use], at[use] - cloud.points[near[use]]
-        seen = np.tile(np.eye(3), (len(use), 1, 1))
-        if not cloud.isolated:
+        if cloud.isolated:
+            seen = np.tile(np.eye(3), (len(use), 1, 1))
+        else:
             towards = cloud.normals[near]
             agree = np.abs(np.einsum("ij,ij->i", normals[use], towards)) > AGREE
             seen = np.einsum("ni,nj->nij", towards, towards) * agree[:, None, None]

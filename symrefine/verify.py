@@ -6,6 +6,7 @@ distance is taken between denoised surfaces: each local plane, moved, against th
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
+from functools import reduce
 
 import numpy as np
 
@@ -97,7 +98,7 @@ class Judge:
         """Verdict on one or several operations together (the worst of each statistic)."""
         motions = tuple(motions)
         found = [_summary(miss_distances(self.cloud, m, stride=stride) / self.diagonal) for m in motions]
-        worst = Deviation(**{f.name: max(getattr(d, f.name) for d in found) for f in fields(Deviation)})
+        worst = reduce(Deviation.at_least, found)
         ratios = worst.over_limits(self.tolerance, self.floor)
         if self.cloud.body == "atoms":
             own = (worst.mean, worst.p95, worst.max)

@@ -46,6 +46,14 @@ class NTuples:
         """Standard deviation [T] of each tuple's components from the sampling of the points (jackknife)."""
         return np.asarray(np.sqrt((self._deviations() ** 2).sum(axis=0).mean(axis=-1)))
 
+    def noise_along(self, directions: Array, weights: Array) -> Array:
+        """Standard deviation [K] of the weighted n-tuples, all together, along directions [K, n]; weights [T].
+
+        That of the singular values where the directions are the singular ones.
+        """
+        along = np.einsum("btn,kn->btk", self._deviations() * weights[:, None], directions)
+        return np.asarray(np.sqrt((along**2).sum(axis=(0, 1))))
+
     @property
     def covariance(self) -> Array:
         """Covariance [T, n, n] of each tuple's components from the sampling of the points; zero for exact moments.

@@ -53,7 +53,7 @@ def fixed_subspace(tuples: NTuples, *, floor: float = FLOOR) -> FixedSubspace:
     dim = tuples.vectors.shape[1]
     weights = 1.0 / np.hypot(tuples.noise, floor)
     _, values, directions = np.linalg.svd(tuples.vectors * weights[:, None], full_matrices=True)
-    allowed = np.hypot(_jackknife(tuples, weights, directions), math.sqrt(len(weights)) * floor * weights.min())
+    allowed = np.hypot(tuples.noise_along(directions, weights), math.sqrt(len(weights)) * floor * weights.min())
     significance = _padded(values, dim) / allowed
     below = np.flatnonzero(significance <= SIGNIFICANT)
     return FixedSubspace(
@@ -62,16 +62,6 @@ def fixed_subspace(tuples: NTuples, *, floor: float = FLOOR) -> FixedSubspace:
         significance=significance,
         directions=directions,
     )
-
-
-def _jackknife(tuples: NTuples, weights: Array, directions: Array) -> Array:
-    """Standard deviation [n] of the singular values along `directions`, from the sampling of the points."""
-    parts = len(tuples.replicates)
-    if parts == 0:
-        return np.zeros(len(directions))
-    spread = (tuples.replicates - tuples.replicates.mean(axis=0)) * weights[:, None]
-    along = np.einsum("btn,kn->btk", spread, directions)
-    return np.sqrt((parts - 1) / parts * (along**2).sum(axis=(0, 1)))
 
 
 def _padded(values: Array, dim: int) -> Array:
