@@ -14,8 +14,8 @@ import numpy as np
 
 from benchmarks.metric import Metric
 from experiments.alignment import CHIRAL, RANDOM, Case, error_deg, estimator, given, mesh, present, sample
-from symrefine.align import Alignment
-from symrefine.moments import central_moments
+from symrefine.align.story import Alignment
+from symrefine.moments.moments import central_moments
 from symrefine.ntuples.contract import ntuples
 
 REPEATS = 3

@@ -10,8 +10,8 @@ from benchmarks.metric import Metric
 from experiments.shapes import SHAPES, box, join, random_pose, sample
 from symrefine.detect import detect
 from symrefine.geometry import Array
-from symrefine.moments import central_moments
-from symrefine.spectrum import mirror_candidates
+from symrefine.moments.moments import central_moments
+from symrefine.propose.spectrum import mirror_candidates
 
 POINTS = 20000
 TARGET_PASSES = 10.0

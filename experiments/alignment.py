@@ -19,17 +19,17 @@ from pathlib import Path
 import numpy as np
 
 from experiments.shapes import SHAPES
-from symrefine.align import Alignment, align
+from symrefine.align.procrustes import procrustes
+from symrefine.align.story import Alignment, align
 from symrefine.detect import detect
 from symrefine.errors import InputError
 from symrefine.geometry import Array, line_angle_rad, random_orthogonal
 from symrefine.groups import PointGroup
 from symrefine.groups.orthogonal import chord_angles, nearest_orthogonal
 from symrefine.load import load
-from symrefine.moments import central_moments
+from symrefine.moments.moments import central_moments
+from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.ntuples.contract import ntuples
-from symrefine.quadrature import triangle_areas_and_normals
-from symrefine.registration.procrustes import procrustes
 from symrefine.shape import Shape
 
 OBJECTS = Path(__file__).parents[2] / "shared" / "objects"

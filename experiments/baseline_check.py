@@ -12,13 +12,13 @@ from time import perf_counter, process_time
 
 import numpy as np
 
+from experiments.ecins import SHIPPED, TUNED, EcinsResult, Settings, ecins, estimated_normals
 from experiments.measure import FOUND_DEG
 from experiments.shapes import SHAPES, box, join, random_pose, revolve
-from symrefine.baseline import SHIPPED, TUNED, EcinsResult, Settings, ecins, estimated_normals
 from symrefine.errors import InputError
 from symrefine.geometry import Array, line_angle_rad
 from symrefine.groups import point_group
-from symrefine.quadrature import sample_surface, triangle_areas_and_normals
+from symrefine.moments.quadrature import sample_surface, triangle_areas_and_normals
 from symrefine.shape import Shape
 
 FOUND_REL = 0.02

@@ -16,7 +16,7 @@ from experiments import constructions as made
 from experiments.parts import Part, assembled, block, cylinder, extruded, placed_group, spun
 from symrefine.geometry import Array, tight_diagonal, unit
 from symrefine.groups import PointGroup
-from symrefine.quadrature import sample_surface
+from symrefine.moments.quadrature import sample_surface
 from symrefine.shape import Shape
 
 MISS_REL = 0.03

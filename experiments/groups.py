@@ -22,7 +22,7 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.groups import PointGroup
 from symrefine.shape import Shape
-from symrefine.verify import TOLERANCE
+from symrefine.surface.misses import TOLERANCE
 
 NOISES = (0.0, 0.005, 0.01)
 STRICT = 0.01

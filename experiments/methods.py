@@ -12,24 +12,26 @@ from time import perf_counter
 
 import numpy as np
 
+from experiments.ecins import SHIPPED, TUNED, Settings, ecins, estimated_normals
+from experiments.ecins.starts import grid_normals
 from experiments.peers import trimesh_symmetry
-from symrefine.axis import classify, fold_candidates
-from symrefine.baseline import SHIPPED, TUNED, Settings, ecins, estimated_normals
-from symrefine.baseline.starts import grid_normals
 from symrefine.detect import detect
 from symrefine.errors import DegenerateShapeError
+from symrefine.fit.gauss_newton import minimise
+from symrefine.fit.matching import match, pair_equations
+from symrefine.fit.refine import MAX_OUTER, SETTLED, refine, single_plane
+from symrefine.fit.residual import axis_gram, design_rows, gram, theta_model
 from symrefine.gather import CLOSER_PLANES, LOCAL_PLANES, ORDER, PARTS
-from symrefine.gauss_newton import minimise
 from symrefine.geometry import Array, Isometry, Plane, tight_diagonal
 from symrefine.groups import from_elements
-from symrefine.matching import LocalPlanes, local_planes, match, pair_equations
-from symrefine.moments import shape_moments
+from symrefine.moments.moments import shape_moments
 from symrefine.ntuples.contract import ntuples
-from symrefine.refine import MAX_OUTER, SETTLED, refine, single_plane
-from symrefine.residual import axis_gram, design_rows, gram, theta_model
+from symrefine.ntuples.rank import classify
+from symrefine.propose.folds import fold_candidates
 from symrefine.search import CLOSE
 from symrefine.shape import Shape
-from symrefine.verify import TOLERANCE, Judge, make_judge
+from symrefine.surface.misses import TOLERANCE, Judge, make_judge
+from symrefine.surface.skin import LocalPlanes, local_planes
 
 # A candidate of the grid may be this far off: half the way to the next one, and more.
 GRID_ERROR_RAD = math.radians(18.0)

@@ -17,7 +17,7 @@ from experiments.peers import point_group_pymatgen
 from symrefine.detect import detect
 from symrefine.errors import InputError
 from symrefine.geometry import Array, random_orthogonal
-from symrefine.verify import TOLERANCE
+from symrefine.surface.misses import TOLERANCE
 
 NOISE_BOND = 0.01
 TOLERANCES = (TOLERANCE, 0.03, 0.04, 0.06)

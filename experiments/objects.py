@@ -17,7 +17,7 @@ from experiments.shapes import random_pose
 from symrefine.detect import Detection, detect
 from symrefine.geometry import unit
 from symrefine.load import load
-from symrefine.quadrature import sample_surface
+from symrefine.moments.quadrature import sample_surface
 from symrefine.shape import Shape
 
 OBJECTS = Path(__file__).parents[2] / "shared" / "objects"

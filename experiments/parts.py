@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull, cKDTree
 from experiments.shapes import box, join, revolve
 from symrefine.geometry import Array, frame_with_z, read_only, rotation
 from symrefine.groups import PointGroup, identify, point_group
-from symrefine.quadrature import triangle_areas_and_normals
+from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.shape import Index, Shape
 
 EXACT = 1e-6

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from symrefine.geometry import Array, Plane
-from symrefine.planar import PlanarDetection, VectorDoublets
+from symrefine.plane import PlanarDetection, VectorDoublets
 
 if TYPE_CHECKING:
     from experiments.drawings import Drawing

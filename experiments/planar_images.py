@@ -23,7 +23,7 @@ from experiments.pictures import DEFECTS, FINISHES, Pose, coverage, fit, picture
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load import load
-from symrefine.planar import PlanarDetection, detect_planar
+from symrefine.plane import PlanarDetection, detect_planar
 
 # A line found is a true one if it is no farther off.
 WORST_DEG = 1.0

@@ -25,7 +25,7 @@ from experiments.reliability import Judged, bins, fitted, plausible, plot, summa
 from symrefine.errors import InputError
 from symrefine.files import check_target
 from symrefine.geometry import Array
-from symrefine.planar.judge import confidence
+from symrefine.plane.judge import confidence
 
 FINISHES = ("clean", "blurred", "noisy")
 # How far a part is moved, over the diagonal, taken as twice the reach; 0 leaves the drawing as it is.

@@ -19,7 +19,7 @@ from experiments.methods import METHODS, Scan
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, line_angle_rad
 from symrefine.groups import PointGroup
-from symrefine.quadrature import sample_surface
+from symrefine.moments.quadrature import sample_surface
 from symrefine.shape import Shape
 
 FOUND_REL = 0.02

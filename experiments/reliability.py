@@ -24,7 +24,7 @@ from symrefine.errors import InputError
 from symrefine.files import check_target, whole
 from symrefine.geometry import Array
 from symrefine.shape import Shape
-from symrefine.verify import confidence
+from symrefine.surface.misses import confidence
 
 # Form, points and noise of every look at an object.
 VIEWS = (("mesh", 0, 0.0), ("cloud", 8000, 0.0), ("cloud", 20000, 0.005), ("cloud", 8000, 0.01))

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from symrefine.geometry import Array, random_orthogonal, rotation
-from symrefine.quadrature import sample_surface
+from symrefine.moments.quadrature import sample_surface
 from symrefine.shape import Index, Shape
 
 Mesh = tuple[Array, Index]

@@ -12,12 +12,12 @@ import numpy as np
 
 from experiments.alignment import PRINTED, RANDOM
 from experiments.exhibits import FORMS, Exhibit, Pose, check_exhibit, exhibit, judge, observed, posed
-from symrefine.align import align
+from symrefine.align.story import align
 from symrefine.detect import Detection, detect
 from symrefine.errors import InputError
+from symrefine.fit.refine import Iterate
 from symrefine.geometry import Array, householder, line_angle_rad, random_orthogonal, rotation
 from symrefine.groups.orthogonal import nearest_orthogonal
-from symrefine.refine import Iterate
 from symrefine.shape import Shape
 
 Result = int | float | str | bool | None

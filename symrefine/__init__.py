@@ -9,7 +9,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from symrefine.align import Alignment, align
+    from symrefine.align.story import Alignment, align
     from symrefine.detect import Detection, detect
     from symrefine.errors import DegenerateShapeError, InputError, SymrefineError
     from symrefine.geometry import Axis, Plane
@@ -39,7 +39,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "symrefine.align": ("Alignment", "align"),
+    "symrefine.align.story": ("Alignment", "align"),
     "symrefine.detect": ("Detection", "detect"),
     "symrefine.errors": ("DegenerateShapeError", "InputError", "SymrefineError"),
     "symrefine.geometry": ("Axis", "Plane"),

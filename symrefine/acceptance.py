@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from symrefine.search import Mirror, closer_core
-from symrefine.verify import Verdict
+from symrefine.surface.misses import Verdict
 
 # Beside an element that holds exactly, one that misses this many times more, and by this share of the limit, is not
 # the same kind of truth: a wheel maps onto itself nearly as well between its spokes.

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symrefine.acceptance import EXACT, Standard, standard_of
-from symrefine.axis import fold_energy
 from symrefine.closure import (
     NEAR,
     Generators,
@@ -24,10 +23,11 @@ from symrefine.closure import (
     with_turns,
 )
 from symrefine.elements import Element, elements_of, mirror_element
+from symrefine.fit.refine import Framed, Iterate
 from symrefine.geometry import Array, Isometry, frame_with_z, householder, rotation, rotoreflection
 from symrefine.groups import PointGroup
 from symrefine.lone import keeps, lone_part
-from symrefine.refine import Framed, Iterate
+from symrefine.propose.folds import fold_energy
 from symrefine.search import (
     LOOK,
     Bundle,
@@ -39,7 +39,7 @@ from symrefine.search import (
     refined_if_promising,
 )
 from symrefine.shape import Index
-from symrefine.verify import Verdict
+from symrefine.surface.misses import Verdict
 
 # Directions closer than this are the same start for an axis, which is then polished.
 APART_RAD = math.radians(1.0)

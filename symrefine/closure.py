@@ -9,13 +9,13 @@ import numpy as np
 from symrefine.acceptance import Standard, compromise, standard_of
 from symrefine.elements import Element, mirror_element
 from symrefine.errors import DegenerateShapeError
+from symrefine.fit.refine import Framed
 from symrefine.geometry import Array, Isometry, Plane, frame_with_z, householder, rotation, rotoreflection, unit
 from symrefine.groups import PointGroup, from_elements
 from symrefine.lone import keeps
-from symrefine.refine import Framed
 from symrefine.search import Evidence, Mirror, Turn, axis_directions, improper_about, mirrors, turns_about
 from symrefine.shape import Index
-from symrefine.verify import Verdict
+from symrefine.surface.misses import Verdict
 
 # Directions of elements are known to this before the joint refinement.
 DIRECTION_ERROR_RAD = math.radians(1.5)

@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.assemble import Assembly, assemble
-from symrefine.axis import TupleClass
 from symrefine.elements import Element, inversion_of
 from symrefine.errors import InputError
+from symrefine.fit.refine import Iterate
 from symrefine.gather import gather, is_few, measure, part
 from symrefine.geometry import Array, Axis, Plane, read_only
 from symrefine.groups import PointGroup
 from symrefine.ntuples.contract import NTuples
-from symrefine.refine import Iterate
+from symrefine.ntuples.rank import TupleClass
 from symrefine.search import Evidence
 from symrefine.shape import Shape
-from symrefine.verify import TOLERANCE, Deviation, Verdict, confidence
+from symrefine.surface.misses import TOLERANCE, Deviation, Verdict, confidence
 
 LARGEST_TOLERANCE = 0.2
 # Tolerances of the staircase that the command line tells.
@@ -217,9 +217,9 @@ def _with_mass(shape: Shape) -> Shape:
 def _elsewhere(dim: int) -> str:
     """What is offered for points of another dimension."""
     if dim == 2:
-        return "these points have 2 coordinates: use symrefine.planar.detect_planar"
+        return "these points have 2 coordinates: use symrefine.plane.detect_planar"
     return (
-        f"these points have {dim} coordinates: for 4 and more symrefine.subspace.detect_nd tells the rank of the "
+        f"these points have {dim} coordinates: for 4 and more symrefine.ndim.detect_nd tells the rank of the "
         "n-tuples and the hyperplanes of symmetry, no turns and no groups"
     )
 

@@ -8,9 +8,9 @@ screw, meets nothing wherever it is moved; a part that is only shifted does, and
 import numpy as np
 
 from symrefine.geometry import Array, Isometry
-from symrefine.matching import LocalPlanes
 from symrefine.shape import Index
-from symrefine.verify import Judge, disc_distances, miss_distances
+from symrefine.surface.misses import Judge, disc_distances, miss_distances
+from symrefine.surface.skin import LocalPlanes
 
 # A point is astray from this miss on (tolerances, and the floor in squares).
 ASTRAY = 0.5

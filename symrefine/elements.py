@@ -9,7 +9,7 @@ import numpy as np
 from symrefine.geometry import Array, Isometry, householder, rotation, rotoreflection
 from symrefine.groups import PointGroup
 from symrefine.search import Evidence, Mirror
-from symrefine.verify import Verdict
+from symrefine.surface.misses import Verdict
 
 # Angles that stand for a continuous axis.
 FREE_TURNS = (0.517, 1.234, 2.6833)

@@ -5,16 +5,16 @@ from functools import cache, partial
 
 import numpy as np
 
-from symrefine.axis import classify
 from symrefine.geometry import Array, tight_diagonal
-from symrefine.harmonics import harmonic_moments
-from symrefine.matching import LocalPlanes, fills_volume, isolated_points, local_planes
-from symrefine.moments import Moments, shape_moments
+from symrefine.moments.harmonics import harmonic_moments
+from symrefine.moments.moments import Moments, shape_moments
+from symrefine.moments.quadrature import mesh_nodes, sample_surface
 from symrefine.ntuples.contract import NTuples, ntuples
-from symrefine.quadrature import mesh_nodes, sample_surface
+from symrefine.ntuples.rank import classify
 from symrefine.search import Evidence
 from symrefine.shape import Index, Shape
-from symrefine.verify import Deviation, Judge, make_judge, split_floor
+from symrefine.surface.misses import Deviation, Judge, make_judge, split_floor
+from symrefine.surface.skin import LocalPlanes, fills_volume, isolated_points, local_planes
 
 ORDER = 8
 PARTS = 16

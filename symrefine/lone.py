@@ -12,7 +12,7 @@ from symrefine.geometry import Array, Isometry
 from symrefine.groups import PointGroup
 from symrefine.search import Evidence
 from symrefine.shape import Index
-from symrefine.verify import disc_distances, miss_distances
+from symrefine.surface.misses import disc_distances, miss_distances
 
 # Operations asked, sources of each.
 ASKED = 12

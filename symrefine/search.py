@@ -10,14 +10,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.axis import FoldCandidate, TupleClass, fold_candidates, polish_frame
 from symrefine.displaced import displacement
+from symrefine.fit.frame import polish_frame
+from symrefine.fit.matching import ROBUST
+from symrefine.fit.refine import Framed, Iterate, mirror_bundle, refine, single_plane
 from symrefine.geometry import Array, Isometry, Plane, frame_with_z, rotation, rotoreflection
-from symrefine.matching import ROBUST
-from symrefine.moments import Moments
-from symrefine.refine import Framed, Iterate, mirror_bundle, refine, single_plane
-from symrefine.spectrum import axis_misses, half_sphere, local_minima, mirror_candidates, whitened
-from symrefine.verify import Deviation, Judge, Verdict
+from symrefine.moments.moments import Moments
+from symrefine.ntuples.rank import TupleClass
+from symrefine.propose.folds import FoldCandidate, fold_candidates
+from symrefine.propose.spectrum import axis_misses, half_sphere, local_minima, mirror_candidates, whitened
+from symrefine.surface.misses import Deviation, Judge, Verdict
 
 # Turns that no finite fold below 36 shares; a surface of revolution survives them all.
 IRRATIONAL_TURNS = 2.0 * np.pi * np.array([0.0823, 0.1381966, 0.2360680, 0.4270510])

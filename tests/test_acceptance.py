@@ -7,7 +7,7 @@ import pytest
 from symrefine.acceptance import BESIDE, EXACT, EXACT_DETAIL, Standard, compromise, standard_of
 from symrefine.geometry import Plane, rotation, unit
 from symrefine.search import CORE_NOISE, Mirror
-from symrefine.verify import Deviation, Verdict
+from symrefine.surface.misses import Deviation, Verdict
 
 NOTHING = Deviation(mean=0, p80=0, p95=0, p97=0, p99=0, p994=0, max=0)
 NORMAL = unit([0.3, -0.5, 0.8])

@@ -9,14 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from experiments.shapes import asymmetric, bottle, box, join, mug, sample, table
-from symrefine.align import Alignment, align
-from symrefine.errors import DegenerateShapeError, InputError
-from symrefine.geometry import Array, householder, line_angle_rad, random_orthogonal, rotation
-from symrefine.groups.orthogonal import chord_angles
-from symrefine.harmonics import evaluate
-from symrefine.moments import central_moments
-from symrefine.ntuples.contract import ntuples
-from symrefine.registration.harmonic_fit import (
+from symrefine.align.harmonic_fit import (
     Turner,
     euler_zyz,
     fit,
@@ -27,10 +20,17 @@ from symrefine.registration.harmonic_fit import (
     mismatch,
     preference,
 )
-from symrefine.registration.moment_fit import moment_fit
-from symrefine.registration.polish import Similarity, polish, probes
-from symrefine.registration.procrustes import procrustes
-from symrefine.registration.skin import skin
+from symrefine.align.moment_fit import moment_fit
+from symrefine.align.polish import Similarity, polish, probes
+from symrefine.align.procrustes import procrustes
+from symrefine.align.skin import skin
+from symrefine.align.story import Alignment, align
+from symrefine.errors import DegenerateShapeError, InputError
+from symrefine.geometry import Array, householder, line_angle_rad, random_orthogonal, rotation
+from symrefine.groups.orthogonal import chord_angles
+from symrefine.moments.harmonics import evaluate
+from symrefine.moments.moments import central_moments
+from symrefine.ntuples.contract import ntuples
 from symrefine.shape import Shape
 
 DETERMINANTS = (1, -1)

@@ -19,15 +19,15 @@ from symrefine.assemble import (
     _unless_round,
     assemble,
 )
-from symrefine.axis import TupleClass
 from symrefine.closure import Generators, with_turns
 from symrefine.elements import Element, elements_of
 from symrefine.gather import gather, measure
 from symrefine.geometry import Plane, line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.groups import PointGroup
+from symrefine.ntuples.rank import TupleClass
 from symrefine.search import Mirror
 from symrefine.shape import Shape
-from symrefine.verify import TOLERANCE, Deviation, Verdict
+from symrefine.surface.misses import TOLERANCE, Deviation, Verdict
 
 MATRIX = random_orthogonal(np.random.default_rng(1))
 NOTHING = Deviation(mean=0, p80=0, p95=0, p97=0, p99=0, p994=0, max=0)

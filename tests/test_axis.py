@@ -4,20 +4,14 @@ import numpy as np
 import pytest
 
 from experiments.shapes import asymmetric, bottle, box, join, mug, sample, stool, table
-from symrefine.axis import (
-    _weights,
-    azimuthal_spectrum,
-    classify,
-    fold_candidates,
-    fold_energy,
-    polish_frame,
-    to_polar_axis_rotation,
-)
+from symrefine.fit.frame import _weights, polish_frame, to_polar_axis_rotation
 from symrefine.geometry import line_angle_rad, random_orthogonal, rotation, unit
-from symrefine.harmonics import harmonic_moments
-from symrefine.moments import central_moments, shape_moments
+from symrefine.moments.harmonics import harmonic_moments
+from symrefine.moments.moments import central_moments, shape_moments
+from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import NTuples, ntuples
-from symrefine.quadrature import sample_surface
+from symrefine.ntuples.rank import classify
+from symrefine.propose.folds import azimuthal_spectrum, fold_candidates, fold_energy
 from symrefine.shape import Shape
 
 ORDER = 8

@@ -13,18 +13,18 @@ from scipy.spatial import cKDTree
 
 from experiments import baseline_check
 from experiments.baseline_check import ALL_SHAPES, Case
+from experiments.ecins import SHIPPED, TUNED, ecins, estimated_normals
+from experiments.ecins.clouds import Clouds, prepare, principal_axes, voxel_means
+from experiments.ecins.fitting import inner_minimum, mirror_coordinates, partners, refine_plane
+from experiments.ecins.judging import representatives, score
+from experiments.ecins.levenberg import least_squares
+from experiments.ecins.starts import best_of_each, grid_normals, position
 from experiments.shapes import box, join, random_pose, table
-from symrefine.baseline import SHIPPED, TUNED, ecins, estimated_normals
-from symrefine.baseline.clouds import Clouds, prepare, principal_axes, voxel_means
-from symrefine.baseline.fitting import inner_minimum, mirror_coordinates, partners, refine_plane
-from symrefine.baseline.judging import representatives, score
-from symrefine.baseline.levenberg import least_squares
-from symrefine.baseline.starts import best_of_each, grid_normals, position
 from symrefine.errors import DegenerateShapeError, InputError
-from symrefine.gauss_newton import minimise
+from symrefine.fit.gauss_newton import minimise
+from symrefine.fit.residual import design_rows, frame_model, gram, observable_motions, residual_function
 from symrefine.geometry import Plane, frame_with_z, line_angle_rad, random_orthogonal, rotation, unit
-from symrefine.quadrature import sample_surface
-from symrefine.residual import design_rows, frame_model, gram, observable_motions, residual_function
+from symrefine.moments.quadrature import sample_surface
 
 CUBOID = join([box((0, 0, 0), (1.0, 0.7, 0.4))])
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from experiments.shapes import box, join, table
-from symrefine.axis import TupleClass
 from symrefine.closure import (
     NEAR,
     Generators,
@@ -24,9 +23,10 @@ from symrefine.elements import Element
 from symrefine.gather import gather, measure
 from symrefine.geometry import Plane, householder, line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.groups import PointGroup, point_group
+from symrefine.ntuples.rank import TupleClass
 from symrefine.search import Mirror, Turn
 from symrefine.shape import Shape
-from symrefine.verify import TOLERANCE, Deviation, Verdict
+from symrefine.surface.misses import TOLERANCE, Deviation, Verdict
 
 NOTHING = Deviation(mean=0, p80=0, p95=0, p97=0, p99=0, p994=0, max=0)
 POINT = np.array([0.2, -0.1, 0.3])

@@ -16,7 +16,7 @@ from symrefine import Detection, Shape, detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import line_angle_rad, random_orthogonal
 from symrefine.groups import point_group
-from symrefine.quadrature import sample_surface
+from symrefine.moments.quadrature import sample_surface
 
 SLOW = pytest.mark.slow
 

@@ -6,8 +6,8 @@ import pytest
 from experiments.shapes import box, join, sample
 from symrefine.displaced import displacement
 from symrefine.geometry import Isometry, Plane, random_orthogonal
-from symrefine.matching import isolated_points, local_planes
-from symrefine.verify import make_judge
+from symrefine.surface.misses import make_judge
+from symrefine.surface.skin import isolated_points, local_planes
 
 TOLERANCE = 0.02
 MIRROR = Isometry.reflection(Plane(normal=[1, 0, 0], offset=0.0))

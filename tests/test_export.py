@@ -19,7 +19,7 @@ from symrefine.export.records import detection_record, number, toward_positive
 from symrefine.geometry import Array, Axis, Plane, random_orthogonal, rotation
 from symrefine.groups import PointGroup, point_group
 from symrefine.shape import Shape
-from symrefine.verify import Deviation
+from symrefine.surface.misses import Deviation
 
 CENTER = np.array([0.3, -1.2, 2.5])
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)

@@ -15,7 +15,7 @@ from experiments.household import OBJECTS
 from symrefine import detect
 from symrefine.errors import InputError
 from symrefine.geometry import Array, householder, line_angle_rad, rotation
-from symrefine.moments import Moments, shape_moments, transformed
+from symrefine.moments.moments import Moments, shape_moments, transformed
 
 HOME = Pose(turn=np.eye(3), shift=np.zeros(3), scale=1.0)
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares, rosen
 
-from symrefine.gauss_newton import Linearisation, minimise
+from symrefine.fit.gauss_newton import Linearisation, minimise
 
 SEEDS = st.integers(0, 2**32 - 1)
 

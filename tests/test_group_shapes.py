@@ -12,7 +12,7 @@ from experiments.shapes import sample
 from symrefine.errors import InputError
 from symrefine.geometry import random_orthogonal, rotation
 from symrefine.groups import PointGroup, point_group
-from symrefine.quadrature import triangle_areas_and_normals
+from symrefine.moments.quadrature import triangle_areas_and_normals
 
 ASKED = {
     *"C1 Cs Ci S4 S6 S8 S10 T Td Th O Oh I Ih Cinfv Dinfh Kh C12v D12h D24h".split(),

@@ -8,8 +8,8 @@ from scipy.linalg import expm
 from scipy.special import lpmv
 
 from symrefine.geometry import random_orthogonal, rotation, unit
-from symrefine.harmonics import evaluate, generators, harmonic_moments, solid_harmonic, to_polar_axis, turn
-from symrefine.moments import central_moments, transformed
+from symrefine.moments.harmonics import evaluate, generators, harmonic_moments, solid_harmonic, to_polar_axis, turn
+from symrefine.moments.moments import central_moments, transformed
 
 SEEDS = st.integers(0, 2**32 - 1)
 DEGREES = range(9)

@@ -11,7 +11,7 @@ from symrefine.geometry import Isometry, random_orthogonal, rotation
 from symrefine.groups import PointGroup
 from symrefine.lone import keeps, lone_part
 from symrefine.shape import Shape
-from symrefine.verify import TOLERANCE, make_judge
+from symrefine.surface.misses import TOLERANCE, make_judge
 
 LEGS = 8
 # A turn for the pose; legs stand on a circle of radius 0.33 about the third column.

@@ -8,19 +8,11 @@ from scipy.spatial import cKDTree
 from scipy.stats import norm
 
 from experiments.shapes import bottle, box, join, mug, sample, table
+from symrefine.fit.matching import ROBUST, match, pair_equations
+from symrefine.fit.residual import design_rows, gram
 from symrefine.geometry import Isometry, Plane, random_orthogonal, rotation, unit
-from symrefine.matching import (
-    ROBUST,
-    choose_neighbours,
-    fills_volume,
-    isolated_points,
-    local_planes,
-    match,
-    pair_equations,
-    smallest_eigenvectors,
-)
-from symrefine.quadrature import sample_surface
-from symrefine.residual import design_rows, gram
+from symrefine.moments.quadrature import sample_surface
+from symrefine.surface.skin import choose_neighbours, fills_volume, isolated_points, local_planes, smallest_eigenvectors
 
 BOX = join([box((0, 0, 0), (1, 0.7, 0.4))])
 

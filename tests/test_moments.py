@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from experiments.shapes import asymmetric, box, join, mug, sample
 from symrefine.errors import DegenerateShapeError
 from symrefine.geometry import random_orthogonal
-from symrefine.moments import (
+from symrefine.moments.moments import (
     BLOCK,
     central_moments,
     exponents,
@@ -22,7 +22,7 @@ from symrefine.moments import (
     tensor_index,
     transformed,
 )
-from symrefine.quadrature import triangle_areas_and_normals
+from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.shape import Shape
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -10,7 +10,7 @@ from experiments.measure import score_planes
 from experiments.shapes import random_pose
 from symrefine import detect, load
 from symrefine.geometry import unit
-from symrefine.quadrature import sample_surface
+from symrefine.moments.quadrature import sample_surface
 
 OBJECTS = Path(__file__).resolve().parents[2] / "shared" / "objects"
 ROUND = ("Cinfv", "Dinfh")

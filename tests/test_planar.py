@@ -18,9 +18,9 @@ from symrefine.cli import invoke
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.export.planar import planar_record
 from symrefine.geometry import Array
-from symrefine.planar import PLANAR_ORDERS, PlanarDetection, detect_planar
-from symrefine.planar.outline import smallest_diagonal
-from symrefine.planar.raster import raster_of
+from symrefine.plane import PLANAR_ORDERS, PlanarDetection, detect_planar
+from symrefine.plane.outline import smallest_diagonal
+from symrefine.plane.raster import raster_of
 from symrefine.shape import Shape
 
 QUICK = ("disc on the x axis", "heart", "letter N", "letter R", "star", "pinwheel of 4", "ring")

@@ -10,7 +10,7 @@ from experiments.drawings import DRAWINGS
 from experiments.pictures import fit
 from experiments.planar_reliability import Case, Element
 from experiments.reliability import fitted
-from symrefine.planar.judge import EVEN, STEEPNESS, confidence
+from symrefine.plane.judge import EVEN, STEEPNESS, confidence
 
 
 def test_confidence_falls_from_one_to_nothing() -> None:

@@ -17,7 +17,7 @@ from symrefine.geometry import Plane, rotation
 from symrefine.study import runner
 from symrefine.study.plan import make_plan
 from symrefine.study.typed import read_config
-from symrefine.verify import miss_distances
+from symrefine.surface.misses import miss_distances
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 
@@ -34,7 +34,7 @@ def case(method: str = "ntuples", shape: str = "table", points: int = 4000, nois
 @pytest.mark.parametrize("name", SHAPES)
 def test_truth_maps_the_object_onto_itself(name: str) -> None:
     from symrefine.geometry import Isometry
-    from symrefine.matching import local_planes
+    from symrefine.surface.skin import local_planes
 
     scan, truth = make(case(shape=name, points=6000, seed=3))
     cloud = local_planes(scan.points, 3000, np.random.default_rng(0), normals=scan.normals, exact=True)

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.shapes import box, join, mug
 from symrefine.errors import DegenerateShapeError
-from symrefine.quadrature import mesh_nodes, sample_surface, triangle_areas_and_normals, triangle_rule
+from symrefine.moments.quadrature import mesh_nodes, sample_surface, triangle_areas_and_normals, triangle_rule
 from symrefine.shape import Shape
 
 # Two triangles of areas 1 and 3 in different planes, and a degenerate one between them.

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.shapes import box, join, mug, sample, stool, table
+from symrefine.fit.refine import LONGEST, SETTLED, WITHIN_NOISE, Framed, _remaining, mirror_bundle, refine, single_plane
 from symrefine.geometry import (
     Plane,
     householder,
@@ -15,10 +16,9 @@ from symrefine.geometry import (
     rotation,
     rotoreflection,
 )
-from symrefine.matching import isolated_points, local_planes
-from symrefine.moments import shape_moments
-from symrefine.quadrature import sample_surface
-from symrefine.refine import LONGEST, SETTLED, WITHIN_NOISE, Framed, _remaining, mirror_bundle, refine, single_plane
+from symrefine.moments.moments import shape_moments
+from symrefine.moments.quadrature import sample_surface
+from symrefine.surface.skin import isolated_points, local_planes
 
 BOX = join([box((0, 0, 0), (1, 0.7, 0.4))])
 ORIGIN = np.zeros(3)

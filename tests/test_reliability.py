@@ -14,7 +14,7 @@ from experiments.reliability import Case, Judged
 from symrefine.errors import InputError
 from symrefine.geometry import random_orthogonal, rotation
 from symrefine.groups import PointGroup
-from symrefine.quadrature import sample_surface
+from symrefine.moments.quadrature import sample_surface
 
 DIAGONAL = 10.0
 

@@ -7,9 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from symrefine.geometry import Isometry, Plane, householder, random_orthogonal, rotation, rotoreflection, unit
-from symrefine.groups import point_group
-from symrefine.residual import (
+from symrefine.fit.residual import (
     axis_gram,
     coordinates,
     design_rows,
@@ -20,6 +18,8 @@ from symrefine.residual import (
     theta_model,
     turn_frame,
 )
+from symrefine.geometry import Isometry, Plane, householder, random_orthogonal, rotation, rotoreflection, unit
+from symrefine.groups import point_group
 
 SEEDS = st.integers(0, 2**32 - 1)
 Z = np.array([0.0, 0, 1])

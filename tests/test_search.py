@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from experiments.shapes import bottle, box, join, mug, sample, stool
+from symrefine.fit.refine import single_plane
 from symrefine.gather import gather, measure
 from symrefine.geometry import Isometry, Plane, line_angle_rad, random_orthogonal, unit
 from symrefine.groups import point_group
-from symrefine.refine import single_plane
 from symrefine.search import (
     CORE_NOISE,
     Mirror,
@@ -30,7 +30,7 @@ from symrefine.search import (
     turns_about,
 )
 from symrefine.shape import Shape
-from symrefine.verify import TOLERANCE, Deviation, Verdict
+from symrefine.surface.misses import TOLERANCE, Deviation, Verdict
 
 NOTHING = Deviation(mean=0, p80=0, p95=0, p97=0, p99=0, p994=0, max=0)
 ORIGIN, X, Z = np.zeros(3), np.array([1.0, 0, 0]), np.array([0.0, 0, 1])

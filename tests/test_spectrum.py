@@ -6,10 +6,9 @@ import pytest
 from experiments.shapes import asymmetric, box, join, mug, revolve, stool, table
 from symrefine.geometry import frame_with_z, householder, random_orthogonal, rotation
 from symrefine.groups import point_group
-from symrefine.harmonics import harmonic_moments
-from symrefine.moments import shape_moments, transformed
-from symrefine.shape import Shape
-from symrefine.spectrum import (
+from symrefine.moments.harmonics import harmonic_moments
+from symrefine.moments.moments import shape_moments, transformed
+from symrefine.propose.spectrum import (
     DIRECTIONS,
     axis_misses,
     half_sphere,
@@ -18,6 +17,7 @@ from symrefine.spectrum import (
     mirror_misses,
     whitened,
 )
+from symrefine.shape import Shape
 
 ORDER = 8
 BOX, CUBE = join([box((0, 0, 0), (1, 0.7, 0.4))]), join([box((0, 0, 0), (1, 1, 1))])

@@ -11,11 +11,11 @@ import pytest
 from symrefine.cli import invoke
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array
+from symrefine.ndim import detect_nd
+from symrefine.ndim import sampled as samples
+from symrefine.ndim.matched import Points
+from symrefine.ndim.roots import MOST, closed_under_reflection, reflection_group_order
 from symrefine.shape import Shape
-from symrefine.subspace import detect_nd
-from symrefine.subspace import sampled as samples
-from symrefine.subspace.matched import Points
-from symrefine.subspace.roots import MOST, closed_under_reflection, reflection_group_order
 
 DIMENSIONS = [4, 5, 6]
 

@@ -17,7 +17,7 @@ from symrefine.export.models import model_bytes
 from symrefine.geometry import Array, random_orthogonal, rotation
 from symrefine.groups import PointGroup, is_subgroup, point_group
 from symrefine.load import load
-from symrefine.quadrature import sample_surface
+from symrefine.moments.quadrature import sample_surface
 from symrefine.shape import Shape
 from symrefine.symmetrize import Symmetrized, exact_place, placed_subgroup, symmetrize
 from symrefine.symmetrize.action import act, generators

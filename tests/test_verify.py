@@ -5,10 +5,9 @@ import pytest
 
 from experiments.shapes import bottle, box, join, mug, sample, stool, table
 from symrefine.geometry import Isometry, Plane, householder, random_orthogonal, rotation, tight_diagonal
-from symrefine.matching import isolated_points, local_planes
-from symrefine.moments import shape_moments
-from symrefine.quadrature import sample_surface
-from symrefine.verify import (
+from symrefine.moments.moments import shape_moments
+from symrefine.moments.quadrature import sample_surface
+from symrefine.surface.misses import (
     LIMITS,
     TOLERANCE,
     Deviation,
@@ -19,6 +18,7 @@ from symrefine.verify import (
     split_floor,
     spread_distance,
 )
+from symrefine.surface.skin import isolated_points, local_planes
 
 Z = np.array([0.0, 0, 1])
 

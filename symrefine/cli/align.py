@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _record(args: argparse.Namespace) -> dict[str, Any]:
-    from symrefine.align import align
+    from symrefine.align.story import align
     from symrefine.export.records import alignment_record
     from symrefine.load import load
 

@@ -14,7 +14,7 @@ from symrefine.errors import InputError, SymrefineError
 
 if TYPE_CHECKING:
     from symrefine.detect import Detection
-    from symrefine.planar import PlanarDetection
+    from symrefine.plane import PlanarDetection
     from symrefine.shape import Shape
 
 NAME = "batch"

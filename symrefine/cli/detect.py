@@ -115,7 +115,7 @@ def examine(
         )
     if shape.dim == 2:
         from symrefine.export.planar import planar_record
-        from symrefine.planar import detect_planar
+        from symrefine.plane import detect_planar
 
         flat = detect_planar(shape, tolerance=tolerance, seed=seed)
         if Path(path).suffix.lower() in IMAGES:
@@ -123,7 +123,7 @@ def examine(
         return shape, flat, planar_record(flat, shape, options=options, load_s=load_s)
     if shape.dim > 3:
         from symrefine.export.spaces import subspace_record
-        from symrefine.subspace import detect_nd
+        from symrefine.ndim import detect_nd
 
         start = time.perf_counter()
         beyond = detect_nd(shape, tolerance=tolerance)

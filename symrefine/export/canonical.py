@@ -17,7 +17,7 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array, frame_with_z, read_only, rotation
 from symrefine.groups import PointGroup
 from symrefine.groups.standard import GOLDEN
-from symrefine.quadrature import mesh_nodes
+from symrefine.moments.quadrature import mesh_nodes
 from symrefine.shape import Shape
 
 _X, _Y, _Z = np.eye(3)

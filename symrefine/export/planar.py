@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from symrefine.export.records import number, numbers, opening, order, placed, residual, seconds
-from symrefine.planar import FoundLine, PlanarDetection, PlanarNearMiss, VectorDoublets
+from symrefine.plane import FoundLine, PlanarDetection, PlanarNearMiss, VectorDoublets
 from symrefine.shape import Shape
 
 SCHEMA = "symrefine.detection2d/1"

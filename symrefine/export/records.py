@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from symrefine.align import Alignment
+from symrefine.align.story import Alignment
 from symrefine.detect import Detection, FoundAxis, FoundPlane, NearMiss
 from symrefine.geometry import Array, Plane
-from symrefine.planar.judge import LineDeviation
+from symrefine.plane.judge import LineDeviation
 from symrefine.shape import Shape
-from symrefine.verify import Deviation
+from symrefine.surface.misses import Deviation
 
 SCHEMA = "symrefine.detection/1"
 ALIGNMENT_SCHEMA = "symrefine.alignment/1"

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from symrefine.export.records import number, numbers, opening, placed, seconds
+from symrefine.ndim import Hyperplane, SubspaceDetection
 from symrefine.shape import Shape
-from symrefine.subspace import Hyperplane, SubspaceDetection
 
 SCHEMA = "symrefine.detection_nd/1"
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array, read_only
-from symrefine.moments import Moments, exponents
+from symrefine.moments.moments import Moments, exponents
 from symrefine.shape import Index
 
 # The 3-D orders of the paper's experiments: 17 triplets from moments to order 5.

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from symrefine.refine import Iterate
+from symrefine.fit.refine import Iterate
 
 
 def cost_series(history: Sequence[Iterate]) -> list[float]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from symrefine.detect import Detection, FoundAxis
 from symrefine.picture.scene import AXIS, MISS, Colour, plane_colour
 from symrefine.picture.words import direction, order_name
-from symrefine.verify import Deviation
+from symrefine.surface.misses import Deviation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

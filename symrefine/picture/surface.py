@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, read_only
+from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.picture.scene import OBJECT, Quad, Scene
-from symrefine.quadrature import triangle_areas_and_normals
 from symrefine.shape import Index, Shape
 
 # Points of a cloud that are painted, and the fewest whose neighbourhoods say anything about normals.

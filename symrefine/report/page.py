@@ -6,15 +6,15 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.metadata import version
 
-from symrefine.axis import SIGNIFICANT
 from symrefine.detect import Detection
+from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.picture.measures import inlier_series, rms_series, turn_series_deg
 from symrefine.picture.rows import Row, found_rows, near_miss_rows
 from symrefine.picture.words import coordinates, fit, headline, meaning, percent, symbol, tuples_meaning
 from symrefine.report.charts import bar_chart, line_chart
 from symrefine.report.style import STYLE
 from symrefine.shape import Shape
-from symrefine.verify import LIMITS, Deviation
+from symrefine.surface.misses import LIMITS, Deviation
 
 _MISSES = ("mean", "p95", "p99", "max")
 _MISS_NAMES = ("mean", "95 %", "99 %", "largest")

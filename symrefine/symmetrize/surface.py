@@ -6,9 +6,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from symrefine.geometry import Array
-from symrefine.matching import local_planes
-from symrefine.quadrature import sample_surface
+from symrefine.moments.quadrature import sample_surface
 from symrefine.shape import Index, Shape
+from symrefine.surface.skin import local_planes
 
 # Samples that lead to the triangles near a point, and how many of them are asked.
 SAMPLES, ASKED = 20000, 8

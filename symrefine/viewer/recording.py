@@ -18,11 +18,11 @@ import numpy as np
 from symrefine.detect import Detection
 from symrefine.errors import InputError
 from symrefine.files import whole
+from symrefine.fit.refine import Iterate
 from symrefine.geometry import Array, Plane
 from symrefine.picture.measures import cost_series, inlier_series, step_series, theta_series_deg, turn_series_deg
 from symrefine.picture.scene import AXIS as DARK
 from symrefine.picture.scene import MISS, OBJECT, Colour, Line, Quad, Scene, make_scene, plane_colour
-from symrefine.refine import Iterate
 from symrefine.shape import Shape
 from symrefine.viewer.layout import SERIES, blueprint
 from symrefine.viewer.text import iteration_line, markdown, report_lines

@@ -4,11 +4,11 @@ import math
 from collections.abc import Iterable, Sequence
 
 from symrefine.detect import Detection
+from symrefine.fit.refine import Iterate
 from symrefine.picture.rows import found_rows, near_miss_rows
 from symrefine.picture.words import coordinates, fit, headline, percent, tuples_meaning
-from symrefine.refine import Iterate
 from symrefine.shape import Shape
-from symrefine.verify import Deviation
+from symrefine.surface.misses import Deviation
 
 
 def markdown(detection: Detection, shape: Shape) -> str:

@@ -9,10 +9,10 @@ from scipy.stats import f as f_distribution
 from experiments.shapes import asymmetric, box, join
 from symrefine.errors import InputError
 from symrefine.geometry import random_orthogonal
-from symrefine.moments import Moments, central_moments, exponents, raw_moments, shape_moments
+from symrefine.moments.moments import Moments, central_moments, exponents, raw_moments, shape_moments
+from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import PAPER_ORDERS, NTuples, ntuples
 from symrefine.ntuples.derive import derive
-from symrefine.quadrature import sample_surface
 
 SEEDS = st.integers(0, 2**32 - 1)
 # method.md, section 2: dimension, orders, number of n-tuples with reflection.

@@ -1,0 +1,112 @@
+"""The answer to "which map takes one object onto another", with what else would do as well and how well it does."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from symrefine.align.coset import Coset
+from symrefine.geometry import Array, read_only
+
+OK = "ok"
+# How a status begins that leaves open whether the objects agree.
+OPEN = "not determined"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Alignment:
+    """`target ~ scale * matrix @ source + translation`, and what else would do as well.
+
+    Attributes:
+        matrix: [n, n] orthogonal, determinant +1 or -1; +1 wherever both explain the pair equally well.
+        translation: [n], units of the target.
+        scale: 1.0 unless it was asked for.
+        sigma_rad: standard deviation of the rotation from sampling noise; 0 where the moments agree to rounding, large
+            where some turn is not observable.
+        exact: whether the moments of both agree to rounding: the same points in another pose.
+        timings: seconds by stage.
+    """
+
+    matrix: Array
+    translation: Array
+    scale: float
+    sigma_rad: float
+    exact: bool
+    timings: dict[str, float]
+    _coset: Callable[[], Coset] = field(repr=False)
+    _miss: Callable[[], tuple[float, str]] = field(repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "matrix", read_only(self.matrix))
+        object.__setattr__(self, "translation", read_only(self.translation))
+
+    @property
+    def determinant(self) -> int:
+        """+1 for a rotation, -1 for a reflection or rotoreflection."""
+        return int(np.sign(np.linalg.det(self.matrix)))
+
+    @property
+    def transform(self) -> Array:
+        """Homogeneous matrix [n+1, n+1], scale included."""
+        return _homogeneous(self.scale * self.matrix, self.translation)
+
+    def apply(self, points: ArrayLike) -> Array:
+        """Points [N, n] of the source, in the pose of the target."""
+        return np.asarray(self.scale * (np.asarray(points, dtype=np.float64) @ self.matrix.T) + self.translation)
+
+    @cached_property
+    def coset(self) -> Coset:
+        """All maps that do equally well; in 3-space from what `detect` finds in the target, on first use."""
+        return self._coset()
+
+    @property
+    def equivalents(self) -> Array:
+        """[k, n, n] matrices of the coset, `matrix` first; one for each connected part if some subspace is free."""
+        return self.coset.matrices
+
+    @property
+    def equivalent_transforms(self) -> Array:
+        """[k, n+1, n+1] homogeneous matrices of the coset, scale included."""
+        pairs = zip(self.coset.matrices, self.coset.translations, strict=True)
+        return np.array([_homogeneous(self.scale * m, t) for m, t in pairs])
+
+    @property
+    def observable(self) -> str:
+        """What the pair determines: "full", or up to what."""
+        return self.coset.observable
+
+    @property
+    def free_axis(self) -> Array:
+        """[0 or 1, 3] direction in the target about which any turn does equally well; n = 3 only."""
+        free = self.coset.free
+        return np.cross(free[0], free[1])[None] if free.shape == (2, 3) else np.zeros((0, self.matrix.shape[0]))
+
+    @cached_property
+    def _fit(self) -> tuple[float, str]:
+        return self._miss()
+
+    @property
+    def rms(self) -> float:
+        """Root mean square distance from the moved source to the target as a fraction of the target's diagonal.
+
+        In 3-space between denoised surfaces; elsewhere, and for fewer than 60 points, to the nearest point.
+        """
+        return self._fit[0]
+
+    @property
+    def status(self) -> str:
+        """ "ok", or why the result should not be relied upon."""
+        return self._fit[1]
+
+    @property
+    def is_misfit(self) -> bool:
+        """Whether no map that was admitted takes the source onto the target: then `matrix` is the closest found."""
+        return not self.status.startswith((OK, OPEN))
+
+
+def _homogeneous(matrix: Array, shift: Array) -> Array:
+    full = np.eye(len(shift) + 1)
+    full[:-1, :-1], full[:-1, -1] = matrix, shift
+    return full

@@ -1,0 +1,150 @@
+"""The two objects of an alignment in 3-space, and what is known of them: each part worked out when first needed."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from symrefine.align.harmonic_fit import HarmonicPair, harmonic_pair
+from symrefine.align.polish import Probes, probes, probes_of
+from symrefine.align.procrustes import Procrustes, procrustes
+from symrefine.align.skin import Skin, isolated, patches, skin, skin_of
+from symrefine.align.surfaces import Surfaces
+from symrefine.geometry import Array
+from symrefine.moments.moments import Moments, central_moments
+from symrefine.moments.quadrature import sample_surface
+from symrefine.ntuples.contract import ntuples
+from symrefine.propose.folds import azimuthal_spectrum
+from symrefine.shape import Shape
+
+# Local planes of the source and of the target, and points below which local planes say nothing.
+SOURCE_PLANES, TARGET_PLANES, FEWEST = 1000, 2000, 60
+# Points of the source that are moved by a polish: without noise, under noise, and for a look.
+CLEAN, NOISY, LOOK = 600, 1000, 400
+# Points of a cloud that planes are fitted to at most, and points that a mesh is sampled at.
+DENSE, SAMPLES = 40000, 10000
+# Where neither side has more points than this they stand for themselves (atoms), not for a surface.
+FEW = 250
+# Neighbours whose distance tells the density at a point, and the bound of what is made of it, over the median.
+DENSITY_NEIGHBOURS, DENSITY_BOUND = 8, 30.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Side:
+    """One of the two objects: its moments, and the weights of its points if it is a cloud."""
+
+    shape: Shape
+    moments: Moments
+    weights: Array
+
+    @property
+    def is_mesh(self) -> bool:
+        """Whether the points are vertices and the moments exact."""
+        return self.shape.faces is not None
+
+    def evened(self) -> "Side":
+        """The same cloud, each point weighted by the area its neighbours leave it, unless the weights are given."""
+        from scipy.spatial import cKDTree
+
+        if self.is_mesh or self.shape.weights is not None:
+            return self
+        points, reach = self.shape.points, min(DENSITY_NEIGHBOURS, len(self.shape.points) - 1)
+        area = cKDTree(points).query(points, k=[reach + 1])[0][:, 0] ** 2
+        middle = max(float(np.median(area)), 1e-300)
+        weights = np.clip(area, middle / DENSITY_BOUND, middle * DENSITY_BOUND)
+        parts = len(self.moments.replicates)
+        moments = central_moments(points, weights, self.moments.order, parts=parts)
+        return Side(shape=self.shape, moments=moments, weights=weights / weights.sum())
+
+    def skin(self, unit: float, rng: np.random.Generator) -> Skin:
+        """The surface about the centre, in units of `unit`."""
+        points, normals = self._points(unit, rng)
+        return skin(points, normals, rng, exact=self.is_mesh)
+
+    def _points(self, unit: float, rng: np.random.Generator) -> tuple[Array, Array | None]:
+        """Points about the centre, and normals if they are known: of the cloud, or samples of the mesh."""
+        points, normals = self.shape.points, self.shape.normals
+        if self.is_mesh:
+            points, normals, _ = sample_surface(self.shape, SAMPLES, rng)
+        elif len(points) > DENSE:
+            some = rng.choice(len(points), DENSE, replace=False)
+            points, normals = points[some], None if normals is None else normals[some]
+        return (points - self.moments.center) / unit, normals
+
+    def azimuths(self, frame: Array) -> Array:
+        """Azimuthal coefficients [K, 4] about the frame's third axis, scaled by what random azimuths would give."""
+        points = self.shape.points
+        weights = self.weights
+        if self.is_mesh:
+            points, _, _ = sample_surface(self.shape, 20000, np.random.default_rng(0))
+            weights = np.full(len(points), 1.0 / len(points))
+        local = (points - self.moments.center) @ frame.T / self.moments.scale
+        c, sigma = azimuthal_spectrum(local, weights, np.array([0.0, 0.0, 1.0]))
+        return c / sigma
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Evidence:
+    """Everything an alignment in 3-space may use; each part is worked out when first needed."""
+
+    source: Side
+    target: Side
+    scale: bool
+    tolerance: float
+    seed: int
+
+    @cached_property
+    def closed(self) -> Procrustes:
+        """Procrustes solution of the n-tuples."""
+        return procrustes(ntuples(self.source.moments), ntuples(self.target.moments))
+
+    @cached_property
+    def harmonics(self) -> HarmonicPair:
+        """Harmonic moments of both sides."""
+        return harmonic_pair(self.source.moments, self.target.moments)
+
+    @cached_property
+    def skins(self) -> tuple[Skin, Skin]:
+        """Source and target as the points show them, each about its own centre, in units of the target."""
+        sides, unit = (self.source, self.target), self.target.moments.scale
+        units = (self.source.moments.scale if self.scale else unit, unit)
+        if few(self.source.shape, self.target.shape):
+            atoms = [(s.shape.points - s.moments.center) / u for s, u in zip(sides, units, strict=True)]
+            return isolated(atoms[0]), isolated(atoms[1])
+        return self.source.skin(units[0], self._rng()), self.target.skin(units[1], self._rng())
+
+    @cached_property
+    def probes(self) -> Probes:
+        """Points of the source that a polish moves."""
+        return probes(self.skins[0], NOISY if self.skins[0].is_noisy else CLEAN, self._rng())
+
+    @cached_property
+    def surfaces(self) -> Surfaces:
+        """Local planes of both sides, for the judgement."""
+        source, target = self.skins
+        return Surfaces(
+            source=patches(source, SOURCE_PLANES, self._rng()),
+            target=patches(target, TARGET_PLANES, self._rng()),
+            tolerance=self.tolerance,
+        )
+
+    @cached_property
+    def coarse(self) -> tuple[Probes, Skin]:
+        """What a quick polish moves and meets: the local planes of the judgement."""
+        return probes_of(self.surfaces.source, LOOK), skin_of(self.surfaces.target)
+
+    def _rng(self) -> np.random.Generator:
+        return np.random.default_rng(self.seed)
+
+    @property
+    def has_points(self) -> bool:
+        """Whether there is enough on both sides to judge: surfaces, or few points that stand for themselves."""
+        sides = (self.source.shape, self.target.shape)
+        solid = {s.measure for s in sides} == {"solid", "points"}
+        enough = all(s.faces is not None or len(s.points) >= FEWEST for s in sides)
+        return few(*sides) or (enough and not solid)
+
+
+def few(source: Shape, target: Shape) -> bool:
+    """Whether both are sets of points that stand for themselves."""
+    return all(s.faces is None and len(s.points) <= FEW for s in (source, target))

@@ -1,0 +1,237 @@
+"""Which orthogonal map explains two objects of 3-space: the moments propose, and decide where they can; else points do.
+
+Where the n-tuples fix the map but for its determinant, Procrustes gives the starts; else the landscape of all harmonic
+moments over O(3). Gauss-Newton on the moments sharpens them, and its cost leaves only rivals that sampling noise cannot
+tell apart: the two determinants of a thin propeller, or the teeth of a gear that no moment of order 8 sees. Those are
+polished and judged on the points.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from symrefine.align.harmonic_fit import (
+    HarmonicFit,
+    fit,
+    hills,
+    landscape,
+    mismatch,
+    preference,
+    rotation_covariance,
+)
+from symrefine.align.pair import Evidence, few
+from symrefine.align.polish import MAX_OUTER, Polished, Probes, Similarity, polish
+from symrefine.align.skin import Skin
+from symrefine.geometry import Array, frame_with_z, rotation
+
+# Hills of the landscape that are climbed, for each determinant: a few steps for all, the rest for those in sight.
+HILLS = 8
+FIRST_STEPS, LAST_STEPS = 4, 8
+IN_SIGHT = 30.0
+# A map whose cost exceeds the best by this factor, and by this much per coefficient, is out; measured on 52 objects,
+# costs of true maps scatter between 0.02 and 2.5 per coefficient.
+RIVAL = 5.0
+PER_COEFFICIENT = 2.0
+# Above this cost per coefficient the moments hardly fit, and the densities may differ; above the second not at all.
+UNEVEN, MISFIT = 4.0, 20.0
+# Moments that agree to this are those of the same points.
+ROUNDING = 1e-7
+# Singular values of the n-tuples this many times beyond significance make the landscape unnecessary.
+CLEAR = 2.5
+# Standard deviations by which the moments must prefer one determinant to decide it alone.
+DECIDED = 5.0
+# A rival that misses by less than this share of the limits is good; no other of its determinant is tried.
+GOOD = 0.35
+# The proper map is as good if its miss is below this many times that of the improper one: 1.2 at most for exact mirror
+# symmetry; 2.5 and more for a propeller, a camera, a posed ant.
+AS_GOOD = 2.0
+# Rivals judged for each determinant, and matchings spent on each; fewer where the other determinant has a good
+# one already, and no search for phases where they are hopeless.
+JUDGED, LOOK_OUTER = 4, 4
+LAST_CHANCE, HOPELESS = 2, 2.0
+# Bounds of what the start of a polish may be off, radians; the moments' own estimate lies between.
+START_ERROR = (0.01, 0.3)
+# Standard deviation that the moments' rotation is never trusted beyond, radians.
+TRUST = 1e-3
+PHASES, PHASE_GRID = 3, 720
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Choice:
+    """The map chosen, in units of the target about the two centres.
+
+    Attributes:
+        evidence: what it rests on; the centres are those of its moments.
+        motion: matrix, shift and scale.
+        covariance: [3, 3] of the rotation as the moments know it, target axes.
+        exact: whether the moments agree to rounding, as for the same points on both sides.
+        misfit: cost per coefficient; about 1 or below if sampling noise explains the difference of the moments.
+        excess: miss over its limit; 0 where the moments were enough to decide.
+    """
+
+    evidence: Evidence
+    motion: Similarity
+    covariance: Array
+    exact: bool
+    misfit: float
+    excess: float
+
+    @property
+    def merit(self) -> tuple[float, float]:
+        """The less the better: first that the surfaces agree well, then that the moments do."""
+        return max(self.excess, GOOD), self.misfit
+
+
+def choose(evidence: Evidence, *, reflections: bool = True) -> Choice:
+    """The best map over O(3), or over SO(3) without reflections; determinant +1 wherever both do equally well.
+
+    Where the moments do not fit, the densities of the clouds may differ: a second try gives every point its share of
+    the area.
+    """
+    first = _choose(evidence, reflections)
+    if first.merit <= (GOOD, UNEVEN) or few(evidence.source.shape, evidence.target.shape):
+        return first
+    evened = replace(evidence, source=evidence.source.evened(), target=evidence.target.evened())
+    return min(first, _choose(evened, reflections), key=lambda c: c.merit)
+
+
+def _choose(evidence: Evidence, reflections: bool) -> Choice:
+    fitted = candidates(evidence, (1, -1) if reflections else (1,))
+    exact = fitted.matrices[mismatch(evidence.harmonics, fitted.matrices) < ROUNDING]
+    if len(exact):
+        best = Similarity(matrix=exact[int(np.argmax(np.linalg.det(exact)))], shift=np.zeros(3))
+        return Choice(evidence=evidence, motion=best, covariance=np.zeros((3, 3)), exact=True, misfit=0.0, excess=0.0)
+    rivals, misfit = _rivals(evidence, fitted), float(fitted.costs[0]) / evidence.harmonics.size
+    covariance = _covariance(evidence, fitted, max(1.0, misfit))
+    motion, excess = Similarity(matrix=rivals.matrices[0], shift=np.zeros(3)), 0.0
+    if (len(rivals.costs) > 1 or misfit > MISFIT) and evidence.has_points:
+        judged = _judged(evidence, rivals, covariance)
+        motion, excess = judged.motion, judged.excess
+    return Choice(evidence=evidence, motion=motion, covariance=covariance, exact=False, misfit=misfit, excess=excess)
+
+
+def _rivals(evidence: Evidence, fitted: HarmonicFit) -> HarmonicFit:
+    """Fits that sampling noise cannot tell from the best; of the best one's determinant alone if that is decided."""
+    pair = evidence.harmonics
+    near = fitted[fitted.costs <= fitted.costs[0] * RIVAL + PER_COEFFICIENT * pair.size]
+    signs = np.sign(np.linalg.det(near.matrices))
+    mirrored = np.flatnonzero(signs != signs[0])
+    misfit = max(1.0, float(fitted.costs[0]) / pair.size)
+    if len(mirrored) and preference(pair, near.matrices[0], near.matrices[mirrored[0]]) > DECIDED * np.sqrt(misfit):
+        return near[np.flatnonzero(signs == signs[0])]
+    return near
+
+
+def candidates(evidence: Evidence, determinants: tuple[int, ...]) -> HarmonicFit:
+    """Maps that explain the moments, by rising cost."""
+    closed, pair = evidence.closed, evidence.harmonics
+    starts = [m for m in (closed.matrix, closed.flipped) if int(np.sign(np.linalg.det(m))) in determinants]
+    if closed.singular_values[1] > CLEAR * closed.significance:
+        fitted = fit(pair, np.array(starts), steps=FIRST_STEPS + LAST_STEPS)
+        if fitted.costs[0] < UNEVEN * pair.size:
+            return fitted
+    scores = dict(zip((1, -1), landscape(evidence.source.moments, evidence.target.moments, pair), strict=True))
+    climbed = [hills(scores[d], d, count=HILLS) for d in determinants]
+    coarse = fit(pair, np.concatenate([starts, *climbed]), steps=FIRST_STEPS)
+    near = coarse[coarse.costs <= IN_SIGHT * (coarse.costs[0] + pair.size)]
+    return _distinct(fit(pair, near.matrices, steps=LAST_STEPS))
+
+
+def _distinct(fitted: HarmonicFit) -> HarmonicFit:
+    kept: list[int] = []
+    for i, m in enumerate(fitted.matrices):
+        if all(np.linalg.norm(m - fitted.matrices[k]) > 0.02 for k in kept):
+            kept.append(i)
+    return fitted[np.array(kept)]
+
+
+def _covariance(evidence: Evidence, fitted: HarmonicFit, misfit: float) -> Array:
+    """Covariance of the best fit from the jackknife and from what the moments misfit beyond their noise."""
+    inverse = np.linalg.pinv(fitted.hessians[0], rcond=1e-12, hermitian=True)
+    return misfit * (rotation_covariance(evidence.harmonics, fitted.matrices[0], fitted.hessians[0]) + inverse)
+
+
+def _start_error(covariance: Array) -> float:
+    """Three standard deviations of the rotation, within bounds: how far a start may be off."""
+    return float(np.clip(3.0 * np.sqrt(np.trace(covariance)), *START_ERROR))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Judged:
+    motion: Similarity
+    excess: float
+
+
+def _judged(evidence: Evidence, rivals: HarmonicFit, covariance: Array) -> _Judged:
+    """The rival that the points confirm best; the proper one if its mirror image does no better."""
+    best: dict[int, _Judged] = {}
+    for det in _by_cost(rivals.matrices):
+        of_det = [m for m in rivals.matrices if np.linalg.det(m) * det > 0.0]
+        beaten = any(b.excess <= GOOD for b in best.values())
+        found = _first_good(evidence, iter(of_det[: LAST_CHANCE if beaten else JUDGED]), covariance)
+        nearest = min(f.excess for f in found)
+        if nearest > GOOD and not (beaten and nearest > HOPELESS):
+            found += _first_good(evidence, _phases(evidence, of_det[0], rivals), covariance)
+        best[det] = min(found, key=lambda f: f.excess)
+    if len(best) < 2:
+        return next(iter(best.values()))
+    proper, improper = best[1], best[-1]
+    as_good = proper.excess <= min(1.0, max(GOOD, AS_GOOD * improper.excess)) or proper.excess <= improper.excess
+    return proper if as_good else improper
+
+
+def _by_cost(matrices: Array) -> list[int]:
+    """The determinants among matrices, in the order in which they first occur."""
+    return list(dict.fromkeys(int(s) for s in np.sign(np.linalg.det(matrices))))
+
+
+def _first_good(evidence: Evidence, matrices: Iterator[Array], covariance: Array) -> list[_Judged]:
+    """Polish and judge one after the other until one is good."""
+    found: list[_Judged] = []
+    for m in matrices:
+        start = Similarity(matrix=m, shift=np.zeros(3))
+        motion = _polish(evidence, evidence.coarse, start, covariance, LOOK_OUTER).motion
+        found.append(_Judged(motion=motion, excess=evidence.surfaces.excess(motion)))
+        if found[-1].excess <= GOOD:
+            break
+    return found
+
+
+def _phases(evidence: Evidence, matrix: Array, rivals: HarmonicFit) -> Iterator[Array]:
+    """The best turns about the axis that the moments know least about, from the azimuths of both clouds.
+
+    With c_k the azimuthal coefficients about that axis, a turn by phi multiplies those of the source by exp(i k phi).
+    """
+    axis = np.linalg.eigh(rivals.hessians[0])[1][:, 0]
+    frame = frame_with_z(axis)
+    source, target = evidence.source.azimuths(frame @ matrix), evidence.target.azimuths(frame)
+    spectrum = np.zeros(PHASE_GRID, complex)
+    spectrum[1 : len(source)] = (np.conj(target) * source).sum(axis=1)[1:]
+    score = np.fft.ifft(spectrum).real
+    for _ in range(PHASES):
+        i = int(np.argmax(score))
+        yield rotation(axis, 2.0 * np.pi * i / PHASE_GRID) @ matrix
+        window = (np.arange(-6, 7) + i) % PHASE_GRID
+        score[window] = -np.inf
+
+
+def polished(evidence: Evidence, start: Similarity, covariance: Array) -> Polished:
+    """Polish on the points of the evidence from a start whose rotation the moments know with this covariance [3, 3]."""
+    return _polish(evidence, (evidence.probes, evidence.skins[1]), start, covariance, MAX_OUTER)
+
+
+def _polish(
+    evidence: Evidence, points: tuple[Probes, Skin], start: Similarity, covariance: Array, outer: int
+) -> Polished:
+    error, known = _start_error(covariance), _information(evidence, covariance)
+    return polish(*points, start, error=error, known=known, scale=evidence.scale, outer=outer)
+
+
+def _information(evidence: Evidence, covariance: Array) -> Array:
+    """Inverse covariance [6, 6] of rotation and shift (RMS radii) that the moments carry."""
+    known: Array = np.zeros((6, 6))
+    known[:3, :3] = np.linalg.inv(covariance + TRUST**2 * np.eye(3))
+    counts = [np.sum(s.weights**2) for s in (evidence.source, evidence.target)]
+    known[3:, 3:] = np.eye(3) / (sum(counts) / 3.0 + TRUST**2)
+    return known

@@ -1,0 +1,286 @@
+"""Alignment, the other story: the orthogonal map between two objects, reflections included, without correspondences.
+
+moments of both -> n-tuples -> Procrustes (or the landscape over O(3) where the tuples vanish) -> Gauss-Newton on all
+moments -> rivals judged on the points -> polish on the points -> the coset of maps that do equally well.
+Elsewhere than in 3-space: moments -> n-tuples -> Procrustes -> Gauss-Newton on the moments.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from symrefine.align.alignment import OK, OPEN, Alignment
+from symrefine.align.coset import Coset, coset_of_group, coset_of_list, lifted
+from symrefine.align.moment_fit import moment_fit
+from symrefine.align.pair import Evidence, Side, few
+from symrefine.align.polish import Similarity
+from symrefine.align.procrustes import procrustes
+from symrefine.align.rivals import MISFIT, ROUNDING, choose, polished
+from symrefine.detect import Clock, detect
+from symrefine.errors import DegenerateShapeError, InputError
+from symrefine.geometry import Array
+from symrefine.groups import PointGroup
+from symrefine.moments.moments import Moments, central_moments, shape_moments
+from symrefine.moments.quadrature import mesh_nodes
+from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
+from symrefine.plane import detect_planar
+from symrefine.shape import Shape
+from symrefine.surface.misses import TOLERANCE
+
+__all__ = ["Alignment", "align"]
+
+ORDER, PARTS = 8, 16
+# Orders in other dimensions: n^order components each.
+ORDER_ND, ORDER_HIGH = 5, 3
+HIGH_DIMENSION, HIGHEST_DIMENSION = 7, 10
+# Variance across, as a fraction of the whole, below which points count as lying in a subspace: rounding of float32.
+FLAT = 1e-12
+# Radii that differ by more than this factor are no matter of sampling.
+RADII = 1.2
+
+
+def align(
+    source: Shape | ArrayLike,
+    target: Shape | ArrayLike,
+    *,
+    scale: bool = False,
+    polish: bool = True,
+    allow_reflection: bool = True,
+    tolerance: float = TOLERANCE,
+    seed: int = 0,
+) -> Alignment:
+    """Orthogonal map and translation that take one object onto another; samplings, densities and formats may differ.
+
+    Args:
+        source: a `Shape`, or points [N, n].
+        target: a `Shape`, or points [M, n].
+        scale: whether the objects may differ in size; then `target ~ scale * matrix @ source + translation`.
+        polish: refine on the points (3-space only); without it the moments have the last word, in half of the time.
+        allow_reflection: whether determinant -1 is an answer.
+        tolerance: largest miss that still counts as agreement, as in `detect`: decides between rivals, and symmetry.
+        seed: of the random choices (samples of meshes, subsets of clouds).
+
+    Raises:
+        InputError: points that cannot be used, of different dimensions, or options out of range.
+        DegenerateShapeError: the points do not spread.
+    """
+    a, b = (_shape(s, name) for s, name in ((source, "source"), (target, "target")))
+    _check(a, b, tolerance)
+    clock = Clock()
+    with clock("moments"):
+        parts = 0 if few(a, b) else PARTS
+        sides = _side(a, parts), _side(b, parts)
+    ranks = [_rank(s.moments) for s in sides]
+    if max(ranks) - min(ranks) > 1:
+        lean, full = (a, b) if ranks[0] < ranks[1] else (b, a)
+        raise DegenerateShapeError(
+            f"{lean.source} spans {min(ranks)} of {a.dim} dimensions, {full.source} {max(ranks)}: nothing maps them"
+        )
+    if a.dim != 3 or max(ranks) < 3:
+        return _align_moments(sides, scale, allow_reflection, clock)
+    evidence = Evidence(
+        source=sides[0], target=sides[1], scale=scale or _unlike(*sides), tolerance=tolerance, seed=seed
+    )
+    return _align_solid(evidence, scale, polish, allow_reflection, clock)
+
+
+def _shape(values: Shape | ArrayLike, name: str) -> Shape:
+    return values if isinstance(values, Shape) else Shape(points=np.asarray(values), source=name)
+
+
+def _check(source: Shape, target: Shape, tolerance: float) -> None:
+    if source.dim != target.dim:
+        raise InputError(
+            f"{source.source} has {source.dim} coordinates, {target.source} has {target.dim}; both need the same number"
+        )
+    if source.dim > HIGHEST_DIMENSION:
+        raise InputError(f"points have {source.dim} coordinates; align takes {HIGHEST_DIMENSION} at most")
+    if {source.measure, target.measure} == {"surface", "solid"}:
+        raise InputError(
+            f"{source.source} is taken as a {source.measure}, {target.source} as a {target.measure}; "
+            "their moments differ, give both the same measure"
+        )
+    if not 0.0 < tolerance <= 0.2:
+        raise InputError(f"tolerance is {tolerance}; expected a fraction of the diagonal in (0, 0.2]")
+
+
+def _order(dim: int) -> int:
+    return ORDER if dim <= 3 else ORDER_ND if dim < HIGH_DIMENSION else ORDER_HIGH
+
+
+def _side(shape: Shape, parts: int) -> Side:
+    order = _order(shape.dim)
+    if shape.faces is not None:
+        return Side(shape=shape, moments=shape_moments(shape, order), weights=np.zeros(0))
+    weights = np.ones(len(shape.points)) if shape.weights is None else shape.weights
+    return Side(shape=shape, moments=shape_moments(shape, order, parts=parts), weights=weights / weights.sum())
+
+
+def _rank(moments: Moments) -> int:
+    """Dimension of the subspace that the points spread in."""
+    return int((np.linalg.eigvalsh(moments.covariance) > FLAT).sum())
+
+
+def _unlike(source: Side, target: Side) -> bool:
+    """Whether the sizes differ by more than sampling explains."""
+    return not 1.0 / RADII < target.moments.scale / source.moments.scale < RADII
+
+
+def _same_size(source: Side, target: Side) -> bool:
+    """Whether the sizes agree to rounding."""
+    return abs(target.moments.scale / source.moments.scale - 1.0) < ROUNDING
+
+
+def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: bool, clock: Clock) -> Alignment:
+    """The story in 3-space. Objects of unlike size are compared at one size, even where the scale is not asked for."""
+    with clock("choose"):
+        choice = choose(evidence, reflections=reflections)
+    evidence, motion, covariance = choice.evidence, choice.motion, choice.covariance
+    if polish and not choice.exact and evidence.has_points:
+        with clock("planes"):
+            _ = evidence.probes
+        with clock("polish"):
+            done = polished(evidence, motion, covariance)
+            motion, covariance = done.motion, done.covariance[:3, :3]
+    matrix, translation, factor = _in_input_units(evidence, motion, scale)
+
+    def coset() -> Coset:
+        group, center = _symmetry(evidence, motion)
+        return coset_of_group(matrix, translation, group, center, reflections=reflections)
+
+    return Alignment(
+        matrix=matrix,
+        translation=translation,
+        scale=factor,
+        sigma_rad=float(np.sqrt(np.trace(covariance))),
+        exact=choice.exact and (scale or _same_size(evidence.source, evidence.target)),
+        timings=clock.seconds,
+        _coset=coset,
+        _miss=lambda: _miss(evidence, motion, scale, choice.exact),
+    )
+
+
+def _symmetry(evidence: Evidence, motion: Similarity) -> tuple[PointGroup, Array]:
+    """Symmetry group of the target and its centre, from whichever of the two objects is the better known."""
+    side = max(evidence.target, evidence.source, key=lambda s: (s.is_mesh, len(s.shape.points)))
+    found = detect(side.shape, tolerance=evidence.tolerance, seed=evidence.seed)
+    if side is evidence.target:
+        return found.group, found.center
+    # R G R' = (-R) G (-R)', so a rotation turns the frame; the centre moves with the object, at the target's size.
+    matrix, translation, factor = _in_input_units(evidence, motion, evidence.scale)
+    frame = found.group.frame @ matrix.T * np.sign(np.linalg.det(matrix))
+    return PointGroup(name=found.group.name, frame=frame), factor * (matrix @ found.center) + translation
+
+
+def _in_input_units(evidence: Evidence, motion: Similarity, scale: bool) -> tuple[Array, Array, float]:
+    """Matrix, translation and scale for the input's own coordinates."""
+    a, b = evidence.source.moments, evidence.target.moments
+    factor = motion.scale * b.scale / a.scale if scale else 1.0
+    return motion.matrix, b.center + b.scale * motion.shift - factor * (motion.matrix @ a.center), factor
+
+
+def _miss(evidence: Evidence, motion: Similarity, scale: bool, exact: bool) -> tuple[float, str]:
+    """rms and status in 3-space."""
+    a, b = evidence.source, evidence.target
+    status = OK if scale else _sizes(a, b)
+    if status != OK or not evidence.has_points:
+        return _nearest(a.shape, b.shape, *_in_input_units(evidence, motion, scale)), status
+    misses = evidence.surfaces.misses(motion)
+    rms, excess = float(np.sqrt(np.mean(misses**2))), evidence.surfaces.excess(motion)
+    if excess <= 1.0 or exact:
+        return rms, OK
+    return rms, (
+        f"the objects differ by {excess:.1f} times what the tolerance allows: 99 % of the source comes within "
+        f"{100 * float(np.quantile(misses, 0.99)):.2g} % of the diagonal"
+    )
+
+
+def _sizes(source: Side, target: Side) -> str:
+    if not _unlike(source, target):
+        return OK
+    ratio = target.moments.scale / source.moments.scale
+    return f"the target is {ratio:.3g} times as large as the source: ask for the scale"
+
+
+def _nearest(source: Shape, target: Shape, matrix: Array, translation: Array, scale: float) -> float:
+    """Root mean square distance of the moved source points to the nearest point of the target, over its diagonal."""
+    from scipy.spatial import cKDTree
+
+    moved = scale * (source.points @ matrix.T) + translation
+    distance, _ = cKDTree(target.points).query(moved)
+    return float(np.sqrt(np.mean(distance**2)) / target.diagonal)
+
+
+def _align_moments(sides: tuple[Side, Side], scale: bool, reflections: bool, clock: Clock) -> Alignment:
+    """The story elsewhere, and for sets that span fewer dimensions than they live in: moments within the span."""
+    a, b = sides
+    dim, rank = a.shape.dim, max(_rank(a.moments), _rank(b.moments))
+    bases = [np.eye(dim) if rank == dim else np.linalg.eigh(s.moments.covariance)[1].T[::-1] for s in (a, b)]
+    with clock("choose"):
+        source, target = _within(a, bases[0][:rank]), _within(b, bases[1][:rank])
+        orders = [t for t in PAPER_ORDERS if max(t) <= source.order]
+        tuples = ntuples(source, orders), ntuples(target, orders)
+        found = moment_fit(source, target, tuples, procrustes(*tuples), reflections=reflections or rank < dim)
+    factor = b.moments.scale / a.moments.scale if scale else 1.0
+    if rank == dim:
+        coset = coset_of_list(found.matrices, a.moments.center, b.moments.center, factor, found.free)
+    else:
+        inner = coset_of_list(found.matrices, np.zeros(rank), np.zeros(rank), factor, found.free)
+        centers = (a.moments.center, b.moments.center)
+        coset = lifted(inner, bases[0], bases[1], centers, factor, reflections=reflections)
+    matrix, translation = coset.matrices[0], coset.translations[0]
+
+    def miss() -> tuple[float, str]:
+        status = OK if scale else _sizes(a, b)
+        if found.misfit > MISFIT and not found.exact:
+            status = f"the moments differ by {found.misfit:.0f} times what sampling explains"
+        if status == OK and not np.isfinite(found.sigma_rad) and not found.exact:
+            status = f"{OPEN}: the noise of the moments hides every direction; give more points"
+        return _nearest(a.shape, b.shape, matrix, translation, factor), status
+
+    return Alignment(
+        matrix=matrix,
+        translation=translation,
+        scale=factor,
+        sigma_rad=0.0 if found.exact else found.sigma_rad,
+        exact=found.exact and (scale or _same_size(a, b)),
+        timings=clock.seconds,
+        _coset=(lambda: _planar_coset(b.shape, coset, reflections)) if dim == rank == 2 else (lambda: coset),
+        _miss=miss,
+    )
+
+
+def _planar_coset(target: Shape, known: Coset, reflections: bool) -> Coset:
+    """In the plane, the operations of the target that `detect_planar` finds, after the map that is known."""
+    found = detect_planar(target)
+    if (
+        found.undetermined
+        or not np.isfinite(found.group.order)
+        or found.group.order <= len(known.matrices)
+        or len(known.free)
+    ):
+        return known
+    operations = found.group.operations()
+    if not reflections:
+        operations = operations[np.linalg.det(operations) > 0]
+    first, shift = known.matrices[0], known.translations[0]
+    either = ", and the determinant is free" if np.linalg.det(operations).min() < 0 else ""
+    return Coset(
+        matrices=operations @ first,
+        translations=operations @ (shift - found.center) + found.center,
+        free=known.free,
+        symmetry=found.point_group,
+        observable=f"up to the {len(operations)} operations of {found.point_group}{either}",
+    )
+
+
+def _within(side: Side, basis: Array) -> Moments:
+    """Moments of the projection on orthonormal rows [r, n]; those of the side itself if the rows are those of I."""
+    if len(basis) == side.shape.dim:
+        return side.moments
+    if side.shape.faces is None:
+        points, weights = side.shape.points - side.moments.center, side.weights
+    else:
+        nodes, weights = mesh_nodes(side.shape, side.moments.order)
+        points = nodes + (side.shape.points[0] - side.moments.center)
+    parts = len(side.moments.replicates)
+    return central_moments(points @ basis.T, weights, side.moments.order, parts=parts)

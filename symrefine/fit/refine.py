@@ -1,0 +1,219 @@
+"""Refinement on the points: outer iterations (match, then Gauss-Newton) as a generator of immutable iterates.
+
+One skeleton for every case: operations that share one frame and one centre. The b planes through an axis have five
+unknowns, a lone plane three, a full group up to six. Everything is in normalised units (RMS radius 1).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from symrefine.fit.gauss_newton import Linearisation, Solution, minimise
+from symrefine.fit.matching import ROBUST, Pairs, match, pair_equations
+from symrefine.fit.residual import (
+    axis_gram,
+    design_rows,
+    frame_model,
+    gram,
+    observable_motions,
+    theta_model,
+    turn_frame,
+)
+from symrefine.geometry import Array, Isometry, Plane, frame_with_z, householder, read_only
+from symrefine.surface.skin import LocalPlanes
+
+MAX_OUTER = 10
+# An outer iteration that moves nothing by more than this (radians, RMS radii) ends the refinement ...
+SETTLED = 2e-4
+# ... and so does one that moves everything by less than this share of what the noise leaves uncertain.
+WITHIN_NOISE = 0.22
+# Largest ratio of successive steps that is extrapolated.
+LONGEST = 0.7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Framed:
+    """Operations given in the coordinates of a frame, and where that frame stands.
+
+    Attributes:
+        standard: [k, 3, 3] orthogonal matrices, det +1 or -1, in the frame's own coordinates.
+        frame: [3, 3] the frame's axes as rows; a direction v of space has coordinates `frame @ v`.
+        center: [3] point that all the operations leave in place.
+        bundle: whether the operations are mirrors through the frame's third axis, so that theta has a meaning.
+    """
+
+    standard: Array
+    frame: Array
+    center: Array
+    bundle: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("standard", "frame", "center"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def motions(self) -> tuple[Isometry, ...]:
+        """The operations in space."""
+        return tuple(Isometry.about(self.center, self.frame.T @ s @ self.frame) for s in self.standard)
+
+    @property
+    def planes(self) -> tuple[Plane, ...]:
+        """The mirror planes among the operations."""
+        mirrors = [s for s in self.standard if np.linalg.det(s) < 0 and np.isclose(np.trace(s), 1.0)]
+        normals = [self.frame.T @ _normal(s) for s in mirrors]
+        return tuple(Plane(normal=n, offset=float(n @ self.center)) for n in normals)
+
+
+def _normal(mirror: Array) -> Array:
+    """Unit normal of a reflection matrix `I - 2 n n'`."""
+    outer = 0.5 * (np.eye(3) - mirror)
+    column = outer[:, int(np.argmax(np.diag(outer)))]
+    return column / np.linalg.norm(column)
+
+
+def mirror_bundle(fold: int, frame: Array, center: Array) -> Framed:
+    """The b mirrors of C_bv: planes through the frame's third axis at multiples of pi/b from its first."""
+    angles = np.pi * np.arange(fold) / fold
+    normals = np.stack([-np.sin(angles), np.cos(angles), np.zeros(fold)], axis=1)
+    return Framed(standard=np.stack([householder(n) for n in normals]), frame=frame, center=center, bundle=True)
+
+
+def single_plane(plane: Plane) -> Framed:
+    """One mirror, its normal on the frame's third axis."""
+    return Framed(
+        standard=np.diag([1.0, 1.0, -1.0])[None], frame=frame_with_z(plane.normal), center=plane.offset * plane.normal
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Iterate:
+    """State after one outer iteration.
+
+    Attributes:
+        index: 0 for the start, then 1, 2, ...
+        state: the operations and their frame now.
+        theta_rad: [b] what each plane alone would turn about the shared axis (the paper's unknown); empty if no bundle.
+        step: size of the last change, radians and RMS radii together.
+        covariance: [6, 6] of the frame's rotation and shift (about and along its axes), zero where unobservable.
+        cost: mean weighted squared residual over the inliers, squared RMS radii.
+        inliers: pairs used, over all operations.
+        pairs: correspondences of each operation.
+        inner_steps: accepted Gauss-Newton steps.
+        converged: whether the change has settled.
+    """
+
+    index: int
+    state: Framed
+    theta_rad: Array
+    step: float
+    covariance: Array
+    cost: float
+    inliers: int
+    pairs: tuple[Pairs, ...]
+    inner_steps: int
+    converged: bool
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "theta_rad", read_only(self.theta_rad))
+        object.__setattr__(self, "covariance", read_only(self.covariance))
+
+
+def refine(
+    cloud: LocalPlanes,
+    start: Framed,
+    *,
+    start_error_rad: float = 0.05,
+    max_outer: int = MAX_OUTER,
+    stride: int = 1,
+    robust: float = ROBUST,
+) -> Iterator[Iterate]:
+    """Refine operations that share a frame: theta of each plane first, then the unknowns they have in common.
+
+    Args:
+        cloud: local planes, normalised units.
+        start: the operations where the moments put them.
+        start_error_rad: how far the start may be off; sets the first gate and robust scale.
+        max_outer: outer iterations at most.
+        stride: use every stride-th local plane as a source.
+        robust: scale of the weights over the median absolute residual (see `match`).
+
+    Yields: the start as iterate 0, then one iterate for each outer iteration, the last one when the change settles.
+    """
+    state, step = start, np.inf
+    last: Array = np.zeros(6)
+    yield Iterate(
+        index=0, state=state, theta_rad=np.zeros(0), step=np.inf, covariance=np.zeros((6, 6)), cost=np.nan, inliers=0,
+        pairs=(), inner_steps=0, converged=False,
+    )  # fmt: skip
+    for index in range(1, max_outer + 1):
+        uncertainty = min(start_error_rad, 4.0 * step)
+        pairs = tuple(match(cloud, motion, uncertainty, stride=stride, robust=robust) for motion in state.motions)
+        grams = np.stack([_pair_gram(cloud, p) for p in pairs])
+        theta = _thetas(grams, state) if state.bundle else np.zeros(0)
+        solution = _solve(grams, state, float(np.median(theta)) if theta.size else 0.0)
+        weight = max(sum(float(p.weights.sum()) for p in pairs), 1e-300)
+        covariance = (
+            cloud.redundancy * solution.cost / weight * np.linalg.pinv(solution.hessian, rcond=1e-9, hermitian=True)
+        )
+        noise = WITHIN_NOISE * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
+        settled = bool(np.abs(solution.x).max() < SETTLED or np.all(np.abs(solution.x) <= noise))
+        last = solution.x * _remaining(solution.x, last)
+        state, step = _moved(state, last), float(np.abs(last).max())
+        yield Iterate(
+            index=index,
+            state=state,
+            theta_rad=theta,
+            step=step,
+            covariance=covariance,
+            cost=max(solution.cost, 0.0) / weight,
+            inliers=sum(len(p.sources) for p in pairs),
+            pairs=pairs,
+            inner_steps=solution.steps,
+            converged=settled,
+        )
+        if settled:
+            return
+
+
+def _remaining(x: Array, last: Array) -> float:
+    """Factor that sums the geometric series of the steps to come.
+
+    Noisy points match back towards where the object stands now, so each step covers a fixed share of the way. Where two
+    steps point the same way and shrink, their ratio q tells the share, and 1 / (1 - q) the way that is left.
+    """
+    length = float(np.linalg.norm(x) * np.linalg.norm(last))
+    if length == 0.0 or x @ last < 0.7 * length:
+        return 1.0
+    ratio = float(np.linalg.norm(x) / np.linalg.norm(last))
+    return 1.0 / (1.0 - min(ratio, LONGEST)) if ratio < 0.95 else 1.0
+
+
+def _pair_gram(cloud: LocalPlanes, pairs: Pairs) -> Array:
+    sources, targets, directions, weights = pair_equations(cloud, pairs)
+    return gram(design_rows(sources, targets, directions), weights)
+
+
+def _thetas(grams: Array, state: Framed) -> Array:
+    """Gauss-Newton over theta for every plane through the axis, each on its 3x3 Gram matrix."""
+    angles = np.pi * np.arange(len(grams)) / len(grams)
+    small = [axis_gram(g, state.frame, state.center) for g in grams]
+    found = [minimise(partial(theta_model, g), np.array([a])).x[0] for g, a in zip(small, angles, strict=True)]
+    return np.array(found) - angles
+
+
+def _solve(grams: Array, state: Framed, theta: float) -> Solution:
+    """Gauss-Newton over the observable motions of the shared frame, from a turn by theta about its third axis."""
+    basis = observable_motions(state.standard, state.frame, state.center)
+
+    def linearise(y: Array) -> Linearisation:
+        full = frame_model(grams, state.standard, state.frame, state.center, basis @ y)
+        return replace(full, gradient=basis.T @ full.gradient, hessian=basis.T @ full.hessian @ basis)
+
+    solution = minimise(linearise, basis.T @ np.array([0.0, 0.0, theta, 0.0, 0.0, 0.0]))
+    return replace(solution, x=basis @ solution.x, hessian=basis @ solution.hessian @ basis.T)
+
+
+def _moved(state: Framed, x: Array) -> Framed:
+    return replace(state, frame=turn_frame(state.frame, x[:3]), center=state.center + state.frame.T @ x[3:])

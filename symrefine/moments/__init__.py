@@ -1,0 +1,1 @@
+"""Numbers that turn with the object: moments, quadrature over meshes, harmonics."""

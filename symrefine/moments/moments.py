@@ -1,0 +1,297 @@
+"""Geometric moments of weighted points, of any order in any dimension.
+
+Notation: `m_p = sum_i w_i prod_j x_ij^p_j` (paper, eq. MomentsNDdiscrete); `mu` central; normalised moments have
+mass 1 and RMS radius 1, so every quantity made of them is dimensionless and comparable across objects.
+"""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symrefine.errors import DegenerateShapeError
+from symrefine.geometry import Array, read_only
+from symrefine.moments.quadrature import mesh_nodes, triangle_areas_and_normals
+from symrefine.shape import Shape
+
+# Points per block: the monomials of a block stay in the L2 cache (method.md, section 1: a factor of ten).
+BLOCK = 2048
+# Waves that the edges of a solid's surface are tested with, radians per diagonal, and the share of the area that may be
+# missing or turned round: what single precision leaves where triangles meet without sharing vertices.
+WAVES, WAVE_NUMBER, LOOSE = 6, 4.0, 1e-6
+
+
+@lru_cache(maxsize=64)
+def exponents(dim: int, order: int) -> NDArray[np.int64]:
+    """Exponent vectors [K, dim] of total degree <= `order`, by degree, then x_1 first."""
+    rows = [e for e in product(range(order + 1), repeat=dim) if sum(e) <= order]
+    rows.sort(key=lambda e: (sum(e), [-k for k in e]))
+    array = np.array(rows, dtype=np.int64)
+    array.flags.writeable = False
+    return array
+
+
+@lru_cache(maxsize=64)
+def tensor_index(dim: int, degree: int, order: int) -> NDArray[np.int64]:
+    """Where each entry of the symmetric tensor T_degree [dim]*degree stands among `exponents(dim, order)`."""
+    position = {tuple(e): i for i, e in enumerate(exponents(dim, order).tolist())}
+    index = np.empty((dim,) * degree, dtype=np.int64)
+    for entry in product(range(dim), repeat=degree):
+        index[entry] = position[tuple(entry.count(axis) for axis in range(dim))]
+    return index
+
+
+@lru_cache(maxsize=64)
+def _split(dim: int, order: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], int]:
+    """Each exponent as a product of one monomial in the leading and one in the trailing coordinates."""
+    lead = dim - dim // 2
+    position_a = {tuple(e): i for i, e in enumerate(exponents(lead, order).tolist())}
+    position_b = {tuple(e): i for i, e in enumerate(exponents(dim - lead, order).tolist())}
+    table = exponents(dim, order)
+    a = np.array([position_a[tuple(e)] for e in table[:, :lead].tolist()])
+    b = np.array([position_b[tuple(e)] for e in table[:, lead:].tolist()])
+    return a, b, table, lead
+
+
+@lru_cache(maxsize=64)
+def _ladder(dim: int, order: int) -> list[tuple[int, int]]:
+    """For each monomial but the first: the monomial it is a multiple of, and by which coordinate."""
+    table = exponents(dim, order).tolist()
+    position = {tuple(e): i for i, e in enumerate(table)}
+    steps = []
+    for e in table[1:]:
+        axis = next(j for j in range(dim) if e[j])
+        parent = list(e)
+        parent[axis] -= 1
+        steps.append((position[tuple(parent)], axis))
+    return steps
+
+
+def monomials(points: Array, order: int) -> Array:
+    """All monomials of degree <= `order` at points [N, n], as rows [K, N]."""
+    columns = np.ascontiguousarray(points.T)
+    out = np.empty((len(exponents(points.shape[1], order)), len(points)))
+    out[0] = 1.0
+    for row, (parent, axis) in enumerate(_ladder(points.shape[1], order), start=1):
+        np.multiply(out[parent], columns[axis], out=out[row])
+    return out
+
+
+def raw_moments(points: Array, weights: Array, order: int) -> Array:
+    """Raw moments [K] of points [N, n] with weights [N], in the order of `exponents(n, order)`."""
+    a, b, _, lead = _split(points.shape[1], order)
+    total = np.zeros((a.max() + 1, b.max() + 1))
+    for start in range(0, len(points), BLOCK):
+        block = points[start : start + BLOCK]
+        left = monomials(block[:, :lead], order)
+        left *= weights[start : start + BLOCK]
+        total += left @ monomials(block[:, lead:], order).T
+    return total[a, b]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Moments:
+    """Central normalised moments, with the frame that undoes the normalisation.
+
+    Attributes:
+        values: [K] moments of `(x - center) / scale` with mass 1, in the order of `exponents(dim, order)`.
+        replicates: [B, K] the same with one of B random parts left out in turn (delete-a-group jackknife), in the
+            frame of the whole; empty [0, K] where the moments are exact.
+        center: [n] weighted mean, input units.
+        scale: RMS radius about the centre, input units.
+    """
+
+    dim: int
+    order: int
+    values: Array
+    replicates: Array
+    center: Array
+    scale: float
+
+    def __post_init__(self) -> None:
+        for name in ("values", "replicates", "center"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    def tensor(self, degree: int) -> Array:
+        """Symmetric moment tensor T_degree, shape [n]*degree."""
+        return self.values[tensor_index(self.dim, degree, self.order)]
+
+    @property
+    def covariance(self) -> Array:
+        """Second central moments [n, n] in normalised units (trace 1)."""
+        return self.tensor(2)
+
+
+def central_moments(points: Array, weights: Array, order: int, *, parts: int = 0) -> Moments:
+    """Normalised central moments to `order`, with `parts` jackknife replicates for their sampling noise.
+
+    Args:
+        points: [N, n]; the magnitude of the coordinates does not matter (the mean is removed first).
+        weights: [N], sum not zero.
+        order: highest total degree.
+        parts: number of interleaved parts to leave out in turn; 0 for exact nodes.
+
+    Raises:
+        DegenerateShapeError: the points do not spread about their mean.
+    """
+    shift = points[len(points) // 2]
+    local, mass = points - shift, weights.sum()
+    mean = weights @ local / mass
+    local -= mean
+    scale = float(np.sqrt(weights @ np.einsum("ij,ij->i", local, local) / mass))
+    if not scale > 0:
+        raise DegenerateShapeError(
+            "the points do not spread about their mean; a shape needs at least two distinct points"
+        )
+    local /= scale
+    w = weights / mass
+    replicates: Array = np.empty((0, len(exponents(points.shape[1], order))))
+    if parts:
+        values, replicates = _jackknife(local, w, order, parts)
+    else:
+        values = raw_moments(local, w, order)
+    return Moments(
+        dim=points.shape[1], order=order, values=values, replicates=replicates, center=shift + mean, scale=scale
+    )
+
+
+def shape_moments(shape: Shape, order: int, *, parts: int = 0) -> Moments:
+    """Normalised central moments of a shape: exact for a mesh, with `parts` jackknife replicates for a cloud.
+
+    Raises:
+        DegenerateShapeError: no area, no volume, or no spread.
+    """
+    if shape.faces is None:
+        weights = np.ones(len(shape.points)) if shape.weights is None else shape.weights
+        return central_moments(shape.points, weights, order, parts=parts)
+    nodes, weights = mesh_nodes(shape, order)
+    if shape.measure == "solid":
+        return _solid_moments(nodes, weights, shape, order)
+    inner = central_moments(nodes, weights, order)
+    return replace(inner, center=inner.center + shape.points[0])
+
+
+def _solid_moments(nodes: Array, weights: Array, shape: Shape, order: int) -> Moments:
+    degree = exponents(3, order).sum(axis=1)
+    raw = raw_moments(nodes, weights, order) / (degree + 3)
+    if not abs(raw[0]) > 1e-12 * shape.diagonal**3:
+        raise DegenerateShapeError(f"{shape.source}: the mesh encloses no volume; use the surface measure")
+    if not _closed(shape):
+        raise DegenerateShapeError(
+            f"{shape.source}: the mesh is not a closed, consistently oriented surface, so it has no solid; "
+            "use the surface measure"
+        )
+    values = recentred(raw / raw[0], 3, order)
+    spread = values[tensor_index(3, 2, order)].trace()
+    if not spread > 0:
+        raise DegenerateShapeError(f"{shape.source}: the mesh overlaps itself; use the surface measure")
+    scale = float(np.sqrt(spread))
+    return Moments(
+        dim=3,
+        order=order,
+        values=values / scale**degree,
+        replicates=np.empty((0, len(values))),
+        center=shape.points[0] + raw[1:4] / raw[0],
+        scale=scale,
+    )
+
+
+def _closed(shape: Shape) -> bool:
+    """Whether the surface is closed and consistently oriented: whether its directed edges cancel.
+
+    They do if `int G.dl` over all of them vanishes for every field G (Stokes). A few plane waves of random direction
+    see whatever is left, and unlike a count of edges let pass what meets along an edge without sharing its vertices.
+    By Stokes `|int G.dl| <= |k| |G| A` where a surface of area A is missing, and twice that where it is turned round.
+    """
+    assert shape.faces is not None
+    areas, _ = triangle_areas_and_normals(shape.points, shape.faces)
+    corners = (shape.points - shape.points[0])[shape.faces] / shape.diagonal
+    edges, middles = np.roll(corners, -1, axis=1) - corners, 0.5 * (np.roll(corners, -1, axis=1) + corners)
+    waves, fields = (
+        np.random.default_rng(0).standard_normal((2, WAVES, 3)) * np.array([WAVE_NUMBER, 1.0])[:, None, None]
+    )
+    along = edges @ fields.T * np.sinc(edges @ waves.T / (2.0 * np.pi))
+    left = np.abs(np.einsum("fek,fek->k", along, np.exp(1j * (middles @ waves.T))))
+    most = np.linalg.norm(waves, axis=1) * np.linalg.norm(fields, axis=1) * areas.sum() / shape.diagonal**2
+    return bool(np.all(left <= LOOSE * most))
+
+
+def _jackknife(points: Array, weights: Array, order: int, parts: int) -> tuple[Array, Array]:
+    """Moments of the whole, and of the whole without each of `parts` interleaved parts, about each one's own mean.
+
+    Interleaving after a fixed shuffle keeps the parts alike even where the file orders its points.
+    """
+    sums = _raw_moments_of_parts(points, weights, order, _deal(len(points), parts))
+    total = sums.sum(axis=0)
+    rest = total - sums
+    return total, recentred(rest / rest[:, :1], points.shape[1], order)
+
+
+@lru_cache(maxsize=2)
+def _deal(count: int, parts: int) -> NDArray[np.int64]:
+    """Indices [parts, M] of points dealt in turn after a fixed shuffle; -1 where a part has one point less."""
+    dealt = np.full(-(-count // parts) * parts, -1)
+    dealt[np.random.default_rng(0).permutation(count)] = np.arange(count)
+    dealt.flags.writeable = False
+    return dealt.reshape(-1, parts).T
+
+
+def _raw_moments_of_parts(points: Array, weights: Array, order: int, dealt: NDArray[np.int64]) -> Array:
+    """Raw moments [parts, K] of several parts of the points at once."""
+    a, b, _, lead = _split(points.shape[1], order)
+    parts, size = dealt.shape
+    total = np.zeros((parts, a.max() + 1, b.max() + 1))
+    step = max(1, BLOCK // parts)
+    for start in range(0, size, step):
+        index = dealt[:, start : start + step]
+        block = points[index.ravel()]
+        left = monomials(block[:, :lead], order).reshape(-1, *index.shape)
+        left *= np.where(index < 0, 0.0, weights[index])
+        right = monomials(block[:, lead:], order).reshape(-1, *index.shape)
+        total += left.transpose(1, 0, 2) @ right.transpose(1, 2, 0)
+    return total[:, a, b]
+
+
+@lru_cache(maxsize=16)
+def _binomials(dim: int, order: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], Array]:
+    """Terms of `prod (x_j - t_j)^p_j` for all p: where those of each p start, and for each term the row of the factor
+    kept, the row of the power of t, and the signed coefficient.
+    """
+    from math import comb, prod
+
+    table = [tuple(e) for e in exponents(dim, order).tolist()]
+    position = {e: i for i, e in enumerate(table)}
+    starts: list[int] = []
+    kept: list[int] = []
+    shifts: list[int] = []
+    coefficients: list[float] = []
+    for e in table:
+        starts.append(len(kept))
+        for k in product(*(range(v + 1) for v in e)):
+            rest = tuple(a - b for a, b in zip(e, k, strict=True))
+            kept.append(position[k])
+            shifts.append(position[rest])
+            coefficients.append((-1.0) ** sum(rest) * prod(comb(a, b) for a, b in zip(e, k, strict=True)))
+    return np.array(starts), np.array(kept), np.array(shifts), np.array(coefficients)
+
+
+def recentred(values: Array, dim: int, order: int) -> Array:
+    """Moments [..., K] of unit mass, each set about its own mean instead of the origin."""
+    starts, kept, shifts, coefficients = _binomials(dim, order)
+    powers = monomials(values[..., 1 : dim + 1].reshape(-1, dim), order).T.reshape(values.shape)
+    return np.asarray(np.add.reduceat(coefficients * values[..., kept] * powers[..., shifts], starts, axis=-1))
+
+
+def transformed(moments: Moments, matrix: Array) -> Moments:
+    """Moments of the points after x -> matrix x about the centre, in the same units; replicates are left behind."""
+    values: Array = np.empty_like(moments.values)
+    for degree in range(moments.order + 1):
+        tensor = moments.tensor(degree)
+        for _ in range(degree):
+            # Contract the leading index and append the new one: after `degree` rounds every index has had its turn.
+            tensor = np.tensordot(tensor, matrix, axes=([0], [1]))
+        index = tensor_index(moments.dim, degree, moments.order)
+        values[index.ravel()] = tensor.ravel()
+    return replace(moments, values=values, replicates=np.empty((0, values.size)))

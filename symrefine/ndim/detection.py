@@ -1,0 +1,140 @@
+"""Hyperplanes of symmetry of points in any dimension: points that stand for themselves, or samples; their group."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from symrefine.errors import InputError
+from symrefine.geometry import Array, Plane, read_only
+from symrefine.moments.moments import shape_moments
+from symrefine.ndim import sampled as samples
+from symrefine.ndim.matched import Points
+from symrefine.ndim.rank import FLOOR, FixedSubspace, fixed_subspace
+from symrefine.ndim.search import among_points, among_samples
+from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
+from symrefine.shape import Shape
+
+PARTS = 16
+# Up to so many points stand for themselves, without sampling noise.
+FEW = 250
+LARGEST_DIM = 8
+# Candidates turned down that are told of.
+NEAR = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Hyperplane:
+    """A candidate for a hyperplane of symmetry.
+
+    Attributes:
+        plane: in input units.
+        asymmetry: what the moments of orders 2 to 4 have against it, as a fraction of the whole.
+        noise: what sampling alone would leave of that; 0 for points that stand for themselves.
+        miss: of those, the largest distance from a reflected point to its nearest neighbour, over the diameter; NaN for
+            samples, whose neighbours say nothing in high dimensions.
+    """
+
+    plane: Plane
+    asymmetry: float
+    noise: float
+    miss: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SubspaceDetection:
+    """What `detect_nd` found.
+
+    Attributes:
+        fixed: rank and singular values of the n-tuples.
+        center: [n] the point that every symmetry leaves in place.
+        hyperplanes: of symmetry, best first.
+        rejected: candidates turned down, best first.
+        diameter: twice the largest distance of a point from the centre.
+        undetermined: why the data support no decision; empty when they do.
+        incomplete: why there may be hyperplanes that are not listed; empty when there are none.
+        reflection_group_order: of the group that the reflections listed generate, 1 if there are none; None if they
+            generate more reflections than hold, or nothing is decided.
+    """
+
+    fixed: FixedSubspace
+    center: Array
+    hyperplanes: tuple[Hyperplane, ...]
+    rejected: tuple[Hyperplane, ...]
+    diameter: float
+    undetermined: str
+    incomplete: str
+    reflection_group_order: int | None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", read_only(self.center))
+
+
+def detect_nd(
+    shape: Shape | ArrayLike, *, tolerance: float = 10.0 * FLOOR, sampled: bool | None = None, seed: int = 0
+) -> SubspaceDetection:
+    """Hyperplanes of symmetry of points in n-space, 2 <= n <= 8, the group they generate, and the rank of the n-tuples.
+
+    Of points that stand for themselves all hyperplanes are found: the differences of pairs name them (`matched`). Of
+    samples, normals are turned until the moments of orders 2 to 4 are closest to their images, from the eigenvectors of
+    the second moments and, where these coincide, from random starts (`sampled`). Images of hyperplanes in one another
+    are looked at as well. Everything listed has been held against the points. Turns are not looked for.
+
+    Args:
+        shape: a cloud, or points [N, n].
+        tolerance: what still counts as symmetric: points that stand for themselves may miss by this fraction of the
+            diameter; the moments of samples, and n-tuples, by a tenth of it.
+        sampled: whether the points are random samples of the object, whose noise hides what is smaller, or the object
+            itself; more than 250 points are samples if None.
+        seed: of the random starts.
+
+    Raises:
+        InputError: other dimensions, or a mesh.
+        DegenerateShapeError: the points do not spread.
+    """
+    shape = shape if isinstance(shape, Shape) else Shape.of(shape)
+    if not 0.0 < tolerance <= 0.2:
+        raise InputError(f"tolerance is {tolerance}; expected a number in (0, 0.2]")
+    if not 2 <= shape.dim <= LARGEST_DIM or shape.faces is not None:
+        what = "a mesh" if shape.faces is not None else f"{shape.dim} coordinates"
+        raise InputError(f"{shape.source}: {what}; detect_nd takes points of 2 to {LARGEST_DIM} coordinates")
+    sampled = len(shape.points) > FEW if sampled is None else sampled
+    moments = shape_moments(shape, 5, parts=PARTS if sampled else 0)
+    fixed = fixed_subspace(ntuples(moments, PAPER_ORDERS), floor=0.1 * tolerance)
+    points = (shape.points - moments.center) / moments.scale
+    masses = np.ones(len(points)) if shape.weights is None else shape.weights
+    kept = masses > 0
+    points, masses = points[kept], masses[kept] / masses.sum()
+    diameter = 2.0 * float(np.linalg.norm(points, axis=1).max())
+    cloud = Points(points=points, masses=masses, diameter=diameter)
+    low = samples.block(points, masses, samples.LOW, PARTS if sampled else 1)
+    known = [fixed.directions[-1], *np.linalg.eigh(low.whole[0])[1].T]
+    if sampled:
+        rng = np.random.default_rng(seed)
+        # Masses that differ make up for a density that does.
+        neighbours = samples.Neighbours(points, diameter, rng) if np.ptp(masses) == 0.0 else None
+        search = among_samples(cloud, low, known, tolerance, neighbours, rng)
+    else:
+        search = among_points(cloud, known, tolerance)
+
+    def hyperplane(normal: Array) -> Hyperplane:
+        asymmetry, noise = low.against(normal)
+        plane = Plane(normal=normal, offset=float(normal @ moments.center))
+        return Hyperplane(
+            plane=plane, asymmetry=asymmetry, noise=noise, miss=math.nan if sampled else cloud.miss(normal)
+        )
+
+    def listed(normals: list[Array]) -> tuple[Hyperplane, ...]:
+        return tuple(sorted(map(hyperplane, normals), key=lambda h: h.asymmetry))
+
+    return SubspaceDetection(
+        fixed=fixed,
+        center=moments.center,
+        hyperplanes=listed(search.holds),
+        rejected=listed(search.rejected)[:NEAR],
+        diameter=diameter * moments.scale,
+        undetermined=search.undetermined,
+        incomplete="; ".join(search.incomplete),
+        reflection_group_order=search.order,
+    )

@@ -1,0 +1,177 @@
+"""The search for hyperplanes of symmetry through the centre: those that hold, and why there may be more."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from symrefine.geometry import Array
+from symrefine.ndim import sampled as samples
+from symrefine.ndim.matched import Points, distinct
+from symrefine.ndim.roots import MOST, closed_under_reflection, reflection_group_order
+
+# Angle within which two normals are one, at the least [rad]; what the tolerance forgives when a hyperplane turns about
+# the centre; and how much farther off an image may be, of points and of samples, where the errors of two add up.
+SAME_RAD, SAME_TOLERANCES, SLACK = math.radians(2.0), 2.0, (1.5, 3.0)
+# Moments of orders 5 and 6 are not made in more dimensions: they are too many.
+HIGH_DIM = 6
+# Sampling noise, in tolerances, beyond which moments of orders 2 to 4 decide nothing; and those of orders 5 and 6 not
+# which of the hyperplanes that hold for the others are true.
+ALLOWED = (0.5, 1.0)
+# If so many normals, the best, are all free to turn, then so are the others.
+LOOSE = 8
+# Cosine of the angle to a subspace within which a normal lies in it.
+IN_SPAN = 0.95
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Search:
+    """Unit normals of hyperplanes through the centre.
+
+    Attributes:
+        holds: those that hold.
+        rejected: those that do not.
+        incomplete: reasons why there may be others that hold.
+        order: of the group that the reflections generate; None if they generate others that do not hold.
+        undetermined: why nothing is decided; empty if it is.
+    """
+
+    holds: list[Array]
+    rejected: list[Array]
+    incomplete: list[str]
+    order: int | None
+    undetermined: str = ""
+
+
+def among_points(cloud: Points, known: list[Array], tolerance: float) -> Search:
+    """Search points that stand for themselves; `known` are normals to try besides the differences of pairs."""
+    same = _same(tolerance)
+    candidates, all_there = cloud.candidates(tolerance, same)
+    tried = sorted(((cloud.miss(n), k, n) for k, n in enumerate(map(cloud.refined, [*candidates, *known]))))
+    found, _ = distinct([n for _, _, n in tried], same, len(tried))
+    incomplete = [] if all_there else [f"only the best {len(candidates)} candidates were looked at"]
+    free = cloud.free
+    if len(free) > 1:
+        # Every hyperplane across these directions takes each point to itself.
+        found = [n for n in found if np.linalg.norm(free @ n) < 0.5]
+        incomplete.append(
+            f"the points span {len(free)} dimensions less than the space, so that every hyperplane that holds them all "
+            "is one; none of these is listed"
+        )
+    holds = [n for n in found if cloud.miss(n) <= tolerance]
+
+    def confirmed(image: Array) -> Array | None:
+        normal = cloud.refined(image)
+        return normal if cloud.miss(normal) <= tolerance else None
+
+    search = _closed(holds, confirmed, SLACK[0] * same, incomplete)
+    return replace(
+        search,
+        rejected=[n for n in found if cloud.miss(n) > tolerance],
+        order=search.order if len(free) < 2 else None,
+    )
+
+
+def among_samples(
+    cloud: Points,
+    low: samples.Block,
+    known: list[Array],
+    tolerance: float,
+    neighbours: samples.Neighbours | None,
+    rng: np.random.Generator,
+) -> Search:
+    """Search random samples.
+
+    Args:
+        cloud: the samples about their centre.
+        low: their moments of orders 2 to 4.
+        known: normals to start from besides the eigenvectors of the second moments and random ones.
+        tolerance: see `detect_nd`.
+        neighbours: ask these, too; None where the density of the points is not that of the object.
+        rng: of the random starts.
+    """
+    random, shared = samples.starts(low, tolerance, rng)
+    begin = [*known, *random]
+    blocks, orders = [low], "2 to 4"
+    fixed, loose, rejected, noise = _sorted(blocks, begin, tolerance, ALLOWED[0])
+    if noise > ALLOWED[0] * tolerance:
+        doubt = _hidden(noise, tolerance, "give")
+        return Search(holds=[], rejected=[*rejected, *fixed], incomplete=[], order=None, undetermined=doubt)
+    incomplete = []
+    if loose and low.whole[0].shape[0] <= HIGH_DIM:
+        high = samples.block(cloud.points, cloud.masses, samples.HIGH, len(low.parts))
+        finer = _sorted([low, high], [*begin, *fixed], tolerance, ALLOWED[1])
+        if finer[3] > ALLOWED[1] * tolerance:
+            incomplete.append(f"of orders 5 and 6 {_hidden(finer[3], tolerance, 'to look closer, give')}")
+        else:
+            blocks, orders = [low, high], "2 to 6"
+            fixed, loose, rejected, _ = finer
+    if loose:
+        spread = np.linalg.svd(np.concatenate(loose), compute_uv=False)
+        incomplete.append(
+            f"as far as moments of orders {orders} tell, a hyperplane can turn and still hold, with normals in "
+            f"{np.count_nonzero(spread > 0.2 * spread[0])} dimensions; none of these is listed"
+        )
+    elif shared:
+        incomplete.append(
+            f"second moments coincide in {shared} dimensions, where normals were looked for from {len(random)} starts"
+        )
+
+    def true(normal: Array, sigmas: float) -> bool:
+        moments = all(samples.holds(b, normal, tolerance, sigmas) for b in blocks)
+        return moments and (neighbours is None or not neighbours.contradict(normal, tolerance))
+
+    def confirmed(image: Array) -> Array | None:
+        (normal,) = samples.minima(blocks, [image])
+        return normal if true(normal, samples.IMPLIED) else None
+
+    holds = [n for n in fixed if true(n, samples.FOUND)]
+    rejected = [*rejected, *(n for n in fixed if not any(n is h for h in holds))]
+    search = _closed(holds, confirmed, SLACK[1] * _same(tolerance), incomplete)
+    return replace(search, rejected=rejected, order=None if loose else search.order)
+
+
+def _sorted(
+    blocks: list[samples.Block], begin: list[Array], tolerance: float, allowed: float
+) -> tuple[list[Array], list[Array], list[Array], float]:
+    """Normals that hold where they are, bases [k, n] of what others turn in and hold, those that do not; most noise."""
+    found, _ = distinct(samples.minima(blocks, begin), _same(tolerance), MOST)
+    holds = [n for n in found if all(samples.holds(b, n, tolerance) for b in blocks)]
+    kept = {id(n) for n in holds}
+    rejected = [n for n in found if id(n) not in kept]
+    noise = max((b.against(n)[1] for n in holds for b in blocks), default=0.0)
+    if noise > allowed * tolerance:
+        return holds, [], rejected, noise
+    fixed, loose = list[Array](), list[Array]()
+    for k, normal in enumerate(holds):
+        turning = samples.free_turns(blocks, normal, tolerance)
+        if turning:
+            loose.append(np.array([normal, *turning]))
+        else:
+            fixed.append(normal)
+        if not fixed and k + 1 == LOOSE:
+            loose.append(np.array(holds[LOOSE:]).reshape(-1, len(normal)))
+            break
+    # Noise may hold one in its place where others, a little beside it, turn.
+    fixed = [n for n in fixed if all(np.linalg.norm(basis @ n) < IN_SPAN for basis in loose)]
+    return fixed, loose, rejected, noise
+
+
+def _same(tolerance: float) -> float:
+    return max(SAME_RAD, SAME_TOLERANCES * tolerance)
+
+
+def _closed(
+    holds: list[Array], confirmed: Callable[[Array], Array | None], same: float, incomplete: list[str]
+) -> Search:
+    """Normals that hold with their images in one another, and the group, if these hold too."""
+    normals, closed = closed_under_reflection(holds, confirmed, same)
+    order = reflection_group_order(normals) if closed else None
+    open_ = "the reflections listed take one another to others that do not hold, or that are too many"
+    return Search(holds=normals, rejected=[], incomplete=[*incomplete, *([] if order else [open_])], order=order)
+
+
+def _hidden(noise: float, tolerance: float, give: str) -> str:
+    hides = f"the noise of the samples, {noise:.1%} of the moments, hides asymmetries of {tolerance:.1%}"
+    return f"{hides}; {give} more points"

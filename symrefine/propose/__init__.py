@@ -1,0 +1,1 @@
+"""Where to look: evidence that is weighed, never obeyed."""

@@ -1,0 +1,78 @@
+"""From moments to an axis, its fold b and the start angles in closed form, then to a frame polished on the moments."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from symrefine.geometry import Array, frame_with_z, read_only, rotation
+
+MAX_FOLD = 36
+# Points that are enough for the azimuthal spectrum.
+AZIMUTHS = 10000
+
+
+def azimuthal_spectrum(points: Array, weights: Array, axis: Array, max_fold: int = MAX_FOLD) -> tuple[Array, Array]:
+    """Azimuthal coefficients about an axis through the origin.
+
+    `c_kq = sum w f_q(rho, h) e^(i k phi)` with the slowly varying f = rho * (1, h, h^2, rho): bounded in k, unlike
+    the polynomial rho^k, so that high folds (gears) stay above the noise of the outermost points.
+
+    Returns: c [max_fold + 1, 4] complex, and the standard deviation [4] of each if the azimuths were random.
+    """
+    thin = -(-len(points) // AZIMUTHS)
+    points, weights = points[::thin], weights[::thin]
+    x, y, h = frame_with_z(axis) @ points.T
+    rho = np.hypot(x, y)
+    phase = np.divide(x + 1j * y, rho, out=np.zeros(len(rho), complex), where=rho > 0)
+    radial = weights[:, None] * rho[:, None] * np.stack([np.ones_like(h), h, h * h, rho], axis=1)
+    powers = np.empty((max_fold + 1, len(rho)), complex)
+    powers[0] = 1.0
+    for k in range(max_fold):
+        np.multiply(powers[k], phase, out=powers[k + 1])
+    return powers.real @ radial + 1j * (powers.imag @ radial), np.sqrt((radial**2).sum(axis=0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FoldCandidate:
+    """A fold b with the frame (rows p0, p1, u) whose mirror planes contain u and stand at multiples of pi/b from p0."""
+
+    fold: int
+    frame: Array
+    leak: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "frame", read_only(self.frame))
+
+
+def fold_candidates(points: Array, weights: Array, axis: Array, *, leak_max: float = 0.35) -> list[FoldCandidate]:
+    """Folds b >= 2 whose multiples carry the azimuthal energy beyond the noise, the least leaking first.
+
+    For C_b only k = 0 mod b survives; for C_bv all phases arg(c_k)/k agree on the mirrors (method.md, section 4).
+    An empty list means a surface of revolution as far as the azimuthal spectrum can tell, or no axis at all.
+    """
+    c, sigma = azimuthal_spectrum(points, weights, axis)
+    energy = _energy_over_noise(c, sigma)
+    energy[0] = 0.0
+    k = np.arange(len(energy))
+    if energy.max() < 12.0:
+        return []
+    total = energy.sum()
+    found = []
+    for b in range(2, len(energy) // 2 + 1):
+        leak = 1.0 - energy[(k % b == 0)].sum() / total
+        if leak < leak_max and energy[b] > 6.0:
+            best = int(np.argmax(np.abs(c[b]) / sigma))
+            phase = rotation([0, 0, 1], -np.angle(c[b, best]) / b)
+            found.append(FoldCandidate(fold=b, frame=phase @ frame_with_z(axis), leak=float(leak)))
+    # A divisor of the true fold leaks no more than it: prefer the largest fold among equals.
+    return sorted(found, key=lambda f: (round(f.leak, 1), -f.fold))
+
+
+def fold_energy(points: Array, weights: Array, axis: Array, fold: int) -> float:
+    """Azimuthal energy at one order about an axis through the origin, over what random azimuths would show."""
+    return float(_energy_over_noise(*azimuthal_spectrum(points, weights, axis, fold))[fold])
+
+
+def _energy_over_noise(c: Array, sigma: Array) -> Array:
+    sigma = np.where(sigma > 0, sigma, np.inf)  # a flat object has no height to weigh azimuths with
+    return np.clip(np.abs(c) ** 2 / sigma**2 - 1.0, 0.0, None).sum(axis=1)

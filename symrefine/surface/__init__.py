@@ -1,0 +1,1 @@
+"""The denoised surface, and how an operation misses it."""
