@@ -22,7 +22,7 @@ setup: $(READY) ## build .venv with the pinned packages and this checkout
 	@echo "Ready for: make demo, make test, make bench"
 
 demo: $(READY) ## find, refine and show symmetries
-	@$(PY) -m experiments.demo
+	@$(PY) -m experiments.studies.demo
 
 test: lint ## lint, then the test suite
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(PY) -m pytest -n 2 $(PYTEST_ARGS)
@@ -31,7 +31,7 @@ bench: $(READY) ## measure against the stored baseline
 	@$(PY) -m benchmarks.run
 
 reproduce: $(READY) ## the paper's experiments beside the baseline, in minutes; the report, the README's table
-	@$(PY) -m experiments.reproduce
+	@$(PY) -m experiments.studies.reproduce
 
 # Runs a command in silence; says what it said if it fails.
 check = printf '%-26s' "$(1)"; if out=$$($(2) 2>&1); then echo ok; else echo FAILED; echo "$$out"; exit 1; fi

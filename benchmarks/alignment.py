@@ -2,7 +2,7 @@
 
 Chiral objects of `../shared/objects` (not part of the product; whatever is not there is left out), 10,000 independent
 points of source and target, rotations and reflections. Processor time over all threads, which other load changes
-little; the least of three runs of each method, of Open3D too. `experiments.alignment` has the figures of accuracy.
+little; the least of three runs of each method, of Open3D too. The figures of accuracy: `experiments.studies.alignment`.
 """
 
 import argparse
@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 
 from benchmarks.metric import Metric
-from experiments.alignment import CHIRAL, RANDOM, Case, error_deg, estimator, given, mesh, present, sample
+from experiments.studies.alignment import CHIRAL, RANDOM, Case, error_deg, estimator, given, mesh, present, sample
 from symrefine.align.story import Alignment
 from symrefine.moments.moments import central_moments
 from symrefine.ntuples.contract import ntuples

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from benchmarks.metric import Metric
-from experiments.shapes import SHAPES, box, join, random_pose, sample
+from experiments.objects.shapes import SHAPES, box, join, random_pose, sample
 from symrefine.detect import detect
 from symrefine.geometry import Array
 from symrefine.moments.moments import central_moments

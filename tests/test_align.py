@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from experiments.shapes import asymmetric, bottle, box, join, mug, sample, table
+from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
 from symrefine.align.harmonic_fit import (
     Turner,
     euler_zyz,

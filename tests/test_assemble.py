@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from experiments.shapes import bottle, box, join, revolve, stool
+from experiments.objects.shapes import bottle, box, join, revolve, stool
 from symrefine.assemble import (
     _best_bundle,
     _finish,

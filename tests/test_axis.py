@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.shapes import asymmetric, bottle, box, join, mug, sample, stool, table
+from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, stool, table
 from symrefine.fit.frame import _weights, polish_frame, to_polar_axis_rotation
 from symrefine.geometry import line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.moments.harmonics import harmonic_moments

@@ -11,15 +11,15 @@ import pytest
 from scipy.optimize import leastsq
 from scipy.spatial import cKDTree
 
-from experiments import baseline_check
-from experiments.baseline_check import ALL_SHAPES, Case
 from experiments.ecins import SHIPPED, TUNED, ecins, estimated_normals
 from experiments.ecins.clouds import Clouds, prepare, principal_axes, voxel_means
 from experiments.ecins.fitting import inner_minimum, mirror_coordinates, partners, refine_plane
 from experiments.ecins.judging import representatives, score
 from experiments.ecins.levenberg import least_squares
 from experiments.ecins.starts import best_of_each, grid_normals, position
-from experiments.shapes import box, join, random_pose, table
+from experiments.objects.shapes import box, join, random_pose, table
+from experiments.studies import baseline_check
+from experiments.studies.baseline_check import ALL_SHAPES, Case
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.fit.gauss_newton import minimise
 from symrefine.fit.residual import design_rows, frame_model, gram, observable_motions, residual_function
@@ -529,8 +529,8 @@ def test_an_asymmetric_or_featureless_cloud_has_no_plane():
 def test_rows_are_equal_byte_for_byte_between_runs_and_workers(tmp_path):
     sweep = {"shape": ["table", "mug"], "method": ["ecins_tuned"], "noise_rel": [0.0, 0.01], "seed": [0]}
     config = tmp_path / "config.yaml"
-    config.write_text(f"experiment: experiments.planes\nout: out\nfixed: {{points: 2000}}\nsweep: {sweep}\n")
-    (tmp_path / "experiments").symlink_to(Path(baseline_check.__file__).parent)
+    config.write_text(f"experiment: experiments.studies.planes\nout: out\nfixed: {{points: 2000}}\nsweep: {sweep}\n")
+    (tmp_path / "experiments").symlink_to(Path(baseline_check.__file__).parents[1])
     rows = []
     for workers in (1, 2, 1):
         out = tmp_path / f"out{len(rows)}"

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.shapes import box, join, table
+from experiments.objects.shapes import box, join, table
 from symrefine.closure import (
     NEAR,
     Generators,

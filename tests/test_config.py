@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.accuracy import DEFAULT, Config
+from experiments.studies.accuracy import DEFAULT, Config
 from symrefine.errors import InputError
 from symrefine.study.typed import read_config
 

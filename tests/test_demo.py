@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments import demo
+from experiments.studies import demo
 from symrefine.detect import detect
 from symrefine.groups import point_group
 from symrefine.load import load

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from experiments import group_shapes, groups
-from experiments.measure import bundle_normals, score_planes
-from experiments.shapes import SHAPES, box, join, mug, random_pose, revolve, sample, table
+from experiments.objects import group_shapes
+from experiments.objects.shapes import SHAPES, box, join, mug, random_pose, revolve, sample, table
+from experiments.studies import groups
+from experiments.studies.measure import bundle_normals, score_planes
 from symrefine import Detection, Shape, detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import line_angle_rad, random_orthogonal

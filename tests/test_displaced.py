@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.shapes import box, join, sample
+from experiments.objects.shapes import box, join, sample
 from symrefine.displaced import displacement
 from symrefine.geometry import Isometry, Plane, random_orthogonal
 from symrefine.surface.misses import make_judge

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from experiments import gallery, models, solo
-from experiments.exhibits import Pose, exhibit, judge, observed, posed
-from experiments.gallery import CAPTION, MARGIN, TILE_HEIGHT, TILE_WIDTH, Tile, contact_sheet
-from experiments.household import OBJECTS
+from experiments.objects import models
+from experiments.objects.exhibits import Pose, exhibit, judge, observed, posed
+from experiments.objects.household import OBJECTS
+from experiments.studies import gallery, solo
+from experiments.studies.gallery import CAPTION, MARGIN, TILE_HEIGHT, TILE_WIDTH, Tile, contact_sheet
 from symrefine import detect
 from symrefine.errors import InputError
 from symrefine.geometry import Array, householder, line_angle_rad, rotation
@@ -117,7 +118,10 @@ def test_what_was_found_is_carried_back_to_the_objects_own_frame():
     [
         ({"name": "cup"}, "name: value is 'cup', expected one of ['mug', "),
         ({"name": "model:cup"}, "name: value is 'model:cup', expected one of"),
-        ({"name": "model:mug"}, "name: model:mug is not in the cache; fetch it with: python -m experiments.models"),
+        (
+            {"name": "model:mug"},
+            "name: model:mug is not in the cache; fetch it with: python -m experiments.objects.models",
+        ),
         ({"method": "open3d"}, "method: value is 'open3d', expected one of ['symrefine', 'trimesh']"),
         ({"method": "trimesh"}, "form: value is 'cloud', expected 'mesh': trimesh's"),
         ({"form": "solid"}, "form: value is 'solid', expected one of ['mesh', 'cloud']"),
@@ -170,10 +174,10 @@ def test_the_command_paints_and_names_what_is_wrong(monkeypatch, tmp_path, capsy
     few = {name: OBJECTS[name] for name in ("spoon", "crown")}
     few["crown"] = replace(few["crown"], group="C5v")
     monkeypatch.setattr(gallery, "OBJECTS", few)
-    monkeypatch.setattr("experiments.exhibits.OBJECTS", few)
+    monkeypatch.setattr("experiments.objects.exhibits.OBJECTS", few)
     assert gallery.main(["--out", str(tmp_path / "sheet"), "--points", "6000"]) == 0
     printed = capsys.readouterr().out
-    assert "no real models: python -m experiments.models fetch brings them" in printed
+    assert "no real models: python -m experiments.objects.models fetch brings them" in printed
     assert "1 of 2 right; wrong: crown" in printed
     assert [p.name for p in (tmp_path / "sheet").iterdir()] == ["gallery.png"]
 

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.group_shapes import DESIGNS, MISS_REL, group, shape
-from experiments.groups import Case, cases, check, is_mirror, label, posed, run, true_group
-from experiments.parts import Part, assembled, ball, block, cylinder, exact_group, hull, orbit, ring_of, rod
-from experiments.shapes import sample
+from experiments.objects.group_shapes import DESIGNS, MISS_REL, group, shape
+from experiments.objects.parts import Part, assembled, ball, block, cylinder, exact_group, hull, orbit, ring_of, rod
+from experiments.objects.shapes import sample
+from experiments.studies.groups import Case, cases, check, is_mirror, label, posed, run, true_group
 from symrefine.errors import InputError
 from symrefine.geometry import random_orthogonal, rotation
 from symrefine.groups import PointGroup, point_group

@@ -13,7 +13,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from experiments.molecule_sets import MOLECULES, molecule
+from experiments.objects.molecule_sets import MOLECULES, molecule
 from symrefine.cli import invoke
 from symrefine.detect import Detection, detect
 from symrefine.errors import InputError

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from experiments.shapes import join, revolve, sample
+from experiments.objects.shapes import join, revolve, sample
 from symrefine.gather import gather, measure
 from symrefine.geometry import Isometry, random_orthogonal, rotation
 from symrefine.groups import PointGroup

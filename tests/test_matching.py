@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.stats import norm
 
-from experiments.shapes import bottle, box, join, mug, sample, table
+from experiments.objects.shapes import bottle, box, join, mug, sample, table
 from symrefine.fit.matching import ROBUST, match, pair_equations
 from symrefine.fit.residual import design_rows, gram
 from symrefine.geometry import Isometry, Plane, random_orthogonal, rotation, unit

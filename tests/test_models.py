@@ -11,9 +11,9 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 import numpy as np
 import pytest
 
-from experiments import models
-from experiments.legacy_vtk import vtk_to_off
-from experiments.models import PYVISTA, VEDO, Model, Package
+from experiments.objects import models
+from experiments.objects.legacy_vtk import vtk_to_off
+from experiments.objects.models import PYVISTA, VEDO, Model, Package
 from symrefine import load
 from symrefine.errors import InputError
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from experiments.molecule_geometry import bent, images, phenyl, pyramid, tub, turned
-from experiments.molecule_sets import MOLECULES, RADII, Molecule, molecule
-from experiments.molecules import Case, check, has_pymatgen, posed, run
-from experiments.parts import marked_group
+from experiments.objects.molecule_geometry import bent, images, phenyl, pyramid, tub, turned
+from experiments.objects.molecule_sets import MOLECULES, RADII, Molecule, molecule
+from experiments.objects.parts import marked_group
+from experiments.studies.molecules import Case, check, has_pymatgen, posed, run
 from symrefine.errors import InputError
 from symrefine.geometry import unit
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.shapes import asymmetric, box, join, mug, sample
+from experiments.objects.shapes import asymmetric, box, join, mug, sample
 from symrefine.errors import DegenerateShapeError
 from symrefine.geometry import random_orthogonal
 from symrefine.moments.moments import (

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.measure import score_planes
-from experiments.shapes import random_pose
+from experiments.objects.shapes import random_pose
+from experiments.studies.measure import score_planes
 from symrefine import detect, load
 from symrefine.geometry import unit
 from symrefine.moments.quadrature import sample_surface

@@ -6,8 +6,8 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.exhibits import Pose, exhibit, posed
-from experiments.peers import point_group_pymatgen, schoenflies, trimesh_symmetry
+from experiments.objects.exhibits import Pose, exhibit, posed
+from experiments.peers.peers import point_group_pymatgen, schoenflies, trimesh_symmetry
 from symrefine.errors import InputError
 from symrefine.geometry import line_angle_rad
 from symrefine.shape import Shape

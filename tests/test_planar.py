@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from experiments.drawings import CASE_STUDY, DRAWINGS, Drawing
-from experiments.pictures import FINISHES, Pose, coverage, fit, picture, random_pose, sibling
-from experiments.planar_cases import Case as StudyCase
-from experiments.planar_cases import run as run_study
-from experiments.planar_images import Case, check, examine, run
+from experiments.objects.drawings import CASE_STUDY, DRAWINGS, Drawing
+from experiments.objects.pictures import FINISHES, Pose, coverage, fit, picture, random_pose, sibling
+from experiments.studies.planar_cases import Case as StudyCase
+from experiments.studies.planar_cases import run as run_study
+from experiments.studies.planar_images import Case, check, examine, run
 from symrefine.cli import invoke
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.export.planar import planar_record

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments import planar_reliability as study
-from experiments.drawings import DRAWINGS
-from experiments.pictures import fit
-from experiments.planar_reliability import Case, Element
-from experiments.reliability import fitted
+from experiments.objects.drawings import DRAWINGS
+from experiments.objects.pictures import fit
+from experiments.studies import planar_reliability as study
+from experiments.studies.planar_reliability import Case, Element
+from experiments.studies.reliability import fitted
 from symrefine.plane.judge import EVEN, STEEPNESS, confidence
 
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments import reproduce
-from experiments.methods import METHODS, generated
-from experiments.models import Package
-from experiments.planes import SHAPES, Case, check, make, run, score, trace
+from experiments.objects.models import Package
+from experiments.studies import reproduce
+from experiments.studies.methods import METHODS, generated
+from experiments.studies.planes import SHAPES, Case, check, make, run, score, trace
 from symrefine.cli import invoke
 from symrefine.errors import InputError
 from symrefine.geometry import Plane, rotation
@@ -165,7 +165,7 @@ def test_reproduce_sets_side_by_side_and_names_misses(
     (home / "configs").mkdir(parents=True)
     (home / "README.md").write_text(f"before\n{reproduce.BEGIN}\nold\n{reproduce.END}\nafter\n")
     monkeypatch.syspath_prepend(str(home))
-    monkeypatch.setattr("experiments.models.download_package", no_network)
+    monkeypatch.setattr("experiments.objects.models.download_package", no_network)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "empty"))
     (home / "halves.py").write_text(
         "from dataclasses import dataclass\n@dataclass(frozen=True)\nclass Case:\n    seed: int\n"

@@ -5,7 +5,7 @@ from math import factorial
 import numpy as np
 import pytest
 
-from experiments.shapes import box, join, mug
+from experiments.objects.shapes import box, join, mug
 from symrefine.errors import DegenerateShapeError
 from symrefine.moments.quadrature import mesh_nodes, sample_surface, triangle_areas_and_normals, triangle_rule
 from symrefine.shape import Shape

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from experiments.shapes import box, join, mug, sample, stool, table
+from experiments.objects.shapes import box, join, mug, sample, stool, table
 from symrefine.fit.refine import LONGEST, SETTLED, WITHIN_NOISE, Framed, _remaining, mirror_bundle, refine, single_plane
 from symrefine.geometry import (
     Plane,

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from experiments import built_symmetry, reliability
-from experiments.built_symmetry import Claim, Truth
-from experiments.exhibits import Pose
-from experiments.reliability import Case, Judged
+from experiments.objects import built_symmetry
+from experiments.objects.built_symmetry import Claim, Truth
+from experiments.objects.exhibits import Pose
+from experiments.studies import reliability
+from experiments.studies.reliability import Case, Judged
 from symrefine.errors import InputError
 from symrefine.geometry import random_orthogonal, rotation
 from symrefine.groups import PointGroup

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.shapes import asymmetric, bottle, box, join, sample, table
+from experiments.objects.shapes import asymmetric, bottle, box, join, sample, table
 from symrefine.detect import Detection, detect
 from symrefine.errors import InputError
 from symrefine.files import whole

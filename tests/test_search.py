@@ -8,7 +8,7 @@ from itertools import combinations, islice
 import numpy as np
 import pytest
 
-from experiments.shapes import bottle, box, join, mug, sample, stool
+from experiments.objects.shapes import bottle, box, join, mug, sample, stool
 from symrefine.fit.refine import single_plane
 from symrefine.gather import gather, measure
 from symrefine.geometry import Isometry, Plane, line_angle_rad, random_orthogonal, unit

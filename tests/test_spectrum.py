@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.shapes import asymmetric, box, join, mug, revolve, stool, table
+from experiments.objects.shapes import asymmetric, box, join, mug, revolve, stool, table
 from symrefine.geometry import frame_with_z, householder, random_orthogonal, rotation
 from symrefine.groups import point_group
 from symrefine.moments.harmonics import harmonic_moments

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.shapes import bottle, box, join, mug, sample, stool, table
+from experiments.objects.shapes import bottle, box, join, mug, sample, stool, table
 from symrefine.geometry import Isometry, Plane, householder, random_orthogonal, rotation, tight_diagonal
 from symrefine.moments.moments import shape_moments
 from symrefine.moments.quadrature import sample_surface

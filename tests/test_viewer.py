@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.shapes import asymmetric, bottle, sample, table
+from experiments.objects.shapes import asymmetric, bottle, sample, table
 from symrefine.detect import Detection, detect
 from symrefine.errors import InputError, SymrefineError
 from symrefine.geometry import rotation

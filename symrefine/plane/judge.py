@@ -21,8 +21,8 @@ SHARE, STRETCH = 0.005, 0.02
 # What an outline known from pixels may miss its image by, in pixels: the same statistics, and the most.
 PIXEL = (0.25, 0.75, 0.75, 0.75, 0.75)
 # Of the confidence: the miss over its limit at which half of the elements were meant, and how fast they become fewer.
-# `python -m experiments.planar_reliability --fit`: pictures of half of 24 drawings, a third of them with a part moved
-# by 1 to 5 % of the diagonal, seeds 0 and 1 together; checked on the other half. 95 % at 0.177.
+# `python -m experiments.studies.planar_reliability --fit`: pictures of half of 24 drawings, a third of them with a part
+# moved by 1 to 5 % of the diagonal, seeds 0 and 1 together; checked on the other half. 95 % at 0.177.
 EVEN, STEEPNESS = 0.40, 3.6
 # Points that an outline is compared with itself at.
 OWN = 1300

@@ -60,7 +60,9 @@ def make_plan(path: Path, settings: Sequence[str] = (), *, quick: bool = False) 
     study: Study = typed(root, Study)
     name = root.at("experiment")
     if not all(part.isidentifier() for part in study.experiment.split(".")):
-        raise name.error(f"expected the name of a Python module such as experiments.planes, got {study.experiment!r}")
+        raise name.error(
+            f"expected the name of a Python module such as experiments.studies.planes, got {study.experiment!r}"
+        )
     try:
         experiment = load_experiment(study.experiment, find_root(study.experiment, path.parent))
     except InputError as error:

@@ -191,6 +191,6 @@ def confidence(excess: float) -> float:
     """How likely a group was meant, from the largest miss over its limit among its elements.
 
     A logistic curve in the logarithm of the miss, 95 % at 0.43 and 50 % at 0.62, fitted to half of the objects of
-    `experiments.reliability` (a third of them broken in a detail) and checked on the other half.
+    `experiments.studies.reliability` (a third of them broken in a detail) and checked on the other half.
     """
     return float(1.0 / (1.0 + (excess / EVEN) ** STEEPNESS))

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import f as f_distribution
 
-from experiments.shapes import asymmetric, box, join
+from experiments.objects.shapes import asymmetric, box, join
 from symrefine.errors import InputError
 from symrefine.geometry import random_orthogonal
 from symrefine.moments.moments import Moments, central_moments, exponents, raw_moments, shape_moments

@@ -1,6 +1,6 @@
 """The lists of n-tuples that the paper offers for download: several orders in 2-, 3- and 4-D, and affine ones.
 
-    python -m experiments.tuple_lists [--out DIR]
+    python -m experiments.studies.tuple_lists [--out DIR]
 
 writes DIR/<dim>d_<orders>.txt and .json for each vector of moments, affine_<dim>d_<orders> for the affine n-tuples, and
 DIR/index.txt with one line for each.

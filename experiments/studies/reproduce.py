@@ -1,4 +1,4 @@
-"""The paper's experiments in one go: `python -m experiments.reproduce [--full]`, which is `make reproduce`.
+"""The paper's experiments in one go: `python -m experiments.studies.reproduce [--full]`, which is `make reproduce`.
 
 Runs the quick version of every study named in configs/reproduce.yaml and writes out/reproduce/report.md: for each claim
 the paper's figure, ours and those of others side by side, and the misses by name. The main claims also become the table
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from symrefine.study.claims import Verdict
     from symrefine.study.runner import Outcome
 
-HOME = Path(__file__).parents[1]
+HOME = Path(__file__).parents[2]
 CONFIG = HOME / "configs" / "reproduce.yaml"
 BEGIN, END = "<!-- reproduce:begin -->", "<!-- reproduce:end -->"
 
@@ -37,7 +37,7 @@ class Picture:
 class Config:
     """The studies, in the order of the report, and the README's picture.
 
-    `fetched` are those of them that need the meshes that `experiments.models` fetches.
+    `fetched` are those of them that need the meshes that `experiments.objects.models` fetches.
     """
 
     configs: list[str]
@@ -91,7 +91,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def missing_models() -> str:
     """Bring the real meshes into the cache if they are not there; why they could not be brought, else nothing."""
-    from experiments.models import cache_folder, download_package, fetch
+    from experiments.objects.models import cache_folder, download_package, fetch
 
     try:
         fetch(cache_folder(), download_package)

@@ -1,4 +1,6 @@
-"""Every point group, and shapes that miss one in a detail: `python -m experiments.groups [--quick] [--seeds N]`.
+"""Every point group, and shapes that miss one in a detail.
+
+    python -m experiments.studies.groups [--quick] [--only SHAPE ...] [--seeds N] [--jobs N]
 
 The shapes of `group_shapes` in random poses, units and scales, without normals: as meshes, and as points with Gaussian
 noise in fractions of the bounding-box diagonal. Right means that the point group is right and no plane is false. The
@@ -13,10 +15,10 @@ from time import perf_counter
 
 import numpy as np
 
-from experiments import group_shapes
-from experiments.measure import FOUND_DEG
-from experiments.parts import placed_group
-from experiments.shapes import random_pose, sample
+from experiments.objects import group_shapes
+from experiments.objects.parts import placed_group
+from experiments.objects.shapes import random_pose, sample
+from experiments.studies.measure import FOUND_DEG
 from symrefine.detect import detect
 from symrefine.errors import InputError
 from symrefine.geometry import Array

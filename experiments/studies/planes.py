@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments import shapes
-from experiments.measure import FOUND_DEG
-from experiments.methods import METHODS, Scan
+from experiments.objects import shapes
+from experiments.studies.measure import FOUND_DEG
+from experiments.studies.methods import METHODS, Scan
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, line_angle_rad
 from symrefine.groups import PointGroup

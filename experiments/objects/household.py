@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.shapes import Mesh, asymmetric, bottle, box, join, mug, revolve, stool, table, tube
+from experiments.objects.shapes import Mesh, asymmetric, bottle, box, join, mug, revolve, stool, table, tube
 from symrefine.geometry import Array, rotation
 from symrefine.shape import Shape
 

@@ -1,4 +1,6 @@
-"""Real meshes in random poses: `python -m experiments.objects [--groups all|first] [--seeds N]`.
+"""Real meshes in random poses.
+
+    python -m experiments.studies.catalogue [--groups all|first] [--seeds N] [--jobs N]
 
 Every mesh of `../shared/objects` (52 files, not part of the product) as a mesh and as an 8,000-point sample without
 normals, turned, moved and scaled at random. Right means that the point group is right and no plane is false.
@@ -12,15 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.measure import score_planes
-from experiments.shapes import random_pose
+from experiments.objects.shapes import random_pose
+from experiments.studies.measure import score_planes
 from symrefine.detect import Detection, detect
 from symrefine.geometry import unit
 from symrefine.load import load
 from symrefine.moments.quadrature import sample_surface
 from symrefine.shape import Shape
 
-OBJECTS = Path(__file__).parents[2] / "shared" / "objects"
+OBJECTS = Path(__file__).parents[3] / "shared" / "objects"
 SAMPLE = 8000
 
 

@@ -1,4 +1,6 @@
-"""Point groups of molecules, and pymatgen beside us: `python -m experiments.molecules [--seeds N] [--tolerances ...]`.
+"""Point groups of molecules, and pymatgen beside us.
+
+    python -m experiments.studies.molecules [--seeds N] [--tolerances ...] [--jobs N]
 
 The molecules of `molecule_sets` in random poses, with their elements as labels; as they are, and with Gaussian noise of
 1 % of the mean bond length on every coordinate.
@@ -12,8 +14,8 @@ from time import perf_counter
 
 import numpy as np
 
-from experiments.molecule_sets import MOLECULES, Molecule, molecule
-from experiments.peers import point_group_pymatgen
+from experiments.objects.molecule_sets import MOLECULES, Molecule, molecule
+from experiments.peers.peers import point_group_pymatgen
 from symrefine.detect import detect
 from symrefine.errors import InputError
 from symrefine.geometry import Array, random_orthogonal

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments import group_shapes, household
-from experiments.exhibits import Pose
-from experiments.objects import OBJECTS
-from experiments.parts import placed_group
+from experiments.objects import group_shapes, household
+from experiments.objects.exhibits import Pose
+from experiments.objects.parts import placed_group
+from experiments.studies.catalogue import OBJECTS
 from symrefine.elements import FREE_TURNS
 from symrefine.geometry import Array, frame_with_z, householder, rotation, rotoreflection
 from symrefine.groups import PointGroup, from_elements

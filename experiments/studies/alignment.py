@@ -1,7 +1,7 @@
 """The map between two poses of an object: the paper's matrices, independent samples, noise, symmetry; Open3D beside us.
 
-    python -m experiments.alignment [--seeds N]        the figures, line by line
-    symrefine run configs/alignment.yaml               the same as rows, tables and claims
+    python -m experiments.studies.alignment [--seeds N]    the figures, line by line
+    symrefine run configs/alignment.yaml                   the same as rows, tables and claims
 
 Objects are shapes of the project's own making and the meshes of `../shared/objects`, which are no part of the product;
 where these are not there, the command names them and goes on. A cloud is independent uniform points of the surface,
@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.shapes import SHAPES
+from experiments.objects.shapes import SHAPES
 from symrefine.align.procrustes import procrustes
 from symrefine.align.story import Alignment, align
 from symrefine.detect import detect
@@ -32,7 +32,7 @@ from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.ntuples.contract import ntuples
 from symrefine.shape import Shape
 
-OBJECTS = Path(__file__).parents[2] / "shared" / "objects"
+OBJECTS = Path(__file__).parents[3] / "shared" / "objects"
 CHIRAL = (
     "drill_cordless",
     "shark",

@@ -1,4 +1,6 @@
-"""Our baseline beside the C++ program it follows: `python -m experiments.baseline_check [--part NAME ...] [--seeds N]`.
+"""Our baseline beside the C++ program it follows.
+
+    python -m experiments.studies.baseline_check [--part NAME ...] [--seeds N]
 
 `REFERENCE` holds what the public code of Ecins, Fermuller and Aloimonos (2017) gave, five random poses each, as
 shared/baseline.md records it. The shapes there are not published; ours have the same symmetry, not the same
@@ -13,8 +15,8 @@ from time import perf_counter, process_time
 import numpy as np
 
 from experiments.ecins import SHIPPED, TUNED, EcinsResult, Settings, ecins, estimated_normals
-from experiments.measure import FOUND_DEG
-from experiments.shapes import SHAPES, box, join, random_pose, revolve
+from experiments.objects.shapes import SHAPES, box, join, random_pose, revolve
+from experiments.studies.measure import FOUND_DEG
 from symrefine.errors import InputError
 from symrefine.geometry import Array, line_angle_rad
 from symrefine.groups import point_group

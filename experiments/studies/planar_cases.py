@@ -1,6 +1,6 @@
 """The paper's case study in the plane: a rectangle, the same with a disc on either axis, and an object with two discs.
 
-    python -m experiments.planar_cases [--out DIR]
+    python -m experiments.studies.planar_cases [--out DIR]
 
 prints what the doublets tell of each object and the ratios of their singular values beside those of the paper, and
 writes DIR/case_study.png; the exit status is 1 if a group is wrong. The paper shows its objects but gives no sizes:
@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.drawings import CASE_STUDY, DRAWINGS
-from experiments.pictures import Pose, coverage, picture
-from experiments.planar_images import Trial, examine, summary
+from experiments.objects.drawings import CASE_STUDY, DRAWINGS
+from experiments.objects.pictures import Pose, coverage, picture
+from experiments.studies.planar_images import Trial, examine, summary
 from symrefine.errors import InputError
 
 # Section "Experiments in 2D space": of the object without symmetry. For the others the paper says in words what we
@@ -84,7 +84,7 @@ def ratio_lines(trials: Sequence[Trial]) -> list[str]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; 1 if anything is found wrong, 2 if the folder cannot be written."""
-    from experiments.planar_figures import case_study_figure
+    from experiments.studies.planar_figures import case_study_figure
 
     parser = argparse.ArgumentParser(description="The paper's case study in the plane.")
     parser.add_argument("--out", type=Path, default=Path("out/planar_cases"), help="folder (default: %(default)s)")

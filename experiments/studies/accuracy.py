@@ -1,4 +1,4 @@
-"""Accuracy on shapes of our own making: `python -m experiments.accuracy [CONFIG.yaml] [--seeds N]`.
+"""Accuracy on shapes of our own making: `python -m experiments.studies.accuracy [CONFIG.yaml] [--seeds N]`.
 
 Points only, no normals, random poses, units and scales; noise in fractions of the bounding-box diagonal. The targets
 are those of the first issue; the C++ baseline finds 2-3 of the table's 4 planes up to 0.5 % noise and none beyond.
@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.measure import bundle_normals, score_planes
-from experiments.shapes import SHAPES, random_pose, sample
+from experiments.objects.shapes import SHAPES, random_pose, sample
+from experiments.studies.measure import bundle_normals, score_planes
 from symrefine.detect import detect
 from symrefine.study.typed import read_config
 
-DEFAULT = Path(__file__).parents[1] / "configs" / "accuracy.yaml"
+DEFAULT = Path(__file__).parents[2] / "configs" / "accuracy.yaml"
 FOLDS = {"C1": 0, "Cs": 1, "Cinfv": 0}
 
 

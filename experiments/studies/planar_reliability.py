@@ -1,6 +1,6 @@
 """Whether 95 % sure means 95 % right in the plane.
 
-    python -m experiments.planar_reliability [--quick] [--fit] [--seed N] [--figure PATH]
+    python -m experiments.studies.planar_reliability [--quick] [--fit] [--seed N] [--figure PATH]
 
 Mirror lines and turns claimed, and candidates turned down, of the drawings of `planar_images` and `planar_cases` in
 random poses, clean, blurred and with grain; and of the same drawings with one part moved by 1 to 5 % of the diagonal.
@@ -18,10 +18,10 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.drawings import DRAWINGS, Drawing, Layer
-from experiments.pictures import Pose, coverage, fit, picture, random_pose
-from experiments.planar_images import Trial, examine
-from experiments.reliability import Judged, bins, fitted, plausible, plot, summary
+from experiments.objects.drawings import DRAWINGS, Drawing, Layer
+from experiments.objects.pictures import Pose, coverage, fit, picture, random_pose
+from experiments.studies.planar_images import Trial, examine
+from experiments.studies.reliability import Judged, bins, fitted, plausible, plot, summary
 from symrefine.errors import InputError
 from symrefine.files import check_target
 from symrefine.geometry import Array
@@ -30,7 +30,8 @@ from symrefine.plane.judge import confidence
 FINISHES = ("clean", "blurred", "noisy")
 # How far a part is moved, over the diagonal, taken as twice the reach; 0 leaves the drawing as it is.
 MOVED = (0.0, 0.01, 0.02, 0.03, 0.05)
-# Looks at the whole drawing for each at a broken one: a third of all looks is broken, as in `experiments.reliability`.
+# Looks at the whole drawing for each at a broken one: a third of all looks is broken, as in
+# `experiments.studies.reliability`.
 WHOLE = 8
 SIDES = (128, 256)
 # A part that is pushed out of place: its radius over the diagonal.
@@ -63,7 +64,7 @@ class Element:
     right: bool
 
     def judged(self) -> Judged:
-        """The same for the tables of `experiments.reliability`; a look is one of an object."""
+        """The same for the tables of `experiments.studies.reliability`; a look is one of an object."""
         look = zlib.crc32(repr(self.case).encode())
         return Judged(
             object=self.case.drawing,
@@ -253,7 +254,7 @@ def report(rows: Sequence[Element]) -> Iterator[str]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the tables; 2 if the plot has no place to go."""
-    parser = argparse.ArgumentParser(prog="python -m experiments.planar_reliability")
+    parser = argparse.ArgumentParser(prog="python -m experiments.studies.planar_reliability")
     parser.add_argument("--quick", action="store_true", help="four drawings only")
     parser.add_argument("--fit", action="store_true", help="print the constants that suit half of the drawings best")
     parser.add_argument("--seed", type=int, default=0, help="of poses, grain and moved parts (default: %(default)s)")

@@ -1,8 +1,8 @@
 """Shapes of every point group, of the project's own making, each with a sibling that misses it in one detail.
 
-`python -m experiments.group_shapes` prints them all with what their details amount to. The sibling has one part (a
-leg, a tooth, a blade, a lid) 3 % of the bounding-box diagonal out of place; its group is what then remains. The groups
-are stated here and follow from the construction: `parts.exact_group` finds the same by trying every operation.
+`python -m experiments.objects.group_shapes` prints them all with what their details amount to. The sibling has one part
+(a leg, a tooth, a blade, a lid) 3 % of the bounding-box diagonal out of place; its group is what then remains. The
+groups are stated here and follow from the construction: `parts.exact_group` finds the same by trying every operation.
 """
 
 from collections.abc import Callable
@@ -12,8 +12,8 @@ from functools import cache, partial
 import numpy as np
 from scipy.spatial import cKDTree
 
-from experiments import constructions as made
-from experiments.parts import Part, assembled, block, cylinder, extruded, placed_group, spun
+from experiments.objects import constructions as made
+from experiments.objects.parts import Part, assembled, block, cylinder, extruded, placed_group, spun
 from symrefine.geometry import Array, tight_diagonal, unit
 from symrefine.groups import PointGroup
 from symrefine.moments.quadrature import sample_surface

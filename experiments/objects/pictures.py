@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 from scipy.ndimage import gaussian_filter
 
-from experiments.drawings import Drawing, Layer, ellipse
+from experiments.objects.drawings import Drawing, Layer, ellipse
 from symrefine.geometry import Array
 
 # Each pixel is the mean of so many by so many.

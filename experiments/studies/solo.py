@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.alignment import PRINTED, RANDOM
-from experiments.exhibits import FORMS, Exhibit, Pose, check_exhibit, exhibit, judge, observed, posed
+from experiments.objects.exhibits import FORMS, Exhibit, Pose, check_exhibit, exhibit, judge, observed, posed
+from experiments.studies.alignment import PRINTED, RANDOM
 from symrefine.align.story import align
 from symrefine.detect import Detection, detect
 from symrefine.errors import InputError

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
 
-from experiments.shapes import box, join, revolve
+from experiments.objects.shapes import box, join, revolve
 from symrefine.geometry import Array, frame_with_z, read_only, rotation
 from symrefine.groups import PointGroup, identify, point_group
 from symrefine.moments.quadrature import triangle_areas_and_normals

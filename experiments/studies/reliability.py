@@ -1,4 +1,6 @@
-"""Whether 95 % sure means 95 % right: `python -m experiments.reliability [--quick] [--every N] [--figure PATH]`.
+"""Whether 95 % sure means 95 % right.
+
+    python -m experiments.studies.reliability [--quick] [--every N] [--figure PATH] [--jobs N]
 
 Elements claimed (planes, axes, rotoreflection axes) and candidates turned down, of every object there is: the shapes of
 all point groups and their siblings with one detail out of place, the household objects, and the catalogued meshes
@@ -16,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.built_symmetry import FAMILIES, Claim, Truth, catalogue, holds, names, specimen
-from experiments.exhibits import Pose, observed, posed
-from experiments.objects import OBJECTS
+from experiments.objects.built_symmetry import FAMILIES, Claim, Truth, catalogue, holds, names, specimen
+from experiments.objects.exhibits import Pose, observed, posed
+from experiments.studies.catalogue import OBJECTS
 from symrefine.detect import Detection, detect
 from symrefine.errors import InputError
 from symrefine.files import check_target, whole
@@ -32,7 +34,7 @@ SURE = 0.95
 EDGES = (0.0, 0.05, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 1.0)
 QUICK_EVERY = 21
 BLUE, ORANGE, RULE, GRID = "#0072b2", "#d55e00", "#6b7484", "#e3e7ee"
-FIGURE = Path(__file__).parents[1] / "docs" / "reliability.png"
+FIGURE = Path(__file__).parents[2] / "docs" / "reliability.png"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -358,7 +360,9 @@ def sure_and_wrong(rows: Sequence[Judged]) -> Iterator[str]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Print the table, write the plot; 2 if the plot has no place to go."""
-    parser = argparse.ArgumentParser(prog="python -m experiments.reliability", description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m experiments.studies.reliability", description=__doc__.partition("\n")[0]
+    )
     parser.add_argument("--quick", action="store_true", help=f"each {QUICK_EVERY}th look only, no figure unless asked")
     parser.add_argument("--every", type=int, default=1, help="each so many-th look (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of poses, samples and noise (default: %(default)s)")

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.parts import (
+from experiments.objects.parts import (
     Part,
     ball,
     block,

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.household import OBJECTS
-from experiments.measure import score_planes
-from experiments.models import MODELS, PREFIX, available, load_model
-from experiments.shapes import random_pose, sample
+from experiments.objects.household import OBJECTS
+from experiments.objects.models import MODELS, PREFIX, available, load_model
+from experiments.objects.shapes import random_pose, sample
+from experiments.studies.measure import score_planes
 from symrefine.detect import Detection
 from symrefine.errors import InputError
 from symrefine.geometry import Array, frame_with_z, line_angle_rad, unit
@@ -55,7 +55,9 @@ def check_exhibit(name: str, field: str = "name") -> None:
     if name.removeprefix(PREFIX) not in (MODELS if name.startswith(PREFIX) else OBJECTS):
         raise InputError(f"{field}: value is {name!r}, expected one of {list(OBJECTS)} or {PREFIX} and {list(MODELS)}")
     if name.startswith(PREFIX) and name.removeprefix(PREFIX) not in available():
-        raise InputError(f"{field}: {name} is not in the cache; fetch it with: python -m experiments.models fetch")
+        raise InputError(
+            f"{field}: {name} is not in the cache; fetch it with: python -m experiments.objects.models fetch"
+        )
 
 
 def exhibit(name: str) -> Exhibit:

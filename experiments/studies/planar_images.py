@@ -1,6 +1,6 @@
 """Symmetry of pictures: drawings in random poses, several finishes, and siblings without the symmetry.
 
-    python -m experiments.planar_images [--out DIR] [--seed N]
+    python -m experiments.studies.planar_images [--out DIR] [--seed N]
 
 photographs every drawing once, makes the picture grey, then binary by Otsu's threshold (the paper's last experiment in
 the plane), prints truth against what was found, and writes DIR/gallery.png; the exit status is 1 if a group is wrong or
@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from experiments.drawings import DRAWINGS, GALLERY, Drawing
-from experiments.pictures import DEFECTS, FINISHES, Pose, coverage, fit, picture, random_pose, sibling
+from experiments.objects.drawings import DRAWINGS, GALLERY, Drawing
+from experiments.objects.pictures import DEFECTS, FINISHES, Pose, coverage, fit, picture, random_pose, sibling
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load import load
@@ -166,7 +166,7 @@ def table_lines(trials: Sequence[Trial]) -> list[str]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; 1 if anything is found wrong, 2 if the folder cannot be written."""
-    from experiments.planar_figures import gallery_figure
+    from experiments.studies.planar_figures import gallery_figure
 
     parser = argparse.ArgumentParser(description="Symmetry of photographs of drawings, truth against found.")
     parser.add_argument("--out", type=Path, default=Path("out/planar_images"), help="folder (default: %(default)s)")

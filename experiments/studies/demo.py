@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.shapes import random_pose, sample, table
+from experiments.objects.shapes import random_pose, sample, table
 from symrefine.detect import Detection, detect
 from symrefine.export.files import json_text
 from symrefine.export.records import detection_record
@@ -35,7 +35,7 @@ class Truth:
 
 def main() -> int:
     """Make, detect, compare, write; 1 if the four planes are not found."""
-    parser = argparse.ArgumentParser(prog="python -m experiments.demo", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m experiments.studies.demo", description=__doc__)
     parser.add_argument(
         "--out", type=Path, default=Path("out/demo"), help="folder for the results (default: %(default)s)"
     )

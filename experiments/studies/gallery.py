@@ -1,4 +1,4 @@
-"""The gallery, like the paper's last figure: `python -m experiments.gallery [--out out/gallery]`.
+"""The gallery, like the paper's last figure: `python -m experiments.studies.gallery [--out out/gallery]`.
 
 Every object in a random pose, unit and scale, as points with noise and without normals, judged against the symmetry
 that is stated for it. Writes `gallery.png` with the objects of the project's own making and, where they are fetched,
@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.exhibits import FORMS, Exhibit, Pose, check_exhibit, exhibit, judge, observed, posed
-from experiments.household import OBJECTS
-from experiments.models import PREFIX, available
-from experiments.peers import trimesh_symmetry
+from experiments.objects.exhibits import FORMS, Exhibit, Pose, check_exhibit, exhibit, judge, observed, posed
+from experiments.objects.household import OBJECTS
+from experiments.objects.models import PREFIX, available
+from experiments.peers.peers import trimesh_symmetry
 from symrefine.detect import Detection, detect
 from symrefine.errors import InputError
 from symrefine.export.files import replacing
@@ -253,7 +253,9 @@ def show(names: Sequence[str], path: Path, options: argparse.Namespace) -> tuple
 
 def main(arguments: list[str] | None = None) -> int:
     """Print the table, write the sheets; 2 if something is wrong with the input."""
-    parser = argparse.ArgumentParser(prog="python -m experiments.gallery", description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m experiments.studies.gallery", description=__doc__.partition("\n")[0]
+    )
     parser.add_argument("--out", type=Path, default=Path("out/gallery"), help="folder (default: %(default)s)")
     parser.add_argument("--points", type=int, default=20000, help="of each object (default: %(default)s)")
     parser.add_argument("--noise", type=float, default=0.005, help="fraction of the diagonal (default: %(default)s)")
@@ -269,7 +271,7 @@ def main(arguments: list[str] | None = None) -> int:
             more, missed = show(fetched, options.out / "models.png", options)
             right, wrong = right + more, wrong + missed
         else:
-            print("no real models: python -m experiments.models fetch brings them")
+            print("no real models: python -m experiments.objects.models fetch brings them")
         print(f"\n{right} of {right + len(wrong)} right" + (f"; wrong: {', '.join(wrong)}" if wrong else ""))
     except (InputError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments import molecule_geometry as made
+from experiments.objects import molecule_geometry as made
 from symrefine.geometry import Array, read_only
 
 NUMBERS = {
