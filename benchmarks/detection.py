@@ -7,7 +7,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from benchmarks.metric import Metric
-from experiments.objects.shapes import SHAPES, box, join, random_pose, sample
+from experiments.objects.poses import Pose
+from experiments.objects.shapes import SHAPES, box, join, sample
 from symrefine.detect import detect
 from symrefine.geometry import Array
 from symrefine.moments.moments import central_moments
@@ -35,8 +36,8 @@ def clouds() -> Iterator[tuple[str, Array]]:
     cases = [(name, SHAPES[name][0](), noise) for name, noise in CASES]
     cases.append(("cube", join([box((0, 0, 0), (1, 1, 1))]), 0.0))
     for name, shape, noise in cases:
-        turn, shift, scale = random_pose(rng)
-        yield f"{name} {100 * noise:g} % noise", scale * sample(shape, POINTS, noise, rng) @ turn.T + shift
+        pose = Pose.random(rng)
+        yield f"{name} {100 * noise:g} % noise", pose.of(sample(shape, POINTS, noise, rng))
 
 
 CASES = (("table", 0.0), ("table", 0.01), ("mug", 0.0), ("stool8", 0.005), ("bottle", 0.0), ("asymmetric", 0.0))

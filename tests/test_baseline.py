@@ -17,7 +17,8 @@ from experiments.ecins.fitting import inner_minimum, mirror_coordinates, partner
 from experiments.ecins.judging import representatives, score
 from experiments.ecins.levenberg import least_squares
 from experiments.ecins.starts import best_of_each, grid_normals, position
-from experiments.objects.shapes import box, join, random_pose, table
+from experiments.objects.poses import Pose
+from experiments.objects.shapes import box, join, table
 from experiments.studies import baseline_check
 from experiments.studies.baseline_check import ALL_SHAPES, Case
 from symrefine.errors import DegenerateShapeError, InputError
@@ -149,10 +150,10 @@ def test_normals_that_cancel_stay_zero():
 
 def test_clouds_have_mean_zero_and_a_unit_box_along_the_principal_axes():
     rng = np.random.default_rng(1)
-    turn, shift, scale = random_pose(rng)
+    pose = Pose.random(rng)
     points, normals = samples(CUBOID, 4000, 0.0, 1)
-    clouds = prepare(scale * points @ turn.T + shift, normals @ turn.T, SHIPPED)
-    back = (points @ turn.T * scale + shift - clouds.center) / clouds.scale
+    clouds = prepare(pose.of(points), normals @ pose.turn.T, SHIPPED)
+    back = (pose.of(points) - clouds.center) / clouds.scale
     assert np.abs(back.mean(axis=0)).max() < 1e-12
     assert np.linalg.norm(np.ptp(back @ clouds.basis.T, axis=0)) == pytest.approx(1.0)
     assert len(clouds.queries) < len(clouds.points) < 4000
@@ -462,14 +463,14 @@ def test_cliques_against_all_subsets():
 
 
 def test_cuboid_in_a_random_pose_and_units():
-    turn, shift, scale = random_pose(np.random.default_rng(6))
+    pose = Pose.random(np.random.default_rng(6))
     points, normals = samples(CUBOID, 10000, 0.0, 6)
-    result = ecins(scale * points @ turn.T + shift, 2.5 * normals @ turn.T)
+    result = ecins(pose.of(points), 2.5 * normals @ pose.turn.T)
     assert len(result.planes) == 3
     for plane in result.planes:
-        angles = [degrees(plane.normal, n) for n in turn.T]
+        angles = [degrees(plane.normal, n) for n in pose.turn.T]
         assert min(angles) < 2.0
-        assert abs(plane.normal @ shift - plane.offset) < 0.02 * scale * CUBOID.diagonal
+        assert abs(plane.normal @ pose.shift - plane.offset) < 0.02 * pose.scale * CUBOID.diagonal
         assert 0.5 < plane.cloud_score <= plane.correspondence_score <= 1.0
         candidate = result.history[plane.candidate]
         np.testing.assert_array_equal(candidate.normals[-1], plane.normal)
@@ -583,11 +584,11 @@ def test_estimated_normals_look_outwards_on_each_of_two_spheres():
 @pytest.mark.parametrize(("name", "share"), [("bottle", 0.99), ("cuboid", 0.97), ("table", 0.7)])
 def test_estimated_normals_look_outwards_in_any_pose_and_units(name, share):
     """Of the table whole legs may be wrong, for they meet the top at right angles; the rest is right."""
-    turn, shift, scale = random_pose(np.random.default_rng(1))
+    pose = Pose.random(np.random.default_rng(1))
     points, true = samples(ALL_SHAPES[name][0](), 8000, 0.002, 1)
-    points = scale * points @ turn.T + shift
+    points = pose.of(points)
     found = estimated_normals(points)
-    assert np.mean(np.einsum("ij,ij->i", found, true @ turn.T) > 0) > share
+    assert np.mean(np.einsum("ij,ij->i", found, true @ pose.turn.T) > 0) > share
     _, near = cKDTree(points).query(points, k=2)
     assert np.mean(np.einsum("ij,ij->i", found, found[near[:, 1]]) < 0) < 0.05  # next to one another they agree
 
@@ -608,8 +609,7 @@ def test_the_true_planes_are_mirrors_of_the_shape(name):
     shape = ALL_SHAPES[name][0]()
     data = baseline_check.posed(Case(shape=name, points=1000, seed=4))
     rng = np.random.default_rng([4, 1000, 0])
-    turn, shift, scale = random_pose(rng)
-    vertices = scale * shape.points @ turn.T + shift
+    vertices = Pose.random(rng).of(shape.points)
     tree = cKDTree(vertices)
     for normal in data.true_normals:
         distance, _ = tree.query(Plane(normal=normal, offset=float(normal @ data.center)).reflect(vertices))

@@ -10,9 +10,10 @@ import pytest
 from scipy.spatial import cKDTree
 
 from experiments.objects import group_shapes
-from experiments.objects.shapes import SHAPES, box, join, mug, random_pose, revolve, sample, table
+from experiments.objects.poses import Pose
+from experiments.objects.shapes import SHAPES, box, join, mirror_normals, mug, revolve, sample, table
 from experiments.studies import groups
-from experiments.studies.measure import bundle_normals, score_planes
+from experiments.studies.measure import score_planes
 from symrefine import Detection, Shape, detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import line_angle_rad, random_orthogonal
@@ -68,10 +69,10 @@ def tetrahedra(name):
 def posed(shape, seed, *, count=8000, noise=0.0, form="sample"):
     """A sample or the mesh itself in a random pose and unit, and the rotation it was given."""
     rng = np.random.default_rng(seed)
-    turn, shift, scale = random_pose(rng)
+    pose = Pose.random(rng)
     if form == "mesh":
-        return Shape(points=scale * shape.points @ turn.T + shift, faces=shape.faces, measure="surface"), turn
-    return scale * sample(shape, count, noise, rng) @ turn.T + shift, turn
+        return Shape(points=pose.of(shape.points), faces=shape.faces, measure="surface"), pose.turn
+    return pose.of(sample(shape, count, noise, rng)), pose.turn
 
 
 def check_consistent(found: Detection):
@@ -109,7 +110,6 @@ def check_consistent(found: Detection):
 # whose handle alone tells its plane.
 LIMITS_DEG = {0.0: 0.1, 0.01: 0.6}
 MUG_DEG = {0.0: 2.5, 0.01: 3.0}
-FOLDS = {"C1": 0, "Cs": 1, "Cinfv": 0}
 
 
 @pytest.mark.parametrize(
@@ -121,8 +121,8 @@ def test_shapes_of_the_first_groups(name, noise):
     found = detect(cloud)
     assert found.point_group == group
     check_consistent(found)
-    fold = FOLDS.get(group, int(group[1:-1]) if group[1:-1].isdigit() else 0)
-    score = score_planes(found, bundle_normals(fold, turn))
+    normals = mirror_normals(group) @ turn.T
+    fold, score = len(normals), score_planes(found, normals)
     assert (score.found, score.false) == (fold, 0)
     assert not found.undetermined
     if fold:
@@ -462,8 +462,7 @@ ATOMS = {
 @pytest.mark.parametrize(("atoms", "group"), ATOMS.values(), ids=ATOMS)
 def test_points_that_stand_for_themselves(atoms, group):
     rng = np.random.default_rng(21)
-    turn, shift, scale = random_pose(rng)
-    found = detect(scale * np.array(atoms, dtype=float) @ turn.T + shift)
+    found = detect(Pose.random(rng).of(np.array(atoms, dtype=float)))
     assert found.point_group == group
     check_consistent(found)
     assert max((p.residual.max for p in found.planes), default=0.0) < 1e-3
@@ -598,7 +597,7 @@ def test_the_uncertainty_of_a_plane_is_what_samples_show():
     for seed in range(4):
         turn = random_orthogonal(np.random.default_rng(seed))
         found = detect(sample(table(), 8000, 0.005, np.random.default_rng(100 + seed)) @ turn.T)
-        truth = bundle_normals(4, turn)
+        truth = mirror_normals("C4v") @ turn.T
         for p in found.planes:
             ratios.append(min(line_angle_rad(p.plane.normal, n) for n in truth) / p.sigma_rad)
             assert 0 < p.sigma < 1e-3 * found.diagonal

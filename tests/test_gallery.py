@@ -9,10 +9,12 @@ import pytest
 from PIL import Image
 
 from experiments.objects import models
-from experiments.objects.exhibits import Pose, exhibit, judge, observed, posed
+from experiments.objects.exhibits import exhibit
 from experiments.objects.household import OBJECTS
+from experiments.objects.poses import Pose, observed, posed
 from experiments.studies import gallery, solo
 from experiments.studies.gallery import CAPTION, MARGIN, TILE_HEIGHT, TILE_WIDTH, Tile, contact_sheet
+from experiments.studies.measure import judge
 from symrefine import detect
 from symrefine.errors import InputError
 from symrefine.geometry import Array, householder, line_angle_rad, rotation

@@ -1,40 +1,28 @@
 """Real meshes that are no part of the product: a few of them always, where they are there, all 52 with `-m slow`."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from experiments.objects.shapes import random_pose
+from experiments.objects.catalogue import FOLDER, catalogue, catalogued, listed_normals
+from experiments.objects.poses import Pose
 from experiments.studies.measure import score_planes
-from symrefine import detect, load
-from symrefine.geometry import unit
+from symrefine import detect
 from symrefine.moments.quadrature import sample_surface
 
-OBJECTS = Path(__file__).resolve().parents[2] / "shared" / "objects"
-ROUND = ("Cinfv", "Dinfh")
-
-pytestmark = pytest.mark.skipif(not OBJECTS.is_dir(), reason=f"{OBJECTS} is not there")
-
-
-def catalogue():
-    return json.loads((OBJECTS / "catalog.json").read_text(encoding="utf-8"))
+pytestmark = pytest.mark.skipif(not catalogue(), reason=f"{FOLDER} is not there")
 
 
 def found_in_sample(entry, seed):
     """What 8,000 points of the object in a random pose and unit show, and the normals of its planes there."""
     rng = np.random.default_rng(seed)
-    turn, shift, scale = random_pose(rng)
-    points = rng.permutation(sample_surface(load(OBJECTS / entry["file"]), 8000, rng)[0])
-    # The catalogue lists four of the endless planes of an object of revolution.
-    listed = [] if entry["point_group"] in ROUND else entry["planes"]
-    return detect(scale * points @ turn.T + shift), [turn @ unit(p["normal"]) for p in listed]
+    pose = Pose.random(rng)
+    points = rng.permutation(sample_surface(catalogued(entry["name"]), 8000, rng)[0])
+    return detect(pose.of(points)), [pose.turn @ n for n in listed_normals(entry)]
 
 
 @pytest.mark.parametrize("name", ["mug_vedo", "table_rect_marble", "mailbox", "teddy", "quadknot", "water_tower"])
 def test_a_few_objects(name):
-    (entry,) = (e for e in catalogue() if e["name"] == name)
+    entry = catalogue()[name]
     found, normals = found_in_sample(entry, 1)
     score = score_planes(found, normals)
     assert found.point_group == entry["point_group"]
@@ -43,7 +31,7 @@ def test_a_few_objects(name):
 
 @pytest.mark.slow
 def test_the_whole_catalogue():
-    entries = catalogue()
+    entries = list(catalogue().values())
     assert len(entries) == 52
     wrong, invented, missed = [], [], []
     for index, entry in enumerate(entries):

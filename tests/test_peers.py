@@ -6,8 +6,10 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.objects.exhibits import Pose, exhibit, posed
-from experiments.peers.peers import point_group_pymatgen, schoenflies, trimesh_symmetry
+from experiments.objects.exhibits import exhibit
+from experiments.objects.poses import Pose, posed
+from experiments.peers.pymatgen_groups import point_group_pymatgen, schoenflies
+from experiments.peers.trimesh_inertia import trimesh_symmetry
 from symrefine.errors import InputError
 from symrefine.geometry import line_angle_rad
 from symrefine.shape import Shape

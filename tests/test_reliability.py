@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from experiments.objects import built_symmetry
 from experiments.objects.built_symmetry import Claim, Truth
-from experiments.objects.exhibits import Pose
+from experiments.objects.poses import Pose
 from experiments.studies import reliability
 from experiments.studies.reliability import Case, Judged
 from symrefine.errors import InputError

@@ -4,22 +4,19 @@ The objects are the shapes of all point groups, their siblings with one detail o
 where they are, the catalogued meshes.
 """
 
-import json
 import math
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from experiments.objects import group_shapes, household
-from experiments.objects.exhibits import Pose
+from experiments.objects.catalogue import catalogue, catalogued
 from experiments.objects.parts import placed_group
-from experiments.studies.catalogue import OBJECTS
+from experiments.objects.poses import Pose
 from symrefine.elements import FREE_TURNS
 from symrefine.geometry import Array, frame_with_z, householder, rotation, rotoreflection
 from symrefine.groups import PointGroup, from_elements
-from symrefine.load import load
 from symrefine.shape import Shape
 
 FAMILIES = ("shape", "sibling", "household", "catalogue")
@@ -85,13 +82,6 @@ def _near(group: PointGroup, matrix: Array, within_deg: float) -> bool:
     return bool(len(apart)) and bool(2.0 * np.degrees(np.arcsin(min(1.0, apart.min()))) <= within_deg)
 
 
-@cache
-def catalogue() -> dict[str, dict[str, Any]]:
-    """Entries of the catalogued meshes by name; none where they are not."""
-    path = OBJECTS / "catalog.json"
-    return {e["name"]: e for e in json.loads(path.read_text())} if path.is_file() else {}
-
-
 def names(family: str) -> list[str]:
     """The objects of a family."""
     if family == "household":
@@ -105,7 +95,7 @@ def specimen(family: str, name: str) -> tuple[Shape, Truth]:
         entry = household.OBJECTS[name]
         return entry.build(), Truth(group=_upright(entry), center=np.zeros(3))
     if family == "catalogue":
-        return load(OBJECTS / catalogue()[name]["file"]), _catalogued(catalogue()[name])
+        return catalogued(name), _entered(catalogue()[name])
     sibling = family == "sibling"
     group, center = placed_group(group_shapes.DESIGNS[name].parts(sibling))
     return group_shapes.shape(name, sibling), Truth(group=group, center=center)
@@ -118,7 +108,7 @@ def _upright(entry: household.Object) -> PointGroup:
     return PointGroup(name=entry.group)
 
 
-def _catalogued(entry: dict[str, Any]) -> Truth:
+def _entered(entry: dict[str, Any]) -> Truth:
     """The group that the elements of an entry generate, and their common point."""
     planes = entry["planes"]
     if entry["point_group"] == "Cs":

@@ -2,18 +2,11 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from experiments.objects.household import OBJECTS
 from experiments.objects.models import MODELS, PREFIX, available, load_model
-from experiments.objects.shapes import random_pose, sample
-from experiments.studies.measure import score_planes
-from symrefine.detect import Detection
 from symrefine.errors import InputError
-from symrefine.geometry import Array, frame_with_z, line_angle_rad, unit
+from symrefine.geometry import Array, frame_with_z, unit
 from symrefine.shape import Shape
-
-FORMS = ("mesh", "cloud")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,74 +79,3 @@ def _fetched(name: str) -> Exhibit:
         axis=None if model.axis is None else upright @ unit(model.axis),
         centred=False,
     )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Pose:
-    """x -> scale * turn x + shift, `turn` of determinant +1."""
-
-    turn: Array
-    shift: Array
-    scale: float
-
-    @classmethod
-    def random(cls, rng: np.random.Generator) -> "Pose":
-        """Any rotation, a shift of several units, a scale from a twentieth to twenty."""
-        turn, shift, scale = random_pose(rng)
-        return cls(turn=turn, shift=shift, scale=scale)
-
-    def of(self, points: Array) -> Array:
-        """Points [N, 3] in this pose."""
-        return self.scale * points @ self.turn.T + self.shift
-
-
-def observed(mesh: Shape, form: str, points: int, noise_rel: float, rng: np.random.Generator) -> Shape:
-    """What is given to a method: the mesh itself, or points of it with noise of `noise_rel` diagonals, no normals."""
-    return mesh if form == "mesh" else Shape(points=sample(mesh, points, noise_rel, rng))
-
-
-def posed(shape: Shape, pose: Pose) -> Shape:
-    """The same in another pose."""
-    return Shape(points=pose.of(shape.points), faces=shape.faces, measure=shape.measure)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Score:
-    """A detection against what is stated; angles in degrees and `offset_rel` in diagonals are NaN without a truth.
-
-    Attributes:
-        right: group right, every mirror found, none false.
-        worst_deg: largest angle between what was found and what is true, planes and axis.
-        offset_rel: largest distance of the origin, which lies in every true plane, from the planes found.
-    """
-
-    right: bool
-    found: int
-    true: int
-    false: int
-    worst_deg: float
-    offset_rel: float
-
-
-def judge(detection: Detection, truth: Exhibit, pose: Pose) -> Score:
-    """Compare what was found in a pose with the stated symmetry."""
-    planes = score_planes(detection, [pose.turn @ n for n in truth.normals])
-    angles = [planes.worst_deg]
-    if truth.axis is not None and detection.axes:
-        angles.append(float(np.degrees(line_angle_rad(detection.axes[0].axis.direction, pose.turn @ truth.axis))))
-    offsets = _offsets(detection, pose.shift) / detection.diagonal if truth.centred else np.empty(0)
-    return Score(
-        right=detection.point_group == truth.group and planes.found == planes.true and planes.false == 0,
-        found=planes.found,
-        true=planes.true,
-        false=planes.false,
-        worst_deg=float(np.nanmax(angles)) if not np.isnan(angles).all() else float("nan"),
-        offset_rel=float(offsets.max()) if offsets.size else float("nan"),
-    )
-
-
-def _offsets(detection: Detection, origin: Array) -> Array:
-    """Distances of a point from all planes and axes found."""
-    planes = [abs(float(p.plane.signed_distance(origin))) for p in detection.planes]
-    axes = [np.linalg.norm(np.cross(origin - a.axis.point, a.axis.direction)) for a in detection.axes]
-    return np.array([*planes, *axes])

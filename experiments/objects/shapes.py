@@ -4,7 +4,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from symrefine.geometry import Array, random_orthogonal, rotation
+from symrefine.geometry import Array, rotation
+from symrefine.groups import PointGroup
 from symrefine.moments.quadrature import sample_surface
 from symrefine.shape import Index, Shape
 
@@ -122,14 +123,24 @@ def asymmetric() -> Shape:
 
 def sample(shape: Shape, count: int, noise_rel: float, rng: np.random.Generator) -> Array:
     """`count` points of the surface with isotropic Gaussian noise of `noise_rel` bounding-box diagonals."""
-    points, _, _ = sample_surface(shape, count, rng)
-    points = points[rng.permutation(count)]
-    return points + rng.normal(scale=noise_rel * shape.diagonal, size=points.shape)
+    return oriented_sample(shape, count, noise_rel, rng)[0]
 
 
-def random_pose(rng: np.random.Generator) -> tuple[Array, Array, float]:
-    """Random orthogonal matrix (det +1), shift and scale."""
-    return random_orthogonal(rng), rng.uniform(-5, 5, 3), float(np.exp(rng.uniform(-3, 3)))
+def oriented_sample(shape: Shape, count: int, noise_rel: float, rng: np.random.Generator) -> tuple[Array, Array]:
+    """The same points [count, 3], and the normals [count, 3] of the surface where they were taken."""
+    points, normals, _ = sample_surface(shape, count, rng)
+    order = rng.permutation(count)
+    return points[order] + rng.normal(scale=noise_rel * shape.diagonal, size=points.shape), normals[order]
+
+
+def mirror_normals(group: str) -> Array:
+    """Normals [m, 3] of the mirrors as our shapes stand: the main axis on z, a mirror through x.
+
+    None for a surface of revolution, which has too many to list.
+    """
+    if group in ("C1", "Cinfv"):
+        return np.empty((0, 3))
+    return np.array([[0.0, 1.0, 0.0]]) if group == "Cs" else PointGroup(name=group).mirrors()
 
 
 SHAPES: dict[str, tuple[Callable[[], Shape], str]] = {

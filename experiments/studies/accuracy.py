@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.objects.shapes import SHAPES, random_pose, sample
-from experiments.studies.measure import bundle_normals, score_planes
+from experiments.objects.poses import Pose
+from experiments.objects.shapes import SHAPES, mirror_normals, sample
+from experiments.studies.measure import score_planes
 from symrefine.detect import detect
 from symrefine.study.typed import read_config
 
 DEFAULT = Path(__file__).parents[2] / "configs" / "accuracy.yaml"
-FOLDS = {"C1": 0, "Cs": 1, "Cinfv": 0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,20 +57,15 @@ class Summary:
     worst_deg: float
 
 
-def true_fold(group: str) -> int:
-    """Number of discrete mirrors of a C_nv, Cs, C1 or Cinfv."""
-    return FOLDS[group] if group in FOLDS else int(group[1:-1])
-
-
 def run(name: str, points: int, noise: float, seeds: int) -> Summary:
     """One shape at one noise in `seeds` random poses."""
     build, group = SHAPES[name]
     found, scores = [], []
     for seed in range(seeds):
         rng = np.random.default_rng([seed, points, int(1e4 * noise)])
-        turn, shift, scale = random_pose(rng)
-        found.append(detect(scale * sample(build(), points, noise, rng) @ turn.T + shift))
-        scores.append(score_planes(found[-1], bundle_normals(true_fold(group), turn)))
+        pose = Pose.random(rng)
+        found.append(detect(pose.of(sample(build(), points, noise, rng))))
+        scores.append(score_planes(found[-1], mirror_normals(group) @ pose.turn.T))
     errors = [s.worst_deg for s in scores if not np.isnan(s.worst_deg)]
     return Summary(
         right=sum(d.point_group == group for d in found),

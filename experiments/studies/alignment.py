@@ -14,11 +14,12 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
+from experiments.objects.catalogue import FOLDER, catalogue, catalogued
 from experiments.objects.shapes import SHAPES
+from experiments.peers.open3d_registration import VOXEL, open3d_align, ready
 from symrefine.align.procrustes import procrustes
 from symrefine.align.story import Alignment, align
 from symrefine.detect import detect
@@ -26,13 +27,11 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array, line_angle_rad, random_orthogonal
 from symrefine.groups import PointGroup
 from symrefine.groups.orthogonal import chord_angles, nearest_orthogonal
-from symrefine.load import load
 from symrefine.moments.moments import central_moments
 from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.ntuples.contract import ntuples
 from symrefine.shape import Shape
 
-OBJECTS = Path(__file__).parents[3] / "shared" / "objects"
 CHIRAL = (
     "drill_cordless",
     "shark",
@@ -55,9 +54,6 @@ RANDOM = {"rotation": 1, "reflection": -1}
 # Points of the same sample, of two samples, a mesh and a sample, and two meshes.
 PAIRS = ("same", "independent", "mesh to cloud", "meshes")
 METHODS = ("align", "moments", "tuples", "open3d")
-# Voxel of Open3D's feature matching, as a fraction of the diagonal: of 5, 3 and 2 % the first at which it finds
-# (nearly) every rotation: 24 of 24 and 15 of 16 in two runs, against 4 of 8 at 5 % and 7 of 8 at 3 %.
-VOXEL = 0.02
 RIGHT_DEG = 5.0
 Row = dict[str, int | float | str | bool | None]
 
@@ -121,12 +117,12 @@ def mesh(name: str) -> Shape:
     Raises:
         InputError: it is not there.
     """
-    return SHAPES[name][0]() if name in SHAPES else load(OBJECTS / f"{name}.ply")
+    return SHAPES[name][0]() if name in SHAPES else catalogued(name)
 
 
 def present(names: Iterable[str]) -> list[str]:
     """The objects that are there."""
-    return [n for n in names if n in SHAPES or (OBJECTS / f"{n}.ply").exists()]
+    return [n for n in names if n in SHAPES or n in catalogue()]
 
 
 @cache
@@ -168,52 +164,11 @@ def tuples_align(source: Array, target: Array) -> Array:
     return procrustes(*(ntuples(m) for m in moments)).matrix
 
 
-def open3d_align(source: Array, target: Array, voxel: float) -> Array:
-    """FPFH features, RANSAC, point-to-plane ICP, with the parameters of Open3D's own tutorial."""
-    import open3d as o3d
-
-    registration, search = o3d.pipelines.registration, o3d.geometry.KDTreeSearchParamHybrid
-    o3d.utility.set_verbosity_level(o3d.utility.VerbosityLevel.Error)
-    o3d.utility.random.seed(0)
-
-    def prepared(points: Array) -> tuple[o3d.geometry.PointCloud, o3d.geometry.PointCloud, object]:
-        cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-        coarse = cloud.voxel_down_sample(voxel)
-        coarse.estimate_normals(search(radius=2 * voxel, max_nn=30))
-        return cloud, coarse, registration.compute_fpfh_feature(coarse, search(radius=5 * voxel, max_nn=100))
-
-    a, coarse_a, features_a = prepared(source)
-    b, coarse_b, features_b = prepared(target)
-    checks = [
-        registration.CorrespondenceCheckerBasedOnEdgeLength(0.9),
-        registration.CorrespondenceCheckerBasedOnDistance(1.5 * voxel),
-    ]
-    found = registration.registration_ransac_based_on_feature_matching(
-        coarse_a, coarse_b, features_a, features_b, True, 1.5 * voxel,
-        registration.TransformationEstimationPointToPoint(False), 3, checks,
-        registration.RANSACConvergenceCriteria(100000, 0.999),
-    )  # fmt: skip
-    b.estimate_normals(search(radius=2 * voxel, max_nn=30))
-    plane = registration.TransformationEstimationPointToPlane()
-    return registration.registration_icp(a, b, 0.4 * voxel, found.transformation, plane).transformation[:3, :3]
-
-
-@cache
-def _ready() -> None:
-    """Load open3d with the library that it needs, outside the time that is taken."""
-    import ctypes
-
-    import libusb_package
-
-    ctypes.CDLL(str(libusb_package.get_library_path()))
-    import open3d  # noqa: F401
-
-
 def estimator(case: Case, pair: Pair) -> Callable[[], Alignment | Array]:
     """The method as a call without arguments; clouds are given as arrays."""
     a, b = (s if s.faces is not None else s.points.copy() for s in (pair.source, pair.target))
     if case.method == "open3d":
-        _ready()
+        ready()
         return lambda: open3d_align(a, b, VOXEL * mesh(case.name).diagonal)
     if case.method == "tuples":
         return lambda: tuples_align(a, b)
@@ -354,7 +309,7 @@ def main() -> None:
     seeds = parser.parse_args().seeds
     names = present(CHIRAL)
     if missing := [n for n in CATALOGUE if n not in present(CATALOGUE)]:
-        print(f"not in {OBJECTS}, left out: {', '.join(missing)}")
+        print(f"not in {FOLDER}, left out: {', '.join(missing)}")
     names = names or ["asymmetric"]
     exact()
     independent(names, seeds)

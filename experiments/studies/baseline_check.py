@@ -15,15 +15,14 @@ from time import perf_counter, process_time
 import numpy as np
 
 from experiments.ecins import SHIPPED, TUNED, EcinsResult, Settings, ecins, estimated_normals
-from experiments.objects.shapes import SHAPES, box, join, random_pose, revolve
-from experiments.studies.measure import FOUND_DEG
+from experiments.objects.poses import Pose
+from experiments.objects.shapes import SHAPES, box, join, mirror_normals, oriented_sample, revolve
+from experiments.studies.measure import FOUND_DEG, FOUND_REL
 from symrefine.errors import InputError
 from symrefine.geometry import Array, line_angle_rad
-from symrefine.groups import point_group
-from symrefine.moments.quadrature import sample_surface, triangle_areas_and_normals
+from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.shape import Shape
 
-FOUND_REL = 0.02
 METHODS: dict[str, Settings] = {"ecins_shipped": SHIPPED, "ecins_tuned": TUNED}
 NORMALS = ("true", "estimated", "sided")
 ROUND = "Cinfv"
@@ -123,25 +122,16 @@ def posed(case: Case) -> Posed:
     build, group = ALL_SHAPES[case.shape]
     shape = build()
     rng = np.random.default_rng([case.seed, case.points, round(1e4 * case.noise_rel)])
-    turn, shift, scale = random_pose(rng)
-    points, normals, _ = sample_surface(shape, case.points, rng)
-    order = rng.permutation(case.points)
-    points = points[order] + rng.normal(scale=case.noise_rel * shape.diagonal, size=points.shape)
+    pose = Pose.random(rng)
+    points, normals = oriented_sample(shape, case.points, case.noise_rel, rng)
     return Posed(
-        points=scale * points @ turn.T + shift,
-        normals=normals[order] @ turn.T,
-        true_normals=_mirrors(group) @ turn.T,
-        axis=turn[:, 2] if group == ROUND else None,
-        center=scale * turn @ _surface_centroid(shape) + shift,
-        diagonal=scale * shape.diagonal,
+        points=pose.of(points),
+        normals=normals @ pose.turn.T,
+        true_normals=mirror_normals(group) @ pose.turn.T,
+        axis=pose.turn[:, 2] if group == ROUND else None,
+        center=pose.of(_surface_centroid(shape)),
+        diagonal=pose.scale * shape.diagonal,
     )
-
-
-def _mirrors(group: str) -> Array:
-    """Normals [m, 3] of the mirrors of a shape as built: the first one holds the x axis, an only one too."""
-    if group in ("C1", ROUND):
-        return np.empty((0, 3))
-    return np.array([[0.0, 1.0, 0.0]]) if group == "Cs" else point_group(group).mirrors()
 
 
 def _surface_centroid(shape: Shape) -> Array:

@@ -7,23 +7,29 @@ normals, turned, moved and scaled at random. Right means that the point group is
 """
 
 import argparse
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from experiments.objects.shapes import random_pose
+from experiments.objects.catalogue import FOLDER, catalogue, catalogued, listed_normals
+from experiments.objects.poses import Pose, posed
+from experiments.studies.jobs import add_jobs, in_order
 from experiments.studies.measure import score_planes
-from symrefine.detect import Detection, detect
-from symrefine.geometry import unit
-from symrefine.load import load
+from symrefine.detect import detect
 from symrefine.moments.quadrature import sample_surface
 from symrefine.shape import Shape
 
-OBJECTS = Path(__file__).parents[3] / "shared" / "objects"
 SAMPLE = 8000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """One object as a "mesh" or as a "sample", in one pose."""
+
+    name: str
+    form: str
+    seed: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,35 +58,33 @@ def first_groups(group: str) -> bool:
     return group in ("C1", "Cs") or (group.startswith("C") and group.endswith("v"))
 
 
-def posed(mesh: Shape, form: str, rng: np.random.Generator) -> tuple[Shape, np.ndarray]:
-    """The object in a random pose as "mesh" or "sample", and the rotation it was given."""
-    turn, shift, scale = random_pose(rng)
-    if form == "mesh":
-        return Shape(points=scale * mesh.points @ turn.T + shift, faces=mesh.faces, measure="surface"), turn
+def cases(seeds: int, every: bool) -> Iterator[Case]:
+    """Every object, form and seed."""
+    for name, entry in catalogue().items():
+        if every or first_groups(entry["point_group"]):
+            yield from (Case(name=name, form=form, seed=seed) for form in ("mesh", "sample") for seed in range(seeds))
+
+
+def shown(case: Case) -> tuple[Shape, Pose]:
+    """The object in a random pose, and that pose."""
+    mesh, index = catalogued(case.name), list(catalogue()).index(case.name)
+    rng = np.random.default_rng([case.seed, index, case.form == "mesh"])
+    pose = Pose.random(rng)
+    if case.form == "mesh":
+        return posed(mesh, pose), pose
     dense, _, _ = sample_surface(mesh, 50 * SAMPLE, rng)
     points = dense[rng.choice(len(dense), SAMPLE, replace=False)]  # independent, not stratified: noisier moments
-    return Shape(points=scale * points @ turn.T + shift), turn
+    return Shape(points=pose.of(points)), pose
 
 
-def rows(seeds: int, every: bool) -> Iterator[Row]:
-    """Detect every object, form and seed."""
-    for index, entry in enumerate(json.loads((OBJECTS / "catalog.json").read_text())):
-        if not (every or first_groups(entry["point_group"])):
-            continue
-        mesh = load(OBJECTS / entry["file"])
-        for form in ("mesh", "sample"):
-            for seed in range(seeds):
-                shape, turn = posed(mesh, form, np.random.default_rng([seed, index, form == "mesh"]))
-                yield _row(entry, form, detect(shape), turn)
-
-
-def _row(entry: dict, form: str, found: Detection, turn: np.ndarray) -> Row:
-    # A surface of revolution has planes everywhere about its axis; the catalogue lists four samples of them.
-    listed = [] if entry["point_group"] in ("Cinfv", "Dinfh") else entry["planes"]
-    score = score_planes(found, [turn @ unit(p["normal"]) for p in listed])
+def run(case: Case) -> Row:
+    """What was found of one object, against the catalogue."""
+    shape, pose = shown(case)
+    found, entry = detect(shape), catalogue()[case.name]
+    score = score_planes(found, [pose.turn @ n for n in listed_normals(entry)])
     return Row(
-        name=entry["name"],
-        form=form,
+        name=case.name,
+        form=case.form,
         truth=entry["point_group"],
         found=found.point_group,
         planes=f"{score.found}/{score.true}",
@@ -94,16 +98,17 @@ def _row(entry: dict, form: str, found: Detection, turn: np.ndarray) -> Row:
 
 def main() -> None:
     """Print the table of right and wrong."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--groups", choices=("first", "all"), default="all")
+    add_jobs(parser)
     options = parser.parse_args()
-    if not OBJECTS.is_dir():
-        print(f"{OBJECTS} is not there: nothing to measure")
+    if not catalogue():
+        print(f"{FOLDER} is not there: nothing to measure")
         return
     print("object                  form    truth  found   planes  false  error deg  iterations  seconds  nearest miss")
     found = []
-    for r in rows(options.seeds, options.groups == "all"):
+    for r in in_order(run, list(cases(options.seeds, options.groups == "all")), options.jobs):
         found.append(r)
         print(
             f"{r.name:23s} {r.form:7s} {r.truth:6s} {r.found:6s} {r.planes:>7s}  {r.false:5d}  {r.worst_deg:9.3f}"

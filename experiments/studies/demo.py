@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.objects.shapes import random_pose, sample, table
+from experiments.objects.poses import Pose
+from experiments.objects.shapes import mirror_normals, sample, table
 from symrefine.detect import Detection, detect
 from symrefine.export.files import json_text
 from symrefine.export.records import detection_record
@@ -61,11 +62,9 @@ def main() -> int:
 def make(rng: np.random.Generator) -> tuple[Array, Truth]:
     """The cloud, and where its symmetries are."""
     points = sample(table(), POINTS, NOISE, rng)
-    turn, shift, scale = random_pose(rng)
-    angles = np.pi / 4 * np.arange(PLANES)
-    normals = np.stack([np.cos(angles), np.sin(angles), np.zeros(PLANES)], axis=1)
-    truth = Truth(normals=normals @ turn.T, axis=turn[:, 2], middle=scale * turn @ np.array([0, 0, 0.4]) + shift)
-    return scale * points @ turn.T + shift, truth
+    pose = Pose.random(rng)
+    normals = mirror_normals("C4v") @ pose.turn.T
+    return pose.of(points), Truth(normals=normals, axis=pose.turn[:, 2], middle=pose.of(np.array([0, 0, 0.4])))
 
 
 def comparison(detection: Detection, truth: Truth) -> list[str]:

@@ -16,10 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.objects.exhibits import FORMS, Exhibit, Pose, check_exhibit, exhibit, judge, observed, posed
+from experiments.objects.exhibits import Exhibit, check_exhibit, exhibit
 from experiments.objects.household import OBJECTS
 from experiments.objects.models import PREFIX, available
-from experiments.peers.peers import trimesh_symmetry
+from experiments.objects.poses import FORMS, Pose, observed, posed
+from experiments.peers.trimesh_inertia import trimesh_symmetry
+from experiments.studies.measure import judge
 from symrefine.detect import Detection, detect
 from symrefine.errors import InputError
 from symrefine.export.files import replacing

@@ -15,9 +15,9 @@ from time import perf_counter
 
 import numpy as np
 
-from experiments.objects import group_shapes
+from experiments.objects import group_shapes, poses
 from experiments.objects.parts import placed_group
-from experiments.objects.shapes import random_pose, sample
+from experiments.studies.jobs import add_jobs, in_order
 from experiments.studies.measure import FOUND_DEG
 from symrefine.detect import detect
 from symrefine.errors import InputError
@@ -103,11 +103,9 @@ def posed(case: Case) -> tuple[Shape, Array]:
     """The object in a random pose and unit, and the rotation it was given."""
     name = list(group_shapes.DESIGNS).index(case.shape)
     rng = np.random.default_rng([case.seed, name, case.sibling, case.form == "mesh", round(1e5 * case.noise_rel)])
-    turn, shift, scale = random_pose(rng)
+    pose = poses.Pose.random(rng)
     shape = group_shapes.shape(case.shape, case.sibling)
-    if case.form == "mesh":
-        return Shape(points=scale * shape.points @ turn.T + shift, faces=shape.faces, measure="surface"), turn
-    return Shape(points=scale * sample(shape, case.points, case.noise_rel, rng) @ turn.T + shift), turn
+    return poses.posed(poses.observed(shape, case.form, case.points, case.noise_rel, rng), pose), pose.turn
 
 
 @cache
@@ -143,15 +141,16 @@ def label(case: Case) -> str:
 
 def main() -> None:
     """Run all cases; print what went wrong and the share that is right."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="a shape of each kind only")
     parser.add_argument("--seeds", type=int, default=1, help="random poses of each")
     parser.add_argument("--only", nargs="*", default=[], help="names of shapes")
+    add_jobs(parser)
     options = parser.parse_args()
     names = options.only or (QUICK if options.quick else list(group_shapes.DESIGNS))
+    chosen = cases(names, options.seeds)
     rows = []
-    for case in cases(names, options.seeds):
-        row = run(case)
+    for case, row in zip(chosen, in_order(run, chosen, options.jobs), strict=True):
         rows.append((label(case), row))
         if not row["right"]:
             print(f"wrong: {label(case):42s} {case.shape:18s} {describe(row)}", flush=True)

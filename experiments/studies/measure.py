@@ -5,10 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.objects.exhibits import Exhibit
+from experiments.objects.poses import Pose
 from symrefine.detect import Detection
 from symrefine.geometry import Array, line_angle_rad
 
 FOUND_DEG = 5.0
+# Of a plane's distance from the true one, in diagonals.
+FOUND_REL = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +40,43 @@ def score_planes(detection: Detection, normals: Sequence[Array]) -> PlaneScore:
     )
 
 
-def bundle_normals(fold: int, rotation: Array) -> list[Array]:
-    """Normals of the mirrors of C_fold,v with its axis on z and one mirror holding x, after a rotation."""
-    angles = np.pi * np.arange(fold) / fold
-    return [rotation @ np.array([-np.sin(a), np.cos(a), 0.0]) for a in angles]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Score:
+    """A detection against what is stated; angles in degrees and `offset_rel` in diagonals are NaN without a truth.
+
+    Attributes:
+        right: group right, every mirror found, none false.
+        worst_deg: largest angle between what was found and what is true, planes and axis.
+        offset_rel: largest distance of the origin, which lies in every true plane, from the planes found.
+    """
+
+    right: bool
+    found: int
+    true: int
+    false: int
+    worst_deg: float
+    offset_rel: float
+
+
+def judge(detection: Detection, truth: Exhibit, pose: Pose) -> Score:
+    """Compare what was found in a pose with the stated symmetry."""
+    planes = score_planes(detection, [pose.turn @ n for n in truth.normals])
+    angles = [planes.worst_deg]
+    if truth.axis is not None and detection.axes:
+        angles.append(float(np.degrees(line_angle_rad(detection.axes[0].axis.direction, pose.turn @ truth.axis))))
+    offsets = _offsets(detection, pose.shift) / detection.diagonal if truth.centred else np.empty(0)
+    return Score(
+        right=detection.point_group == truth.group and planes.found == planes.true and planes.false == 0,
+        found=planes.found,
+        true=planes.true,
+        false=planes.false,
+        worst_deg=float(np.nanmax(angles)) if not np.isnan(angles).all() else float("nan"),
+        offset_rel=float(offsets.max()) if offsets.size else float("nan"),
+    )
+
+
+def _offsets(detection: Detection, origin: Array) -> Array:
+    """Distances of a point from all planes and axes found."""
+    planes = [abs(float(p.plane.signed_distance(origin))) for p in detection.planes]
+    axes = [np.linalg.norm(np.cross(origin - a.axis.point, a.axis.direction)) for a in detection.axes]
+    return np.array([*planes, *axes])

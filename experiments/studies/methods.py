@@ -14,7 +14,7 @@ import numpy as np
 
 from experiments.ecins import SHIPPED, TUNED, Settings, ecins, estimated_normals
 from experiments.ecins.starts import grid_normals
-from experiments.peers.peers import trimesh_symmetry
+from experiments.peers.trimesh_inertia import trimesh_symmetry
 from symrefine.detect import detect
 from symrefine.errors import DegenerateShapeError
 from symrefine.fit.gauss_newton import minimise

@@ -8,14 +8,17 @@ The molecules of `molecule_sets` in random poses, with their elements as labels;
 
 import argparse
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
+from itertools import islice
 from time import perf_counter
 
 import numpy as np
 
 from experiments.objects.molecule_sets import MOLECULES, Molecule, molecule
-from experiments.peers.peers import point_group_pymatgen
+from experiments.peers.pymatgen_groups import point_group_pymatgen
+from experiments.studies.jobs import add_jobs, in_order
 from symrefine.detect import detect
 from symrefine.errors import InputError
 from symrefine.geometry import Array, random_orthogonal
@@ -25,6 +28,7 @@ NOISE_BOND = 0.01
 TOLERANCES = (TOLERANCE, 0.03, 0.04, 0.06)
 # In angstroms: its default, and two smaller ones.
 PYMATGEN_TOLERANCES = (0.3, 0.1, 0.03)
+Row = dict[str, int | float | str | bool | None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +68,7 @@ def check(case: Case) -> None:
         raise InputError(f"tolerance: value is {case.tolerance}, expected a number in (0, {most:g}]")
 
 
-def run(case: Case) -> dict[str, int | float | str | bool | None]:
+def run(case: Case) -> Row:
     """The group of one molecule in a random pose, compared with the truth."""
     check(case)
     given = molecule(case.molecule)
@@ -105,11 +109,30 @@ def has_pymatgen() -> bool:
     return find_spec("pymatgen") is not None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Block:
+    """What stands in one line of the table: all molecules once for each seed."""
+
+    method: str
+    tolerance: float
+    noise_bond: float
+    seeds: int
+
+    def cases(self) -> list[Case]:
+        """One after the other."""
+        return [
+            Case(molecule=name, noise_bond=self.noise_bond, method=self.method, tolerance=self.tolerance, seed=seed)
+            for name in MOLECULES
+            for seed in range(self.seeds)
+        ]
+
+
 def main() -> None:
     """Print how many groups are right, by method, tolerance and noise, and every miss."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=10, help="poses and noises of each molecule")
     parser.add_argument("--tolerances", type=float, nargs="*", default=TOLERANCES, help="fractions of the diagonal")
+    add_jobs(parser)
     options = parser.parse_args()
     groups = len({group for group, _ in MOLECULES.values()})
     print(f"{len(MOLECULES)} molecules of {groups} groups; {options.seeds} seeds where there is noise")
@@ -118,29 +141,31 @@ def main() -> None:
         asked += [("pymatgen", t) for t in PYMATGEN_TOLERANCES]
     else:
         print("pymatgen is not installed: pip install pymatgen, to see it beside us")
-    for method, tolerance in asked:
-        for noise, seeds in ((0.0, 1), (NOISE_BOND, options.seeds)):
-            report(method, tolerance, noise, seeds)
+    blocks = [
+        Block(method=method, tolerance=tolerance, noise_bond=noise, seeds=seeds)
+        for method, tolerance in asked
+        for noise, seeds in ((0.0, 1), (NOISE_BOND, options.seeds))
+    ]
+    rows = in_order(run, [case for block in blocks for case in block.cases()], options.jobs)
+    for block in blocks:
+        cases = block.cases()
+        report(block, [case.molecule for case in cases], list(islice(rows, len(cases))))
 
 
-def report(method: str, tolerance: float, noise: float, seeds: int) -> None:
+def report(block: Block, names: Sequence[str], rows: Sequence[Row]) -> None:
     """Print one line, and the molecules that came out wrong."""
-    rows = []
-    for name in MOLECULES:
-        for seed in range(seeds):
-            case = Case(molecule=name, noise_bond=noise, method=method, tolerance=tolerance, seed=seed)
-            rows.append((name, run(case)))
-    right = sum(bool(row["right"]) for _, row in rows)
-    scale = "of the diagonal" if method == "symrefine" else "angstrom"
-    seconds = np.median([float(row["detect_s"] or 0) for _, row in rows])
+    right = sum(bool(row["right"]) for row in rows)
+    scale = "of the diagonal" if block.method == "symrefine" else "angstrom"
+    seconds = np.median([float(row["detect_s"] or 0) for row in rows])
     print(
-        f"\n{method}, tolerance {tolerance:g} {scale}, noise {noise:.0%} of the bond: right {right} of {len(rows)} "
-        f"({right / len(rows):.1%}), median {1000 * seconds:.0f} ms",
+        f"\n{block.method}, tolerance {block.tolerance:g} {scale}, noise {block.noise_bond:.0%} of the bond: "
+        f"right {right} of {len(rows)} ({right / len(rows):.1%}), median {1000 * seconds:.0f} ms",
         flush=True,
     )
-    wrong = Counter((name, str(row["truth"]), str(row["group"])) for name, row in rows if not row["right"])
+    every = zip(names, rows, strict=True)
+    wrong = Counter((name, str(row["truth"]), str(row["group"])) for name, row in every if not row["right"])
     for (name, truth, group), count in sorted(wrong.items()):
-        print(f"  {name}: {truth} -> {group}, {count} of {seeds}")
+        print(f"  {name}: {truth} -> {group}, {count} of {block.seeds}")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Whether 95 % sure means 95 % right in the plane.
 
-    python -m experiments.studies.planar_reliability [--quick] [--fit] [--seed N] [--figure PATH]
+    python -m experiments.studies.planar_reliability [--quick] [--fit] [--seed N] [--figure PATH] [--jobs N]
 
 Mirror lines and turns claimed, and candidates turned down, of the drawings of `planar_images` and `planar_cases` in
 random poses, clean, blurred and with grain; and of the same drawings with one part moved by 1 to 5 % of the diagonal.
@@ -20,6 +20,7 @@ import numpy as np
 
 from experiments.objects.drawings import DRAWINGS, Drawing, Layer
 from experiments.objects.pictures import Pose, coverage, fit, picture, random_pose
+from experiments.studies.jobs import add_jobs, in_order
 from experiments.studies.planar_images import Trial, examine
 from experiments.studies.reliability import Judged, bins, fitted, plausible, plot, summary
 from symrefine.errors import InputError
@@ -259,6 +260,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--fit", action="store_true", help="print the constants that suit half of the drawings best")
     parser.add_argument("--seed", type=int, default=0, help="of poses, grain and moved parts (default: %(default)s)")
     parser.add_argument("--figure", type=Path, help="where a plot goes")
+    add_jobs(parser)
     args = parser.parse_args(argv)
     try:
         if args.figure is not None:
@@ -267,7 +269,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"error: {error}", file=sys.stderr)
         return 2
     cases = list(plan(quick=args.quick, seed=args.seed))
-    rows = [row for case in cases for row in elements(case)]
+    rows = [row for found in in_order(elements, cases, args.jobs) for row in found]
     print(f"{len(cases)} looks at {len({c.drawing for c in cases})} drawings")
     if args.fit:
         even, steep = fitted_map([r for r in rows if fitted(r.case.drawing)])

@@ -14,15 +14,13 @@ from typing import Any
 import numpy as np
 
 from experiments.objects import shapes
-from experiments.studies.measure import FOUND_DEG
+from experiments.objects.poses import Pose, posed
+from experiments.studies.measure import FOUND_DEG, FOUND_REL
 from experiments.studies.methods import METHODS, Scan
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, line_angle_rad
-from symrefine.groups import PointGroup
-from symrefine.moments.quadrature import sample_surface
 from symrefine.shape import Shape
 
-FOUND_REL = 0.02
 # From here on a plane counts as settled in the trace.
 SETTLED_DEG = 0.5
 
@@ -83,37 +81,25 @@ def make(case: Case) -> tuple[Scan, Truth]:
     build, group = SHAPES[case.shape]
     shape = build()
     rng = np.random.default_rng([case.seed, case.points, round(1e4 * case.noise_rel)])
-    turn, shift, scale = shapes.random_pose(rng)
-    points, normals, _ = sample_surface(shape, case.points, rng)
-    order = rng.permutation(case.points)
-    noisy = points[order] + rng.normal(scale=case.noise_rel * shape.diagonal, size=points.shape)
-    mesh = Shape(points=scale * shape.points @ turn.T + shift, faces=shape.faces, measure="surface")
-    scan = Scan(points=scale * noisy @ turn.T + shift, normals=normals[order] @ turn.T, mesh=mesh)
-    return scan, _truth(shape, group, turn, shift, scale)
+    pose = Pose.random(rng)
+    points, normals = shapes.oriented_sample(shape, case.points, case.noise_rel, rng)
+    scan = Scan(points=pose.of(points), normals=normals @ pose.turn.T, mesh=posed(shape, pose))
+    return scan, _truth(shape, group, pose)
 
 
-def _truth(shape: Shape, group: str, turn: Array, shift: Array, scale: float) -> Truth:
+def _truth(shape: Shape, group: str, pose: Pose) -> Truth:
     middle = 0.5 * (shape.points.min(axis=0) + shape.points.max(axis=0))
     # Every mirror holds the z axis or halves the height; the mug's handle shifts its box in x.
     middle = np.array([0.0, 0.0, middle[2]])
-    round_about = turn[:, 2] if group == "Cinfv" else None
-    normals = np.zeros((0, 3)) if round_about is not None or group == "C1" else _mirrors(group)
-    center = scale * turn @ middle + shift
-    placed = normals @ turn.T
+    center = pose.of(middle)
+    placed = shapes.mirror_normals(group) @ pose.turn.T
     return Truth(
         planes=[Plane(normal=n, offset=float(n @ center)) for n in placed],
         group=group,
         center=center,
-        diagonal=scale * shape.diagonal,
-        round_about=round_about,
+        diagonal=pose.scale * shape.diagonal,
+        round_about=pose.turn[:, 2] if group == "Cinfv" else None,
     )
-
-
-def _mirrors(group: str) -> Array:
-    """Normals of the mirrors as our shapes stand: the main axis on z, a mirror through x."""
-    if group == "Cs":
-        return np.array([[0.0, 1.0, 0.0]])
-    return PointGroup(name=group).mirrors()
 
 
 def run(case: Case) -> dict[str, Any]:

@@ -18,9 +18,10 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.objects.built_symmetry import FAMILIES, Claim, Truth, catalogue, holds, names, specimen
-from experiments.objects.exhibits import Pose, observed, posed
-from experiments.studies.catalogue import OBJECTS
+from experiments.objects.built_symmetry import FAMILIES, Claim, Truth, holds, names, specimen
+from experiments.objects.catalogue import FOLDER, catalogue
+from experiments.objects.poses import Pose, observed, posed
+from experiments.studies.jobs import add_jobs, in_order
 from symrefine.detect import Detection, detect
 from symrefine.errors import InputError
 from symrefine.files import check_target, whole
@@ -147,7 +148,7 @@ def check(case: Case) -> None:
     if case.family not in FAMILIES:
         raise InputError(f"family: value is {case.family!r}, expected one of {', '.join(FAMILIES)}")
     if case.name not in names(case.family):
-        known = ", ".join(names(case.family)) or f"none: {OBJECTS} is not there"
+        known = ", ".join(names(case.family)) or f"none: {FOLDER} is not there"
         raise InputError(f"name: value is {case.name!r}, expected one of the family {case.family!r}: {known}")
     if not 0 <= case.view < len(VIEWS):
         raise InputError(f"view: value is {case.view}, expected 0 to {len(VIEWS) - 1}")
@@ -367,6 +368,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--every", type=int, default=1, help="each so many-th look (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of poses, samples and noise (default: %(default)s)")
     parser.add_argument("--figure", type=Path, help=f"where the plot goes (default: {FIGURE.name} in docs)")
+    add_jobs(parser)
     options = parser.parse_args(arguments)
     path = options.figure or (None if options.quick else FIGURE)
     if options.every < 1:
@@ -378,10 +380,10 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"error: {error}", file=sys.stderr)
         return 2
     cases = list(plan(QUICK_EVERY if options.quick else options.every, options.seed))
-    rows = [row for case in cases for row in judged(case)]
+    rows = [row for found in in_order(judged, cases, options.jobs) for row in found]
     print(f"{len(cases)} looks at {len({(c.family, c.name) for c in cases})} objects")
     if not catalogue():
-        print(f"without the catalogued meshes: {OBJECTS} is not there")
+        print(f"without the catalogued meshes: {FOLDER} is not there")
     print("\n".join(report(rows)))
     if path is not None:
         plot(rows, path)

@@ -10,8 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.objects.exhibits import FORMS, Exhibit, Pose, check_exhibit, exhibit, judge, observed, posed
+from experiments.objects.exhibits import Exhibit, check_exhibit, exhibit
+from experiments.objects.poses import FORMS, Pose, observed, posed
 from experiments.studies.alignment import PRINTED, RANDOM
+from experiments.studies.measure import judge
 from symrefine.align.story import align
 from symrefine.detect import Detection, detect
 from symrefine.errors import InputError
