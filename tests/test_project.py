@@ -86,6 +86,57 @@ def test_only_the_command_line_prints_and_exits() -> None:
     assert not offenders
 
 
+def imported(path: Path) -> set[str]:
+    """Names of all modules that a file imports, wherever in it."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def test_the_product_knows_no_experiments() -> None:
+    beside = ("experiments", "benchmarks", "tests")
+    offenders = {path.name: name for path in modules("symrefine") for name in imported(path) if name.startswith(beside)}
+    assert not offenders
+
+
+@pytest.mark.parametrize("drawer", ["objects", "ecins", "peers"])
+def test_what_is_studied_knows_no_study_and_no_other_drawer(drawer: str) -> None:
+    inside = f"experiments.{drawer}."
+    others = {
+        f"{path.name}: {name}"
+        for path in modules(f"experiments/{drawer}")
+        for name in imported(path)
+        if name.startswith("experiments.") and not f"{name}.".startswith(inside)
+    }
+    assert not others
+
+
+def test_every_experiment_lies_in_a_drawer_that_says_what_belongs_there() -> None:
+    assert [path.name for path in (ROOT / "experiments").glob("*.py")] == ["__init__.py"]
+    drawers = [path for path in (ROOT / "experiments").iterdir() if any(path.glob("*.py"))]
+    assert {path.name for path in drawers} == {"objects", "studies", "ecins", "peers"}
+    for drawer in drawers:
+        assert ast.get_docstring(ast.parse((drawer / "__init__.py").read_text(encoding="utf-8")))
+
+
+def test_commands_in_texts_name_modules_that_are_there() -> None:
+    texts = [*ROOT.glob("*.md"), ROOT / "Makefile", *(ROOT / "docs").glob("*.md"), *(ROOT / "configs").glob("*.yaml")]
+    texts += modules("symrefine", "experiments", "benchmarks")
+    named = {
+        name
+        for path in texts
+        for name in re.findall(
+            r"(?:-m |^experiment: |`)(experiments(?:\.\w+)+)", path.read_text(encoding="utf-8"), re.MULTILINE
+        )
+    }
+    assert len(named) > 10
+    assert not {name for name in named if not (ROOT / Path(*name.split("."))).with_suffix(".py").is_file()}
+
+
 @pytest.mark.skipif(find_spec("symrefine.cli") is None, reason="symrefine.cli is still to come")
 def test_help_imports_nothing_heavy() -> None:
     command = [sys.executable, "-X", "importtime", "-m", "symrefine", "--help"]
