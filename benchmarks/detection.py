@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from benchmarks.metric import Metric
 from experiments.objects.poses import Pose
 from experiments.objects.shapes import SHAPES, box, join, sample
-from symrefine.detect import detect
+from symrefine.detection.story import detect
 from symrefine.geometry import Array
 from symrefine.moments.moments import central_moments
 from symrefine.propose.spectrum import mirror_candidates

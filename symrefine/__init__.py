@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from symrefine.align.story import Alignment, align
-    from symrefine.detect import Detection, detect
+    from symrefine.detection.result import Detection
+    from symrefine.detection.story import detect
     from symrefine.errors import DegenerateShapeError, InputError, SymrefineError
     from symrefine.geometry import Axis, Plane
     from symrefine.groups import PointGroup, point_group
@@ -40,7 +41,8 @@ __all__ = [
 
 _HOMES = {
     "symrefine.align.story": ("Alignment", "align"),
-    "symrefine.detect": ("Detection", "detect"),
+    "symrefine.detection.result": ("Detection",),
+    "symrefine.detection.story": ("detect",),
     "symrefine.errors": ("DegenerateShapeError", "InputError", "SymrefineError"),
     "symrefine.geometry": ("Axis", "Plane"),
     "symrefine.groups": ("PointGroup", "point_group"),

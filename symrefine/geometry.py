@@ -14,6 +14,18 @@ from numpy.typing import ArrayLike, NDArray
 from symrefine.errors import InputError
 
 Array = NDArray[np.floating[Any]]
+# Beyond a fifth of the diagonal everything is symmetric.
+LARGEST_TOLERANCE = 0.2
+
+
+def check_tolerance(tolerance: Any) -> None:
+    """Refuse what is no tolerance.
+
+    Raises:
+        InputError: not a number in (0, 0.2].
+    """
+    if isinstance(tolerance, (str, bytes)) or not 0.0 < tolerance <= LARGEST_TOLERANCE:
+        raise InputError(f"tolerance is {tolerance!r}; expected a fraction of the diagonal in (0, {LARGEST_TOLERANCE}]")
 
 
 def read_only(values: ArrayLike) -> Array:

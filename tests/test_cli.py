@@ -15,7 +15,7 @@ import pytest
 import symrefine
 from symrefine.cli import batch, invoke, journal, values
 from symrefine.cli.tables import batch_table, detection_lines, headline
-from symrefine.detect import detect
+from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.files import whole
 from symrefine.geometry import random_orthogonal
@@ -329,9 +329,9 @@ def test_the_package_is_imported_without_its_parts() -> None:
     source = """
 import sys, symrefine
 assert not {"numpy", "rich", "importlib.metadata"} & set(sys.modules), "heavy"
-import symrefine.detect, symrefine.load.ply
+import symrefine.detection.story, symrefine.load.ply
 assert callable(symrefine.detect) and callable(symrefine.load), "hidden by the modules of the same name"
-from symrefine.detect import Detection
+from symrefine.detection.result import Detection
 assert symrefine.Detection is Detection
 assert all(getattr(symrefine, name) is not None for name in symrefine.__all__)
 assert set(symrefine.__all__) <= set(dir(symrefine))

@@ -13,7 +13,8 @@ from ruamel.yaml import YAML
 from scipy.spatial import cKDTree
 
 from symrefine.cli import invoke
-from symrefine.detect import Detection, detect
+from symrefine.detection.result import Detection
+from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.export.bop import bop_entry
 from symrefine.export.canonical import canonical_pose

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from experiments.studies import demo
-from symrefine.detect import detect
+from symrefine.detection.story import detect
 from symrefine.groups import point_group
 from symrefine.load import load
 

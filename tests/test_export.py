@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from symrefine.detect import Detection, FoundAxis, FoundPlane, detect
+from symrefine.detection.result import Detection, FoundAxis, FoundPlane
+from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.export.bop import bop_entry, bop_limits, diameter, read_models_info, write_bop
 from symrefine.export.files import check_target, json_text, replacing

@@ -15,7 +15,8 @@ from scipy.spatial.transform import Rotation
 
 from experiments.objects.molecule_sets import MOLECULES, molecule
 from symrefine.cli import invoke
-from symrefine.detect import Detection, detect
+from symrefine.detection.result import Detection
+from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.load import load
 from symrefine.load.colours import NEAR, colour_classes

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from experiments.objects.shapes import asymmetric, bottle, box, join, sample, table
-from symrefine.detect import Detection, detect
+from symrefine.detection.result import Detection
+from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.files import whole
 from symrefine.geometry import Array, Plane, rotation

@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from symrefine.cli import invoke
-from symrefine.detect import detect
+from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.export.models import model_bytes
 from symrefine.geometry import Array, random_orthogonal, rotation

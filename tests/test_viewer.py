@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from experiments.objects.shapes import asymmetric, bottle, sample, table
-from symrefine.detect import Detection, detect
+from symrefine.detection.result import Detection
+from symrefine.detection.story import detect
 from symrefine.errors import InputError, SymrefineError
 from symrefine.geometry import rotation
 from symrefine.picture.scene import make_scene

@@ -14,7 +14,7 @@ from experiments.objects import group_shapes, household
 from experiments.objects.catalogue import catalogue, catalogued
 from experiments.objects.parts import placed_group
 from experiments.objects.poses import Pose
-from symrefine.elements import FREE_TURNS
+from symrefine.fit.placed import FREE_TURNS
 from symrefine.geometry import Array, frame_with_z, householder, rotation, rotoreflection
 from symrefine.groups import PointGroup, from_elements
 from symrefine.shape import Shape

@@ -13,7 +13,7 @@ import numpy as np
 from experiments.objects.poses import Pose
 from experiments.objects.shapes import SHAPES, mirror_normals, sample
 from experiments.studies.measure import score_planes
-from symrefine.detect import detect
+from symrefine.detection.story import detect
 from symrefine.study.typed import read_config
 
 DEFAULT = Path(__file__).parents[2] / "configs" / "accuracy.yaml"

@@ -22,7 +22,7 @@ from experiments.objects.shapes import SHAPES
 from experiments.peers.open3d_registration import VOXEL, open3d_align, ready
 from symrefine.align.procrustes import procrustes
 from symrefine.align.story import Alignment, align
-from symrefine.detect import detect
+from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.geometry import Array, line_angle_rad, random_orthogonal
 from symrefine.groups import PointGroup

@@ -16,7 +16,7 @@ from experiments.objects.catalogue import FOLDER, catalogue, catalogued, listed_
 from experiments.objects.poses import Pose, posed
 from experiments.studies.jobs import add_jobs, in_order
 from experiments.studies.measure import score_planes
-from symrefine.detect import detect
+from symrefine.detection.story import detect
 from symrefine.moments.quadrature import sample_surface
 from symrefine.shape import Shape
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from experiments.objects.poses import Pose
 from experiments.objects.shapes import mirror_normals, sample, table
-from symrefine.detect import Detection, detect
+from symrefine.detection.result import Detection
+from symrefine.detection.story import detect
 from symrefine.export.files import json_text
 from symrefine.export.records import detection_record
 from symrefine.geometry import Array, Plane, line_angle_rad

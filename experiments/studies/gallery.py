@@ -22,7 +22,8 @@ from experiments.objects.models import PREFIX, available
 from experiments.objects.poses import FORMS, Pose, observed, posed
 from experiments.peers.trimesh_inertia import trimesh_symmetry
 from experiments.studies.measure import judge
-from symrefine.detect import Detection, detect
+from symrefine.detection.result import Detection
+from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.export.files import replacing
 from symrefine.geometry import Array, Plane, line_angle_rad

@@ -19,7 +19,7 @@ from experiments.objects import group_shapes, poses
 from experiments.objects.parts import placed_group
 from experiments.studies.jobs import add_jobs, in_order
 from experiments.studies.measure import FOUND_DEG
-from symrefine.detect import detect
+from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.groups import PointGroup

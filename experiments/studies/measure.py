@@ -7,7 +7,7 @@ import numpy as np
 
 from experiments.objects.exhibits import Exhibit
 from experiments.objects.poses import Pose
-from symrefine.detect import Detection
+from symrefine.detection.result import Detection
 from symrefine.geometry import Array, line_angle_rad
 
 FOUND_DEG = 5.0

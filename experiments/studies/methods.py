@@ -15,22 +15,21 @@ import numpy as np
 from experiments.ecins import SHIPPED, TUNED, Settings, ecins, estimated_normals
 from experiments.ecins.starts import grid_normals
 from experiments.peers.trimesh_inertia import trimesh_symmetry
-from symrefine.detect import detect
+from symrefine.detection.measure import ORDER, PARTS, PLANES, gather, measure
+from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError
 from symrefine.fit.gauss_newton import minimise
 from symrefine.fit.matching import match, pair_equations
 from symrefine.fit.refine import MAX_OUTER, SETTLED, refine, single_plane
 from symrefine.fit.residual import axis_gram, design_rows, gram, theta_model
-from symrefine.gather import CLOSER_PLANES, LOCAL_PLANES, ORDER, PARTS
-from symrefine.geometry import Array, Isometry, Plane, tight_diagonal
+from symrefine.geometry import Array, Isometry, Plane
 from symrefine.groups import from_elements
 from symrefine.moments.moments import shape_moments
 from symrefine.ntuples.contract import ntuples
 from symrefine.ntuples.rank import classify
 from symrefine.propose.folds import fold_candidates
-from symrefine.search import CLOSE
 from symrefine.shape import Shape
-from symrefine.surface.misses import TOLERANCE, Judge, make_judge
+from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.skin import LocalPlanes, local_planes
 
 # A candidate of the grid may be this far off: half the way to the next one, and more.
@@ -98,14 +97,16 @@ def from_ntuples(scan: Scan) -> Answer:
 
 def from_grid(scan: Scan) -> Answer:
     """Our refinement and our judge, each plane for itself, from the 25 planes that the baseline starts from."""
-    judges, origin, scale = _judges(scan.points)
+    measured = measure(Shape(points=scan.points))
+    _, surface = gather(measured, np.random.default_rng(0))
+    origin, scale = measured.moments.center, measured.moments.scale
     basis = _principal_basis(scan.points)
     histories = [
-        list(refine(judges[0].cloud, single_plane(Plane(normal=normal, offset=0.0)), start_error_rad=GRID_ERROR_RAD))
+        list(refine(surface.cloud, single_plane(Plane(normal=normal, offset=0.0)), start_error_rad=GRID_ERROR_RAD))
         for normal in grid_normals(SHIPPED.divisions, basis)
     ]
     planes = [history[-1].state.planes[0] for history in histories]
-    excess = [_excess(judges, Isometry.reflection(plane)) for plane in planes]
+    excess = [surface.need([Isometry.reflection(plane)]) / TOLERANCE for plane in planes]
     kept: list[int] = []
     for i in np.argsort(excess, kind="stable").tolist():
         alone = all(abs(planes[i].normal @ planes[j].normal) < math.cos(SAME_RAD) for j in kept)
@@ -140,7 +141,7 @@ def from_axis(scan: Scan) -> Answer:
     if tuples.kind != "axis" or not folds:
         return Answer(planes=[], group="Cinfv" if tuples.kind == "axis" else "C1", starts=0)
     fold, frame = folds[0].fold, folds[0].frame
-    cloud = local_planes(local, LOCAL_PLANES, np.random.default_rng(0))
+    cloud = local_planes(local, PLANES, np.random.default_rng(0))
     steps = list(_thetas(cloud, frame, np.pi * np.arange(fold) / fold))
     normals = [[rotated @ frame for rotated in _about_third(theta)] for theta in steps]
     planes = [Plane(normal=n, offset=float(n @ moments.center)) for n in normals[-1]]
@@ -179,22 +180,6 @@ def _thetas(cloud: LocalPlanes, frame: Array, theta: Array) -> Iterator[Array]:
         yield theta
         if step < SETTLED:
             return
-
-
-def _judges(points: Array) -> tuple[tuple[Judge, Judge], Array, float]:
-    """Judges on local planes as `detect` takes them, and on more for close calls; origin and scale of their units."""
-    origin = points.mean(axis=0)
-    scale = float(np.sqrt(((points - origin) ** 2).sum(axis=1).mean()))
-    local, rng = (points - origin) / scale, np.random.default_rng(0)
-    clouds = [local_planes(local, count, rng) for count in (LOCAL_PLANES, CLOSER_PLANES)]
-    diagonal = tight_diagonal(clouds[0].points)
-    first, closer = (make_judge(cloud, diagonal, TOLERANCE) for cloud in clouds)
-    return (first, closer), origin, scale
-
-
-def _excess(judges: tuple[Judge, Judge], motion: Isometry) -> float:
-    excess = judges[0]([motion]).excess
-    return judges[1]([motion]).excess if CLOSE[0] < excess < CLOSE[1] else excess
 
 
 def _principal_basis(points: Array) -> Array:

@@ -19,7 +19,7 @@ import numpy as np
 from experiments.objects.molecule_sets import MOLECULES, Molecule, molecule
 from experiments.peers.pymatgen_groups import point_group_pymatgen
 from experiments.studies.jobs import add_jobs, in_order
-from symrefine.detect import detect
+from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.geometry import Array, random_orthogonal
 from symrefine.surface.misses import TOLERANCE

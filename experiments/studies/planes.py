@@ -172,7 +172,7 @@ def _progress(normals: Sequence[Array], truth: Truth) -> dict[str, float | int |
 
 def record(case: Case, path: Path) -> None:
     """A rerun recording of our detection on this scan."""
-    from symrefine.detect import detect
+    from symrefine.detection.story import detect
     from symrefine.viewer.recording import record as record_detection
 
     scan, _ = make(case)

@@ -22,7 +22,8 @@ from experiments.objects.built_symmetry import FAMILIES, Claim, Truth, holds, na
 from experiments.objects.catalogue import FOLDER, catalogue
 from experiments.objects.poses import Pose, observed, posed
 from experiments.studies.jobs import add_jobs, in_order
-from symrefine.detect import Detection, detect
+from symrefine.detection.result import Detection
+from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.files import check_target, whole
 from symrefine.geometry import Array

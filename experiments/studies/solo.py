@@ -15,7 +15,8 @@ from experiments.objects.poses import FORMS, Pose, observed, posed
 from experiments.studies.alignment import PRINTED, RANDOM
 from experiments.studies.measure import judge
 from symrefine.align.story import align
-from symrefine.detect import Detection, detect
+from symrefine.detection.result import Detection
+from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.fit.refine import Iterate
 from symrefine.geometry import Array, householder, line_angle_rad, random_orthogonal, rotation

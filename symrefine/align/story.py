@@ -15,7 +15,8 @@ from symrefine.align.pair import Evidence, Side, few
 from symrefine.align.polish import Similarity
 from symrefine.align.procrustes import procrustes
 from symrefine.align.rivals import MISFIT, ROUNDING, choose, polished
-from symrefine.detect import Clock, detect
+from symrefine.clock import Clock
+from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array
 from symrefine.groups import PointGroup

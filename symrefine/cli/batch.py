@@ -13,7 +13,7 @@ from symrefine.cli.values import add_class_options, add_detection_options, count
 from symrefine.errors import InputError, SymrefineError
 
 if TYPE_CHECKING:
-    from symrefine.detect import Detection
+    from symrefine.detection.result import Detection
     from symrefine.plane import PlanarDetection
     from symrefine.shape import Shape
 

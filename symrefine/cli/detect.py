@@ -22,7 +22,7 @@ from symrefine.cli.values import add_class_options, add_detection_options, grey,
 from symrefine.errors import InputError
 
 if TYPE_CHECKING:
-    from symrefine.detect import Detection
+    from symrefine.detection.result import Detection
     from symrefine.shape import Shape
 
 NAME = "detect"
@@ -129,7 +129,7 @@ def examine(
         beyond = detect_nd(shape, tolerance=tolerance)
         timings = {"load": load_s, "detect": time.perf_counter() - start}
         return shape, beyond, subspace_record(beyond, shape, options=options, timings=timings)
-    from symrefine.detect import LADDER, detect
+    from symrefine.detection.story import LADDER, detect
     from symrefine.export.records import detection_record
 
     detection = detect(shape, tolerance=tolerance, ladder=LADDER, seed=seed)

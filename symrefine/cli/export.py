@@ -12,7 +12,7 @@ from symrefine.cli.values import add_detection_options, count, natural, positive
 from symrefine.errors import InputError
 
 if TYPE_CHECKING:
-    from symrefine.detect import Detection
+    from symrefine.detection.result import Detection
     from symrefine.export.packages import Package
     from symrefine.shape import Shape
 
@@ -84,7 +84,7 @@ def detected(args: argparse.Namespace) -> tuple["Shape", "Detection"]:
     Raises:
         InputError: a picture, or points with two coordinates.
     """
-    from symrefine.detect import detect
+    from symrefine.detection.story import detect
     from symrefine.load import load
 
     shape = load(args.path, measure=args.measure)

@@ -10,7 +10,7 @@ from symrefine.cli.values import add_detection_options
 from symrefine.errors import InputError
 
 if TYPE_CHECKING:
-    from symrefine.detect import Detection
+    from symrefine.detection.result import Detection
     from symrefine.shape import Shape
     from symrefine.symmetrize import Symmetrized
 

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 from scipy.spatial.distance import cdist
 
-from symrefine.detect import Detection
+from symrefine.detection.result import Detection
 from symrefine.errors import InputError
 from symrefine.export.files import check_target, json_text, replacing
 from symrefine.export.records import toward_positive

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from symrefine.detect import Detection
+from symrefine.detection.result import Detection
 from symrefine.errors import InputError
 from symrefine.export.bop import bop_entry, bop_limits, bop_text
 from symrefine.export.canonical import Canonical, canonical_pose

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from symrefine.align.story import Alignment
-from symrefine.detect import Detection, FoundAxis, FoundPlane, NearMiss
+from symrefine.detection.result import Detection, FoundAxis, FoundPlane, NearMiss
 from symrefine.geometry import Array, Plane
 from symrefine.plane.judge import LineDeviation
 from symrefine.shape import Shape

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.detect import Detection
+from symrefine.detection.result import Detection
 from symrefine.geometry import Array
 from symrefine.picture.camera import Camera, look_at
 from symrefine.picture.painter import paint

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from symrefine.detect import Detection, FoundAxis
+from symrefine.detection.result import Detection, FoundAxis
 from symrefine.picture.scene import AXIS, MISS, Colour, plane_colour
 from symrefine.picture.words import direction, order_name
 from symrefine.surface.misses import Deviation

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from symrefine.detect import Detection, FoundAxis
+from symrefine.detection.result import Detection, FoundAxis
 from symrefine.geometry import Array, Plane, read_only, unit
 from symrefine.picture.words import order_name
 from symrefine.shape import Shape

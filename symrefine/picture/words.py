@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from symrefine.detect import Detection
+from symrefine.detection.result import Detection
 from symrefine.geometry import Array
 from symrefine.groups import PointGroup
 

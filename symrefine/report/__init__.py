@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from symrefine.detect import Detection
+from symrefine.detection.result import Detection
 from symrefine.files import whole
 from symrefine.picture.draw import picture_png
 from symrefine.report.page import html_page

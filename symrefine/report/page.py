@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.metadata import version
 
-from symrefine.detect import Detection
+from symrefine.detection.result import Detection
 from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.picture.measures import inlier_series, rms_series, turn_series_deg
 from symrefine.picture.rows import Row, found_rows, near_miss_rows

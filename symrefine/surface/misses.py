@@ -47,6 +47,11 @@ class Deviation:
         """The larger of the two in every statistic."""
         return Deviation(**{f.name: max(getattr(self, f.name), getattr(other, f.name)) for f in fields(Deviation)})
 
+    @property
+    def limited(self) -> tuple[float, ...]:
+        """The statistics that have limits."""
+        return self.mean, self.p95, self.p97, self.p99, self.p994
+
     def over_limits(self, tolerance: float, floor: "Deviation") -> tuple[float, ...]:
         """Each statistic beyond `floor`, which is what the cloud shows against itself, over its limit; 0 at least.
 
@@ -97,7 +102,7 @@ class Judge:
     def __call__(self, motions: Iterable[Isometry], *, stride: int = 1) -> Verdict:
         """Verdict on one or several operations together (the worst of each statistic)."""
         motions = tuple(motions)
-        found = [_summary(miss_distances(self.cloud, m, stride=stride) / self.diagonal) for m in motions]
+        found = [summary(miss_distances(self.cloud, m, stride=stride) / self.diagonal) for m in motions]
         worst = reduce(Deviation.at_least, found)
         ratios = worst.over_limits(self.tolerance, self.floor)
         if self.cloud.body == "atoms":
@@ -124,10 +129,10 @@ def make_judge(cloud: LocalPlanes, diagonal: float, tolerance: float, floor: Dev
     if floor is not None:
         return Judge(cloud=cloud, diagonal=diagonal, tolerance=tolerance, floor=floor)
     if cloud.body == "atoms":
-        return Judge(cloud=cloud, diagonal=diagonal, tolerance=tolerance, floor=_summary(np.zeros(1)))
+        return Judge(cloud=cloud, diagonal=diagonal, tolerance=tolerance, floor=summary(np.zeros(1)))
     some = slice(None, None, max(1, len(cloud.points) // OWN))
     own = disc_distances(cloud, cloud.points[some], cloud.classes(some), skip_self=True) / diagonal
-    return Judge(cloud=cloud, diagonal=diagonal, tolerance=tolerance, floor=_summary(own))
+    return Judge(cloud=cloud, diagonal=diagonal, tolerance=tolerance, floor=summary(own))
 
 
 def split_floor(one: LocalPlanes, other: LocalPlanes, diagonal: float) -> Deviation:
@@ -137,7 +142,7 @@ def split_floor(one: LocalPlanes, other: LocalPlanes, diagonal: float) -> Deviat
     says less than independent points would show; halves say more than the whole would, by their wider spacing.
     """
     across = [disc_distances(a, b.points, b.labels) for a, b in ((one, other), (other, one))]
-    return _summary(HALF_SPACING * np.concatenate(across) / diagonal)
+    return summary(HALF_SPACING * np.concatenate(across) / diagonal)
 
 
 def miss_distances(cloud: LocalPlanes, motion: Isometry, *, stride: int = 1) -> Array:
@@ -181,7 +186,8 @@ def spread_distance(points: Array, motion: Isometry) -> float:
     return float(np.sqrt(max(2.0 * (np.trace(own) - common), 0.0)))
 
 
-def _summary(distances: Array) -> Deviation:
+def summary(distances: Array) -> Deviation:
+    """Statistics of distances [M]."""
     p80, p95, p97, p99, p994 = (float(q) for q in np.quantile(distances, [0.8, 0.95, 0.97, 0.99, 0.994]))
     mean, largest = float(distances.mean()), float(distances.max())
     return Deviation(mean=mean, p80=p80, p95=p95, p97=p97, p99=p99, p994=p994, max=largest)

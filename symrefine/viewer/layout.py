@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from symrefine.detect import Detection
+from symrefine.detection.result import Detection
 from symrefine.picture.camera import look_at
 from symrefine.picture.scene import Colour, Scene
 

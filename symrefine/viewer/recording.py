@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from symrefine.detect import Detection
+from symrefine.detection.result import Detection
 from symrefine.errors import InputError
 from symrefine.files import whole
 from symrefine.fit.refine import Iterate

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 
-from symrefine.detect import Detection
+from symrefine.detection.result import Detection
 from symrefine.fit.refine import Iterate
 from symrefine.picture.rows import found_rows, near_miss_rows
 from symrefine.picture.words import coordinates, fit, headline, percent, tuples_meaning

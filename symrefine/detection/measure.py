@@ -1,28 +1,26 @@
-"""What a search may use, gathered from a shape: moments, n-tuples, and a cloud to judge by, in normalised units."""
+"""What is known of a shape before any symmetry is looked for: moments, n-tuples, and a surface to judge by."""
 
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import partial
 
 import numpy as np
 
 from symrefine.geometry import Array, tight_diagonal
-from symrefine.moments.harmonics import harmonic_moments
 from symrefine.moments.moments import Moments, shape_moments
 from symrefine.moments.quadrature import mesh_nodes, sample_surface
 from symrefine.ntuples.contract import NTuples, ntuples
-from symrefine.ntuples.rank import classify
-from symrefine.search import Evidence
+from symrefine.ntuples.rank import TupleClass, classify
+from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
-from symrefine.surface.misses import Deviation, Judge, make_judge, split_floor
-from symrefine.surface.skin import LocalPlanes, fills_volume, isolated_points, local_planes
+from symrefine.surface.misses import summary
+from symrefine.surface.noise import noise_distances
+from symrefine.surface.skin import fills_volume, isolated_points, local_planes
+from symrefine.surface.surface import Surface
 
-ORDER = 8
-PARTS = 16
-SAMPLES = 20000
-LOCAL_PLANES = 4000
-CLOSER_PLANES = 12000
-# Points of a cloud that fills a volume, at most.
-VOLUME_POINTS = 20000
+# Order of the moments, and parts of their jackknife.
+ORDER, PARTS = 8, 16
+# Samples of a mesh, and of points of a filled cloud at most; local planes of the surface.
+SAMPLES, PLANES = 20000, 8000
 # Masses of atoms that differ by more than this fraction are masses of different kinds.
 SAME_MASS = 0.01
 # Up to so many distinct points stand for themselves (atoms); more are samples of a surface.
@@ -38,17 +36,17 @@ class Measured:
     moments: Moments
     vectors: NTuples
 
+    @property
+    def tuples(self) -> TupleClass:
+        """What the singular values of the n-tuples say."""
+        return classify(self.vectors)
+
 
 def measure(shape: Shape) -> Measured:
     """Moments to order 8 and the n-tuples of them."""
     classes = _classes(shape)
     moments = _moments(shape, classes, parts=0 if is_few(shape) or shape.faces is not None else PARTS)
     return Measured(shape=shape, classes=classes, moments=moments, vectors=ntuples(moments))
-
-
-def gather(measured: Measured, tolerance: float, rng: np.random.Generator) -> Evidence:
-    """The evidence at a tolerance: of few points from the points, else from local planes of the surface."""
-    return _few_points(measured, tolerance) if is_few(measured.shape) else _surface(measured, tolerance, rng)
 
 
 def is_few(shape: Shape) -> bool:
@@ -64,6 +62,16 @@ def part(shape: Shape, some: Index) -> Shape:
         weights=None if shape.weights is None else shape.weights[some],
         normals=None if shape.normals is None else shape.normals[some],
         labels=None if shape.labels is None else shape.labels[some],
+    )
+
+
+def doubt(surface: Surface, tolerance: float) -> str:
+    """Why a shape supports no decision at this tolerance, or nothing if it does."""
+    if surface.floor <= tolerance or surface.cloud.body != "surface":
+        return ""
+    return (
+        f"the cloud does not even agree with itself: noise alone needs a tolerance of {surface.floor:.1%} of the "
+        f"diagonal, {tolerance:.1%} is asked; give more points, less noise, or a larger tolerance"
     )
 
 
@@ -94,77 +102,42 @@ def _moments(shape: Shape, classes: Index | None, parts: int) -> Moments:
     return shape_moments(Shape(points=shape.points[0] + nodes, weights=heavier), ORDER)
 
 
-def _surface(measured: Measured, tolerance: float, rng: np.random.Generator) -> Evidence:
-    """Evidence from a cloud of local planes (of points, where they fill a volume)."""
-    from scipy.spatial import cKDTree
-
+def gather(measured: Measured, rng: np.random.Generator) -> tuple[Evidence, Surface]:
+    """What proposals are made of, and the surface that judges them."""
     shape, moments = measured.shape, measured.moments
     points, normals, weights, labels = _cloud(shape, measured.classes, rng)
     local = (points - moments.center) / moments.scale
-    exact = shape.faces is not None
+    evidence = Evidence(moments=moments, tuples=measured.tuples, points=local, weights=weights / weights.sum())
+    if is_few(shape):
+        return evidence, Surface(cloud=isolated_points(local, labels), diagonal=tight_diagonal(local))
+    return evidence, _surface(local, normals, weights, labels, shape.faces is not None, rng)
+
+
+def _surface(
+    local: Array, normals: Array | None, weights: Array, labels: Index | None, exact: bool, rng: np.random.Generator
+) -> Surface:
+    """Local planes (points, where they fill a volume) with what noise alone shows."""
+    from scipy.spatial import cKDTree
+
     tree = None if exact else cKDTree(local, balanced_tree=False, compact_nodes=False)
+    if tree is not None and normals is None and fills_volume(local, tree, np.random.default_rng(0)):
+        return _volume(local, labels, rng)
     chance = None if exact or np.ptp(weights) == 0.0 else weights
-    planes = partial(
-        local_planes, local, rng=rng, normals=normals, labels=labels, weights=chance, exact=exact, tree=tree
-    )
-    filled = tree is not None and normals is None and fills_volume(local, tree, np.random.default_rng(0))
-    cloud = _volume(local, labels, rng) if filled else planes(LOCAL_PLANES)
+    cloud = local_planes(local, PLANES, rng, normals=normals, labels=labels, weights=chance, exact=exact, tree=tree)
     diagonal = tight_diagonal(cloud.points)
-    floor = None if exact or filled or len(local) > LOCAL_PLANES else _split(local, labels, diagonal, rng)
-    judge = make_judge(cloud, diagonal, tolerance, floor)
-
-    @cache
-    def closer() -> Judge:
-        return make_judge(cloud if filled else planes(CLOSER_PLANES), diagonal, tolerance, floor)
-
-    @cache
-    def halves() -> Deviation:
-        if exact or filled or floor is not None:
-            return judge.floor
-        return judge.floor.at_least(_split(local, labels, diagonal, np.random.default_rng(0)))
-
-    return Evidence(
-        moments=moments,
-        harmonics=harmonic_moments(moments),
-        tuples=classify(measured.vectors),
-        points=local,
-        weights=weights / weights.sum(),
-        judge=judge,
-        closer=closer,
-        halves=halves,
-    )
+    if exact:
+        return Surface(cloud=cloud, diagonal=diagonal)
+    noise = noise_distances(local, labels, lambda p, c: local_planes(p, PLANES // 4, rng, labels=c), rng)
+    return Surface(cloud=cloud, diagonal=diagonal, noise=summary(noise / diagonal))
 
 
-def _split(points: Array, labels: Index | None, diagonal: float, rng: np.random.Generator) -> Deviation:
-    """What two halves of a cloud show against one another."""
-    order = rng.permutation(len(points))
-    halves = [
-        local_planes(points[half], LOCAL_PLANES, rng, labels=None if labels is None else labels[half])
-        for half in (np.sort(order[::2]), np.sort(order[1::2]))
-    ]
-    return split_floor(halves[0], halves[1], diagonal)
-
-
-def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> LocalPlanes:
-    pick = np.sort(rng.choice(len(points), min(VOLUME_POINTS, len(points)), replace=False))
-    return isolated_points(points[pick], None if labels is None else labels[pick], body="volume")
-
-
-def _few_points(measured: Measured, tolerance: float) -> Evidence:
-    """Evidence from points that stand for themselves: every direction is searched, whatever the n-tuples say."""
-    shape, moments = measured.shape, measured.moments
-    local = (shape.points - moments.center) / moments.scale
-    judge = make_judge(isolated_points(local, measured.classes), tight_diagonal(local), tolerance)
-    weights = np.ones(len(local)) if shape.weights is None else shape.weights
-    return Evidence(
-        moments=moments,
-        harmonics=harmonic_moments(moments),
-        tuples=replace(classify(measured.vectors), kind="vanish"),
-        points=local,
-        weights=weights / weights.sum(),
-        judge=judge,
-        closer=lambda: judge,
-        halves=lambda: judge.floor,
+def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Surface:
+    pick = np.sort(rng.choice(len(points), min(SAMPLES, len(points)), replace=False))
+    points, labels = points[pick], None if labels is None else labels[pick]
+    diagonal = tight_diagonal(points)
+    noise = noise_distances(points, labels, partial(isolated_points, body="volume"), rng)
+    return Surface(
+        cloud=isolated_points(points, labels, body="volume"), diagonal=diagonal, noise=summary(noise / diagonal)
     )
 
 

@@ -1,0 +1,135 @@
+"""Hypotheses: closed groups placed in space, each fitted as a whole and judged element by element.
+
+All operations are judged on the same local planes: what each needs to be forgiven, as a fraction of the diagonal, is
+the table that everything else reads.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from symrefine.errors import DegenerateShapeError
+from symrefine.fit.placed import Operations, Placed, common_center, elements
+from symrefine.fit.refine import Iterate, refine
+from symrefine.geometry import Array
+from symrefine.groups import PointGroup, from_elements, is_subgroup
+from symrefine.surface.misses import Deviation
+from symrefine.surface.surface import Surface
+
+# Sources of a glance, a look, a fit, the judgement of all elements together and of each at least: what they cost.
+GLANCE, LOOK, FITTED, JUDGED, JUDGED_EACH = 120, 400, 3000, 16000, 600
+# How far the moments may put a start wrong, and directions of fitted elements (radians).
+START_ERROR, DIRECTION_ERROR = 0.1, np.radians(1.5)
+# Elements nearer than this (radians) are the same.
+SAME_RAD = np.radians(4.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Element:
+    """One element of a group about a centre, with its miss and the smallest tolerance at which it holds."""
+
+    operations: Operations
+    center: Array
+    deviation: Deviation
+    need: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Hypothesis:
+    """A group where it fits best: its elements judged, and what the worst of them needs.
+
+    `history` holds the iterates of the fit; `before` counts those of the parts that it was put together from.
+    """
+
+    placed: Placed
+    elements: tuple[Element, ...]
+    need: float
+    history: tuple[Iterate, ...] = ()
+    before: int = 0
+
+    @property
+    def group(self) -> PointGroup:
+        """The group, where it stands."""
+        return self.placed.group
+
+    @property
+    def iterations(self) -> int:
+        """Outer iterations it took in all."""
+        return self.before + max(0, len(self.history) - 1)
+
+    def holds(self, other: Placed) -> bool:
+        """Whether it has all operations of another group, as far as directions tell."""
+        return is_subgroup(other.group, self.group, 2.0 * SAME_RAD)
+
+
+NOTHING = Hypothesis(placed=Placed(group=PointGroup(name="C1"), center=np.zeros(3)), elements=(), need=0.0)
+
+
+def need(surface: Surface, placed: Placed, sources: int) -> float:
+    """What the operations of a group need, as a few of them tell on a few points."""
+    parts = elements(placed.group)
+    chosen = parts[:: max(1, len(parts) // 4)]
+    each = max(GLANCE, sources // len(chosen))
+    return max(surface.need(p.motions(placed.center), sources=each) for p in chosen)
+
+
+def looked_at(surface: Surface, start: Placed) -> tuple[Placed, float]:
+    """A coarse fit on a few points, and what it needs by them."""
+    state = start.framed()
+    stride = surface.stride(max(GLANCE, LOOK // len(state.standard)))
+    for iterate in refine(surface.cloud, state, start_error_rad=START_ERROR, max_outer=3, stride=stride):
+        state = iterate.state
+    moved = start.moved(state)
+    return moved, need(surface, moved, LOOK)
+
+
+def fitted(surface: Surface, start: Placed, *, error: float = START_ERROR, before: int = 0) -> Hypothesis:
+    """The group fitted as a whole from where it stands, and judged."""
+    state = start.framed()
+    stride = surface.stride(FITTED if len(state.standard) == 1 else max(JUDGED_EACH, 4 * FITTED // len(state.standard)))
+    history = tuple(refine(surface.cloud, state, start_error_rad=error, max_outer=10, stride=stride))
+    placed = start.moved(history[-1].state)
+    parts = elements(placed.group)
+    each = max(JUDGED_EACH, JUDGED // len(parts))
+    found = tuple(_judged(surface, part, placed.center, each) for part in parts)
+    return Hypothesis(placed=placed, elements=found, need=max(e.need for e in found), history=history, before=before)
+
+
+def _judged(surface: Surface, part: Operations, center: Array, sources: int) -> Element:
+    motions = part.motions(center)
+    deviation = surface.deviation(motions, sources=sources)
+    needed = surface.need(motions, sources=sources) if surface.cloud.body == "volume" else surface.needed(deviation)
+    return Element(operations=part, center=center, deviation=deviation, need=needed)
+
+
+def joined(parts: Sequence[Placed]) -> Placed | None:
+    """The smallest group that holds all of several groups, where it stands; None if there is none."""
+    groups = [p.group for p in parts]
+    center = common_center(list(parts))
+    if any(g.name == "Kh" for g in groups):
+        return Placed(group=PointGroup(name="Kh"), center=center)
+    try:
+        group = from_elements(
+            mirrors=[n for g in groups for n in g.mirrors()],
+            axes=[a for g in groups for a in g.rotation_axes()],
+            improper=[a for g in groups for a in g.improper_axes() if np.isfinite(a[1])],
+            inversion=any(g.has_inversion for g in groups),
+            tolerance_rad=DIRECTION_ERROR,
+        )
+    except DegenerateShapeError:
+        return None
+    return Placed(group=group.for_point_set(), center=center)
+
+
+def single(element: Element) -> Hypothesis:
+    """An element of a group as a group of its own."""
+    part = element.operations
+    group = from_elements(
+        mirrors=[part.direction] if part.kind == "plane" else [],
+        axes=[(part.direction, part.order)] if part.kind == "axis" else [],
+        improper=[(part.direction, part.order)] if part.kind == "improper" else [],
+        inversion=part.kind == "inversion",
+    )
+    placed = Placed(group=group.for_point_set(), center=element.center)
+    return Hypothesis(placed=placed, elements=(element,), need=element.need)

@@ -1,0 +1,134 @@
+"""What a detection found, in the frame and units of the input."""
+
+from dataclasses import dataclass, field
+
+from symrefine.fit.refine import Iterate
+from symrefine.geometry import Array, Axis, Plane, read_only
+from symrefine.groups import PointGroup
+from symrefine.ntuples.contract import NTuples
+from symrefine.ntuples.rank import TupleClass
+from symrefine.surface.misses import Deviation
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FoundPlane:
+    """A mirror plane in input units: its miss as fractions of the diagonal, and the probability that it is meant.
+
+    `sigma_rad` is the standard deviation of the normal in its least certain direction, `sigma` that of the offset in
+    input units: both from the joint refinement of the whole group; NaN where there was none.
+    """
+
+    plane: Plane
+    residual: Deviation
+    confidence: float
+    sigma_rad: float
+    sigma: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FoundAxis:
+    """A rotation axis (or rotoreflection, if `improper`) in input units; `order` is `math.inf` for revolution.
+
+    `sigma_rad` and `sigma` (input units) are standard deviations of direction and position, each where it is least
+    certain; NaN where no refinement told them.
+    """
+
+    axis: Axis
+    order: float
+    improper: bool
+    residual: Deviation
+    confidence: float
+    sigma_rad: float
+    sigma: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """The answer at one tolerance: the group as a function of the tolerance is a staircase."""
+
+    tolerance: float
+    point_group: str
+    undetermined: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Alternative:
+    """Another group that the object may have been meant to have.
+
+    `forgiven` is what its worst element misses by, as the smallest tolerance at which it would hold (fraction of the
+    diagonal): what one has to forgive to believe it.
+    """
+
+    point_group: str
+    probability: float
+    forgiven: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NearMiss:
+    """A candidate that was refined and turned down, with what it misses by, for a person to judge."""
+
+    kind: str
+    direction: Array
+    point: Array
+    order: float
+    residual: Deviation
+    excess: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Detection:
+    """Everything `detect` found, in the frame and units of the input.
+
+    Attributes:
+        point_group: Schoenflies symbol; "C1" when there is nothing, "undetermined" where the data support no decision.
+        confidence: probability that this is the group: the worst element kept and the best turned down both count.
+        alternatives: the groups it may be instead, likeliest first.
+        group: the same placed in space; C1 where nothing is decided.
+        center: [3] the point all operations leave in place.
+        planes: discrete mirror planes, best first.
+        axes: rotation and rotoreflection axes, highest order first.
+        inversion: whether the inversion about the centre is a symmetry.
+        inversion_residual: its miss as fractions of the diagonal; None where there is none.
+        inversion_confidence: how sure it is; None where there is none.
+        near_misses: candidates turned down, best first.
+        iterations: outer iterations of the refinement of all planes together; where the group was put together from
+            parts, those of the part that took most come on top (coarse looks at a tenth of the points do not count).
+        tolerance: the tolerance the decisions were made at, as a fraction of `diagonal`.
+        diagonal: diagonal of the smallest bounding box over all orientations, input units.
+        undetermined: why the data support no decision; empty when they do.
+        staircase: the group at the tolerances that were asked for besides.
+        tuples: class of the n-tuples, with singular values, as measured.
+        vectors: the n-tuples themselves, dimensionless.
+        history: the iterates of that refinement, in normalised units; `scale` and `origin` undo the normalisation.
+        points: [M, 3] the points the refinement used, normalised units.
+        timings: seconds by stage; everything else is a function of the input and the options alone.
+    """
+
+    point_group: str
+    confidence: float
+    alternatives: tuple[Alternative, ...]
+    group: PointGroup
+    center: Array
+    planes: tuple[FoundPlane, ...]
+    axes: tuple[FoundAxis, ...]
+    inversion: bool
+    inversion_residual: Deviation | None
+    inversion_confidence: float | None
+    near_misses: tuple[NearMiss, ...]
+    iterations: int
+    tolerance: float
+    diagonal: float
+    undetermined: str
+    staircase: tuple[Step, ...]
+    tuples: TupleClass
+    vectors: NTuples
+    history: tuple[Iterate, ...]
+    points: Array
+    origin: Array
+    scale: float
+    timings: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("center", "points", "origin"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))

@@ -1,0 +1,242 @@
+"""Detection on one page: shape -> moments -> proposals -> fits -> one table of misses -> the group, and how sure."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from symrefine.clock import Clock
+from symrefine.decide.chain import Pool, chain, explore
+from symrefine.decide.hypotheses import Element, Hypothesis
+from symrefine.decide.posterior import Decision, Link, decide
+from symrefine.detection.measure import Measured, doubt, gather, measure, part
+from symrefine.detection.result import Alternative, Detection, FoundAxis, FoundPlane, NearMiss, Step
+from symrefine.errors import InputError
+from symrefine.fit.refine import Iterate
+from symrefine.geometry import Array, Axis, Plane, check_tolerance, cross_matrix
+from symrefine.shape import Shape
+from symrefine.surface.misses import TOLERANCE
+from symrefine.surface.surface import Surface
+
+# Tolerances of the staircase that the command line tells.
+LADDER = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08)
+# Groups that need up to so many tolerances are asked for as alternatives.
+BEYOND = 1.5
+# Candidates turned down, and alternatives, that are told of; and the least probability that is worth telling.
+NEAR, LEAST = 8, 0.01
+
+
+def detect(
+    shape: Shape | ArrayLike,
+    *,
+    weights: ArrayLike | None = None,
+    normals: ArrayLike | None = None,
+    labels: ArrayLike | None = None,
+    tolerance: float = TOLERANCE,
+    ladder: Sequence[float] = (),
+    seed: int = 0,
+) -> Detection:
+    """Point group, mirror planes and rotation axes of an object in 3-space, with what it misses each of them by.
+
+    Args:
+        shape: a `Shape`, or points [N, 3].
+        weights: [N] masses of the points; not with a `Shape`, which carries its own. Of up to 250 points those of
+            different mass are different things, which no symmetry exchanges; of more, masses are a sampling density.
+        normals: [N, 3] normals, any sign; estimated where absent. Not with a `Shape`.
+        labels: [N] integers: classes (elements, colours, materials) that every symmetry must keep. Not with a `Shape`.
+        tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal: 95 % of the
+            surface must come within 0.75 of it, 99 % within 1.6, the mean within 0.22 (see `surface.misses`). How sure
+            the answer is says how close the object comes to these limits.
+        ladder: other tolerances to tell the group at, from the same table of misses; see `Detection.staircase`.
+        seed: of the random choices (samples of a mesh, subsets of a cloud).
+
+    Raises:
+        InputError: not a 3-D shape, or tolerances outside (0, 0.2].
+        DegenerateShapeError: the points do not spread.
+    """
+    shape = _given(shape, weights, normals, labels)
+    for t in (tolerance, *ladder):
+        check_tolerance(t)
+    clock = Clock()
+    with clock("moments"):
+        measured = measure(shape)
+    with clock("local_planes"):
+        evidence, surface = gather(measured, np.random.default_rng(seed))
+    with clock("search"):
+        pool = explore(surface, evidence, tolerance)
+        links = chain(surface, pool, BEYOND * max(tolerance, *ladder))
+    with clock("decide"):
+        decision = _decided(links, tolerance)
+        steps = tuple(_step(surface, links, t) for t in sorted(ladder))
+    reason = doubt(surface, tolerance)
+    return _report(measured, surface, pool, links, decision, tolerance, reason, steps, clock)
+
+
+def _given(
+    shape: Shape | ArrayLike, weights: ArrayLike | None, normals: ArrayLike | None, labels: ArrayLike | None
+) -> Shape:
+    """The shape in 3-space, without points of no mass, which are no part of the object."""
+    if not isinstance(shape, Shape):
+        shape = Shape.of(shape, weights=weights, normals=normals, labels=labels)
+    elif not (weights is None and normals is None and labels is None):
+        raise InputError("weights, normals and labels belong to the Shape; give them there, or give an array of points")
+    if shape.dim != 3:
+        raise InputError(f"{shape.source}: detect takes 3-D shapes; {_elsewhere(shape.dim)}")
+    if shape.weights is None or shape.faces is not None or shape.weights.all():
+        return shape
+    return part(shape, np.flatnonzero(shape.weights > 0))
+
+
+def _elsewhere(dim: int) -> str:
+    """What is offered for points of another dimension."""
+    if dim == 2:
+        return "these points have 2 coordinates: use symrefine.plane.detect_planar"
+    return (
+        f"these points have {dim} coordinates: for 4 and more symrefine.ndim.detect_nd tells the rank of the "
+        "n-tuples and the hyperplanes of symmetry, no turns and no groups"
+    )
+
+
+def _decided(links: Sequence[Hypothesis], tolerance: float) -> Decision:
+    return decide([Link(need=h.need, lone_mirror=h.group.name == "Cs") for h in links[1:]], tolerance)
+
+
+def _step(surface: Surface, links: Sequence[Hypothesis], tolerance: float) -> Step:
+    """The group at another tolerance, read from the same table."""
+    undetermined = bool(doubt(surface, tolerance))
+    name = "undetermined" if undetermined else links[_decided(links, tolerance).index].group.name
+    return Step(tolerance=tolerance, point_group=name, undetermined=undetermined)
+
+
+def _report(
+    measured: Measured,
+    surface: Surface,
+    pool: Pool,
+    links: Sequence[Hypothesis],
+    decision: Decision,
+    tolerance: float,
+    reason: str,
+    steps: tuple[Step, ...],
+    clock: Clock,
+) -> Detection:
+    origin, scale = measured.moments.center, measured.moments.scale
+    index = 0 if reason else decision.index
+    chosen = links[index]
+    history = chosen.history
+    sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
+    planes = [e for e in chosen.elements if e.operations.kind == "plane"]
+    turns = [e for e in chosen.elements if e.operations.kind in ("axis", "improper")]
+    inversion = next((e for e in chosen.elements if e.operations.kind == "inversion"), None)
+    return Detection(
+        point_group="undetermined" if reason else chosen.group.name,
+        confidence=0.0 if reason else decision.probabilities[index],
+        alternatives=_alternatives(links, decision, -1 if reason else index),
+        group=chosen.group,
+        center=origin + scale * chosen.placed.center,
+        planes=tuple(
+            FoundPlane(
+                plane=_plane(e, origin, scale),
+                residual=e.deviation,
+                confidence=sure[id(e)],
+                sigma_rad=(known := _uncertainty(history, e))[0],
+                sigma=known[1] * scale,
+            )
+            for e in sorted(planes, key=lambda e: e.need)
+        ),
+        axes=tuple(
+            FoundAxis(
+                axis=Axis(point=origin + scale * e.center, direction=e.operations.direction),
+                order=e.operations.order,
+                improper=e.operations.kind == "improper",
+                residual=e.deviation,
+                confidence=sure[id(e)],
+                sigma_rad=(known := _uncertainty(history, e))[0],
+                sigma=known[1] * scale,
+            )
+            for e in sorted(turns, key=lambda e: (-e.operations.order, e.need))
+        ),
+        inversion=chosen.group.has_inversion,
+        inversion_residual=None if inversion is None else inversion.deviation,
+        inversion_confidence=None if inversion is None else sure[id(inversion)],
+        near_misses=tuple(_near_miss(e, origin, scale, tolerance) for e in _turned_down(pool, links, chosen)),
+        iterations=chosen.iterations,
+        tolerance=tolerance,
+        diagonal=surface.diagonal * scale,
+        undetermined=reason,
+        staircase=steps,
+        tuples=measured.tuples,
+        vectors=measured.vectors,
+        history=history,
+        points=surface.cloud.points,
+        origin=origin,
+        scale=scale,
+        timings=clock.seconds,
+    )
+
+
+def _confidence(element: Element, links: Sequence[Hypothesis], decision: Decision) -> float:
+    """Probability that an element is meant: that the true group holds the first group of the chain which has it."""
+    matrix = element.operations.matrices[0][None]
+    for link, inside in zip(links, decision.inside, strict=True):
+        if link.elements and link.group.distance_rad(matrix)[0] < math.radians(5.0):
+            return inside
+    return decision.inside[decision.index]
+
+
+def _alternatives(links: Sequence[Hypothesis], decision: Decision, index: int) -> tuple[Alternative, ...]:
+    """The other groups of the chain that are worth telling, likeliest first."""
+    found = [
+        Alternative(point_group=h.group.name, probability=p, forgiven=h.need)
+        for i, (h, p) in enumerate(zip(links, decision.probabilities, strict=True))
+        if i != index and p >= LEAST
+    ]
+    return tuple(sorted(found, key=lambda a: -a.probability)[:NEAR])
+
+
+def _turned_down(pool: Pool, links: Sequence[Hypothesis], chosen: Hypothesis) -> list[Element]:
+    """Elements that were fitted and judged and are not in the group, best first."""
+    beyond = [e for h in (*links, *pool.small) for e in h.elements]
+    found: list[Element] = []
+    for e in sorted(beyond, key=lambda e: e.need):
+        matrix = e.operations.matrices[0][None]
+        others = [chosen.group.distance_rad(matrix)[0]] if chosen.elements else []
+        others += [float(np.linalg.norm(matrix[0] - o.operations.matrices[0])) for o in found]
+        if min(others, default=math.inf) > math.radians(5.0):
+            found.append(e)
+    return found[:NEAR]
+
+
+def _near_miss(element: Element, origin: Array, scale: float, tolerance: float) -> NearMiss:
+    return NearMiss(
+        kind=element.operations.kind,
+        direction=element.operations.direction,
+        point=origin + scale * element.center,
+        order=element.operations.order,
+        residual=element.deviation,
+        excess=element.need / tolerance,
+    )
+
+
+def _uncertainty(history: tuple[Iterate, ...], element: Element) -> tuple[float, float]:
+    """Standard deviations of an element's direction (radians) and place (RMS radii), each where it is least certain.
+
+    The covariance of the joint refinement is that of a small turn w and a shift of the common frame: a direction u
+    moves by w x u, a plane along its normal, an axis across itself.
+    """
+    if len(history) < 2:
+        return math.nan, math.nan
+    frame, covariance = history[-1].state.frame, history[-1].covariance
+    u = frame @ element.operations.direction
+    cross = cross_matrix(u)
+    along = np.outer(u, u)
+    moves = along if element.operations.kind == "plane" else np.eye(3) - along
+    turned, shifted = cross @ covariance[:3, :3] @ cross.T, moves @ covariance[3:, 3:] @ moves
+    largest = [max(float(np.linalg.eigvalsh(c)[-1]), 0.0) for c in (turned, shifted)]
+    return math.sqrt(largest[0]), math.sqrt(largest[1])
+
+
+def _plane(element: Element, origin: Array, scale: float) -> Plane:
+    point = origin + scale * element.center
+    normal = element.operations.direction
+    return Plane(normal=normal, offset=float(normal @ point))

@@ -1,0 +1,139 @@
+"""A point group placed in space, and the operations that are fitted and judged in its stead."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from symrefine.fit.refine import Framed, mirror_bundle
+from symrefine.geometry import Array, Isometry, frame_with_z, householder, read_only, rotation, rotoreflection
+from symrefine.groups import PointGroup
+
+# Turns that no finite fold below 36 shares; a surface of revolution survives them all.
+FREE_TURNS = 2.0 * np.pi * np.array([0.0823, 0.1381966, 0.2360680, 0.4270510])
+# Operations of one kind that are fitted together: more add points, but no knowledge.
+FITTED = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Placed:
+    """A point group about a centre [3], normalised units."""
+
+    group: PointGroup
+    center: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", read_only(self.center))
+
+    def framed(self) -> Framed:
+        """The operations that are fitted, in the frame of the group: together they leave no unknown of it free."""
+        group = PointGroup(name=self.group.name)
+        if group.symbol.family == "Cv" and group.is_finite:
+            return mirror_bundle(int(group.symbol.fold), self.group.frame, self.center)
+        matrices = fitted_matrices(group)
+        return Framed(standard=np.stack(matrices), frame=self.group.frame, center=self.center)
+
+    def moved(self, state: Framed) -> "Placed":
+        """The same group where a refinement put it."""
+        return Placed(group=PointGroup(name=self.group.name, frame=state.frame), center=state.center)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Operations:
+    """One element of a group: its kind ("plane", "axis", "improper", "inversion"), and matrices that stand for it."""
+
+    kind: str
+    direction: Array
+    order: float
+    matrices: tuple[Array, ...]
+
+    def motions(self, center: Array) -> tuple[Isometry, ...]:
+        """The operations about a centre."""
+        return tuple(Isometry.about(center, m) for m in self.matrices)
+
+
+def elements(group: PointGroup) -> list[Operations]:
+    """Every mirror, axis and rotoreflection axis of a group, and the inversion; of a continuous family, a member."""
+    normals = group.mirrors()
+    if group.name in ("Cinfv", "Kh"):
+        normals = group.frame[:0]
+    elif group.name == "Dinfh":
+        normals = group.frame[2:]
+    found = [Operations(kind="plane", direction=n, order=1.0, matrices=(householder(n),)) for n in normals]
+    for direction, order in group.rotation_axes() if group.is_finite else _endless(group):
+        turns = tuple(rotation(direction, float(a)) for a in _angles(order))
+        found.append(Operations(kind="axis", direction=direction, order=order, matrices=turns))
+    for direction, order in group.improper_axes() if group.is_finite else []:
+        turn = rotoreflection(direction, _wide(int(order)))
+        found.append(Operations(kind="improper", direction=direction, order=order, matrices=(turn,)))
+    if group.has_inversion:
+        z = np.array([0.0, 0.0, 1.0])
+        found.append(Operations(kind="inversion", direction=z, order=2.0, matrices=(-np.eye(3),)))
+    return found
+
+
+def _endless(group: PointGroup) -> list[tuple[Array, float]]:
+    """The continuous axis; of a sphere, all three that stand for it."""
+    axes = [(u, k) for u, k in group.rotation_axes() if math.isinf(k)]
+    return axes if group.name == "Kh" else axes[:1]
+
+
+def _angles(order: float) -> tuple[float, ...]:
+    """Turns that together stand for an axis: the smallest one moves hardly anything, so that a wide one goes along."""
+    if math.isinf(order):
+        return tuple(FREE_TURNS)
+    smallest = 2.0 * math.pi / order
+    return tuple(dict.fromkeys((_wide(int(order)), smallest)))
+
+
+def _wide(order: int) -> float:
+    """Angle of the generator of C_n nearest to the golden section of a full turn, which moves every part far."""
+    powers = [k for k in range(1, order) if math.gcd(k, order) == 1]
+    return 2.0 * math.pi * min(powers, key=lambda k: abs(k / order - 0.381966)) / order
+
+
+def fitted_matrices(group: PointGroup) -> list[Array]:
+    """Some operations of each kind, spread evenly; of a continuous group, mirrors through its axis."""
+    if not group.is_finite:
+        return _round_matrices(group)
+    parts = elements(group)
+    found: list[Array] = []
+    for kind in ("plane", "axis", "improper", "inversion"):
+        matrices = [p.matrices[0] for p in parts if p.kind == kind]
+        found += _some(matrices, FITTED if kind == "plane" else FITTED // 2)
+        if kind == "plane" and found and group.symbol.family not in ("Dh", "Dd", "Ch"):
+            break
+    return found
+
+
+def _round_matrices(group: PointGroup) -> list[Array]:
+    """Mirrors through the axis and, where the group has them, one across it or turns about the others."""
+    angles = np.pi * np.arange(5) / 5
+    normals = np.stack([-np.sin(angles), np.cos(angles), np.zeros(5)], axis=1)
+    matrices = [householder(n) for n in normals]
+    if group.name == "Dinfh":
+        matrices.append(householder([0.0, 0.0, 1.0]))
+    if group.name == "Kh":
+        matrices += [rotation([1.0, 0.0, 0.0], 1.0), rotation([0.0, 1.0, 0.0], 1.7)]
+    return matrices
+
+
+def _some(items: list[Array], most: int) -> list[Array]:
+    """At most so many of them, spread evenly, the first one in any case."""
+    return [items[k * len(items) // most] for k in range(most)] if len(items) > most else items
+
+
+def common_center(placed: "list[Placed]") -> Array:
+    """Point [3] nearest to the centroid that lies on all planes and axes of groups, in the sense of least squares."""
+    rows: list[Array] = []
+    values: list[float] = []
+    for p in placed:
+        for part in elements(p.group):
+            across = part.direction[None] if part.kind == "plane" else frame_with_z(part.direction)[:2]
+            seen = across if part.kind in ("plane", "axis") else np.eye(3)
+            rows += list(seen)
+            values += list(seen @ p.center)
+    if not rows:
+        return np.zeros(3)
+    # Normals are known to a degree or so: what little they leave their common plane by is no third condition.
+    return np.asarray(np.linalg.lstsq(np.array(rows), np.array(values), rcond=0.1)[0])

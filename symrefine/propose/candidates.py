@@ -1,0 +1,107 @@
+"""Small groups that the moments propose: mirrors, and what may stand about an axis. Evidence is weighed, never obeyed.
+
+The n-tuples give an axis or a plane where they do not vanish, the directional spectrum what they cannot see, and the
+azimuthal spectrum the folds about an axis with their phases. Everything is in normalised units (RMS radius 1).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from symrefine.fit.frame import polish_frame
+from symrefine.fit.placed import Placed
+from symrefine.geometry import Array, frame_with_z
+from symrefine.groups import PointGroup
+from symrefine.moments.harmonics import harmonic_moments
+from symrefine.moments.moments import Moments
+from symrefine.ntuples.rank import TupleClass
+from symrefine.propose.folds import MAX_FOLD, fold_candidates
+from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candidates, whitened
+
+# Directions nearer than this to an earlier one are the same start: half of what order 8 resolves is 5.6 degrees.
+APART_RAD = np.radians(3.0)
+# Folds about one axis that are tried.
+FOLDS = 3
+# A fold that no moment reaches: only the coefficients with m = 0 are invariant.
+ROUND_FOLD = 10**6
+# Primes whose axes the moments tell: an axis of any order is one of a prime order too.
+PRIMES = (2, 3, 5, 7)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Evidence:
+    """What is known before any point is matched: moments, the class of the n-tuples, and points to take azimuths of."""
+
+    moments: Moments
+    tuples: TupleClass
+    points: Array
+    weights: Array
+
+
+def mirrors(evidence: Evidence) -> list[Placed]:
+    """Mirrors through the centroid: the n-tuples' own, those across principal axes, those of the spectrum."""
+    spectral = mirror_candidates(evidence.moments).directions
+    normals = np.concatenate([evidence.tuples.directions[::-1], _principal(evidence), spectral])
+    return [placed("Cs", frame_with_z(n)) for n in apart(normals)]
+
+
+def axes(evidence: Evidence) -> list[Array]:
+    """Directions [3] worth trying as axes: the n-tuples' own, principal ones, minima of the whitened spectrum."""
+    white = whitened(evidence.moments)
+    minima = [local_minima(axis_misses(white, k), count=5).directions for k in PRIMES]
+    return apart(np.concatenate([evidence.tuples.directions[:1], _principal(evidence), *minima]))
+
+
+def about(evidence: Evidence, direction: Array) -> list[Placed]:
+    """What may stand about a direction: revolution; mirrors at the phases of a fold, or turns alone; C2 and C3."""
+    harmonics = harmonic_moments(evidence.moments)
+    round_frame = polish_frame(harmonics, frame_with_z(direction), ROUND_FOLD)
+    found = [placed("Cinfv", round_frame)]
+    folds = {2, 3}
+    for axis in apart(np.stack([round_frame[2], direction]), 0.2 * APART_RAD):
+        for candidate in fold_candidates(evidence.points, evidence.weights, axis)[:FOLDS]:
+            folds.add(candidate.fold)
+            frame = polish_frame(harmonics, candidate.frame, candidate.fold)
+            found.append(placed(f"C{candidate.fold}v", frame))
+    return [*found, *(placed(f"C{k}", frame_with_z(direction)) for k in sorted(folds, reverse=True))]
+
+
+def beside(known: Placed) -> list[Placed]:
+    """What may hold beside a group that holds: multiples of its order, revolution, what turns its axis over."""
+    group, center = known.group, known.center
+    main = [(u, k) for u, k in group.rotation_axes()[:1] if group.symbol.fold > 0]
+    found = [Placed(group=PointGroup(name="Ci"), center=center)] if not group.has_inversion else []
+    if not group.is_finite:
+        turned_over = [placed("Cs", group.frame, center)] if group.name == "Cinfv" else []
+        return [*turned_over, placed("Kh", group.frame, center)] if group.name != "Kh" else []
+    for u, k in main:
+        frame = frame_with_z(u)
+        found.append(placed("Cinfv", frame, center))
+        found += [placed(f"C{int(p * k)}", frame, center) for p in (2, 3, 5) if 2 * p * k <= MAX_FOLD]
+        found.append(placed("Cs", frame, center))
+        if 4 * k <= MAX_FOLD:
+            found.append(placed(f"S{int(2 * k)}", group.frame, center))
+    if group.name in ("D2", "D2h"):
+        # The one pair whose elements do not name all their supergroups: T and Th have the same three.
+        found.append(placed("C3", frame_with_z(group.frame.sum(axis=0)), center))
+    if group.name == "Cs":
+        found.append(placed("C2", group.frame, center))
+    return found
+
+
+def placed(name: str, frame: Array, center: Array | None = None) -> Placed:
+    """A group with its frame, about the centroid unless told."""
+    return Placed(group=PointGroup(name=name, frame=frame), center=np.zeros(3) if center is None else center)
+
+
+def _principal(evidence: Evidence) -> Array:
+    return np.asarray(np.linalg.eigh(evidence.moments.covariance)[1].T)
+
+
+def apart(directions: Array, angle_rad: float = APART_RAD) -> list[Array]:
+    """The directions without those within an angle of an earlier one."""
+    kept: list[Array] = []
+    for d in directions:
+        if all(abs(d @ k) < np.cos(angle_rad) for k in kept):
+            kept.append(d)
+    return kept

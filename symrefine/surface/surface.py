@@ -1,0 +1,59 @@
+"""The denoised surface as a judge: by how much an operation misses it, and what noise alone would show."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from symrefine.geometry import Isometry
+from symrefine.surface.misses import ATOM_LIMITS, LIMITS, Deviation, miss_distances, spread_distance, summary
+from symrefine.surface.skin import LocalPlanes
+
+NOTHING = Deviation(mean=0.0, p80=0.0, p95=0.0, p97=0.0, p99=0.0, p994=0.0, max=0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Surface:
+    """Local planes in normalised units, the diagonal their misses are measured by, and what noise alone would show."""
+
+    cloud: LocalPlanes
+    diagonal: float
+    noise: Deviation = NOTHING
+
+    def stride(self, sources: int) -> int:
+        """Stride that leaves about `sources` local planes."""
+        return max(1, len(self.cloud.points) // sources)
+
+    def deviation(self, motions: Sequence[Isometry], *, sources: int = 10**9) -> Deviation:
+        """The miss of one or several operations together: the worst of each statistic."""
+        stride = self.stride(sources)
+        worst = NOTHING
+        for motion in motions:
+            worst = worst.at_least(summary(miss_distances(self.cloud, motion, stride=stride) / self.diagonal))
+        return worst
+
+    def need(self, motions: Sequence[Isometry], *, sources: int = 10**9) -> float:
+        """The smallest tolerance at which operations hold (see `needed`)."""
+        deviation = self.deviation(motions, sources=sources)
+        spread = 0.0
+        if self.cloud.body == "volume":
+            # Of a volume the nearest points tell the outline only; how the mass spreads tells the rest.
+            spread = max(spread_distance(self.cloud.points, m) for m in motions) / self.diagonal
+        return self.needed(deviation, spread)
+
+    def needed(self, deviation: Deviation, spread: float = 0.0) -> float:
+        """The smallest tolerance, a fraction of the diagonal, at which a miss still counts as symmetric.
+
+        Noise and miss add up in squares; each statistic may reach its own multiple of the tolerance.
+        """
+        if self.cloud.body == "atoms":
+            each = (deviation.mean, deviation.p95, deviation.max)
+            return max(v / limit for v, limit in zip(each, ATOM_LIMITS, strict=True))
+        own, base = deviation.limited, self.noise.limited
+        beyond = np.sqrt(np.maximum(np.square(own) - np.square(base), 0.0))
+        return max(float(np.max(beyond / np.array(LIMITS))), spread / LIMITS[0])
+
+    @property
+    def floor(self) -> float:
+        """The smallest tolerance at which noise alone would still count as symmetric."""
+        return float(np.max(np.array(self.noise.limited) / np.array(LIMITS)))
