@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from symrefine.shape import Shape
 
 NAME = "detect"
+# Exit status of `--strict` where nothing is decided.
+UNDETERMINED = 3
 HELP = "find the planes, axes and point group of a mesh, cloud or picture"
 DESCRIPTION = (
     "Find the mirror planes, rotation axes and point group of the mesh or point cloud in PATH (.ply .stl .obj .off "
@@ -57,6 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "as they differ from the background, which is what most of the border shows)",
     )
     parser.add_argument("--invert", action="store_true", help="exchange object and background of a picture")
+    parser.add_argument(
+        "--strict", action="store_true", help=f"end with status {UNDETERMINED} where the answer is undetermined"
+    )
     add_class_options(parser)
     add_detection_options(parser)
 
@@ -83,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
         say(json_text(record))
     else:
         _print(record, list(writers))
-    return 0
+    return UNDETERMINED if args.strict and record["undetermined"] else 0
 
 
 def examine(

@@ -60,6 +60,8 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
             "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows, or, "
             "below 1, by far more than what holds beside them."
         )
+    if record["alternatives"]:
+        yield f"It may be meant otherwise: {otherwise(record)}."
     if record["staircase"]:
         yield f"Group by tolerance: {staircase(record)}"
     yield f"{_count(record['iterations'], 'iteration')}, {sum(record['timings'].values()):.2f} s"
@@ -71,7 +73,7 @@ def staircase(record: Record) -> str:
     for name, steps in groupby(record["staircase"], key=lambda s: s["point_group"]):
         percents = [f"{100 * s['tolerance']:g}" for s in steps]
         span = percents[0] if len(percents) == 1 else f"{percents[0]}-{percents[-1]}"
-        parts.append(f"{name or 'undetermined'} at {span} %")
+        parts.append(f"{name} at {span} %")
     return ", ".join(parts)
 
 
@@ -80,11 +82,16 @@ def headline(record: Record) -> str:
     name = record["point_group"]
     if record["undetermined"]:
         return f"undetermined: {record['undetermined']}"
-    if name == "C1":
-        return f"C1, no symmetry at tolerance {100 * record['tolerance']:g} %"
-    sure = [e["confidence"] for e in record["planes"] + record["axes"] + _inversions(record)]
-    told = f", confidence {sure[0]:.2f}" if sure else ""
-    return f"{name}, {_NAMED.get(name) or _elements(record)}; tolerance {100 * record['tolerance']:g} %{told}"
+    meaning = "no symmetry" if name == "C1" else _NAMED.get(name) or _elements(record)
+    return f"{name}, {meaning}; tolerance {100 * record['tolerance']:g} %, confidence {record['confidence']:.2f}"
+
+
+def otherwise(record: Record) -> str:
+    """The groups it may be instead: `or Cs (12 %), if 1.9 % of the diagonal is forgiven`."""
+    return "; ".join(
+        f"or {a['point_group']} ({100 * a['probability']:.0f} %), if {100 * a['forgiven']:.2g} % is forgiven"
+        for a in record["alternatives"]
+    )
 
 
 def _elements(record: Record) -> str:

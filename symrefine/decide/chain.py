@@ -6,7 +6,7 @@ an exact element stays in it, and the group at any tolerance is read from the sa
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from symrefine.decide.hypotheses import (
@@ -21,7 +21,7 @@ from symrefine.decide.hypotheses import (
     single,
 )
 from symrefine.fit.placed import Placed
-from symrefine.propose.candidates import Evidence, about, axes, beside, mirrors
+from symrefine.propose.candidates import Evidence, beside, proposals
 from symrefine.surface.misses import LIMITS
 from symrefine.surface.surface import Surface
 
@@ -31,6 +31,8 @@ HOPELESS = 0.5 * START_ERROR / LIMITS[0]
 COARSE = 3.5
 # Needs within this factor, or below this share of the limit, are the same: the elements of a true group miss alike.
 ALIKE, EXACT = 1.5, 0.05
+# Candidates turned down after a look that are fitted all the same where nothing else was: the nearest misses.
+TOLD = 2
 # Elements that are joined one by one, where all of a level together make no group.
 SINGLY = 4
 
@@ -39,8 +41,8 @@ SINGLY = 4
 class Pool:
     """Small groups fitted and judged, the largest within the limit, larger ones that failed, candidates turned down."""
 
-    small: tuple[Hypothesis, ...]
-    largest: Hypothesis
+    small: tuple[Hypothesis, ...] = ()
+    largest: Hypothesis = NOTHING
     turned_down: tuple[tuple[Placed, float], ...] = ()
     failed: tuple[Hypothesis, ...] = ()
 
@@ -51,27 +53,26 @@ def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
     Args:
         limit: what the largest group may need, as a fraction of the diagonal.
     """
-    pool = Pool(small=(), largest=NOTHING)
-    pool = _tried(surface, pool, _promising(surface, _proposed(evidence)), limit)
-    while True:
+    pool = Pool()
+    for starts in proposals(evidence):
+        pool = _settled(surface, _tried(surface, pool, starts, limit), pool.largest, limit)
+    nearest = sorted(pool.turned_down, key=lambda k: k[1])[:TOLD] if not pool.small else []
+    return replace(pool, small=(*pool.small, *(fitted(surface, start) for start, _ in nearest)))
+
+
+def _settled(surface: Surface, pool: Pool, before: Hypothesis, limit: float) -> Pool:
+    """The pool when the neighbours of its largest group were tried, and of the one that this makes, and so on."""
+    while pool.largest is not before:
         before = pool.largest
-        pool = _tried(surface, pool, _promising(surface, beside(before.placed)), limit)
-        if pool.largest is before:
-            return pool
+        pool = _tried(surface, pool, beside(before.placed), limit)
+    return pool
 
 
-def _proposed(evidence: Evidence) -> Iterator[Placed]:
-    """All that the moments propose: mirrors first."""
-    yield from mirrors(evidence)
-    for direction in axes(evidence):
-        yield from about(evidence, direction)
-
-
-def _promising(surface: Surface, starts: Iterable[Placed]) -> list[Placed]:
-    """The starts that a glance does not rule out, the largest groups of those that look best first."""
-    glances = [(need(surface, start, GLANCE), start) for start in starts]
-    kept = [(g, start) for g, start in glances if g <= HOPELESS]
-    return [start for g, start in sorted(kept, key=lambda k: k[0] / math.log2(1.0 + _size(k[1])))]
+def _promising(surface: Surface, largest: Hypothesis, starts: Iterable[Placed]) -> list[Placed]:
+    """The starts that are new and that a glance does not rule out, those of large groups that look best first."""
+    glances = [(need(surface, s, GLANCE), s) for s in starts if not largest.holds(s)]
+    kept = [(g, s) for g, s in glances if g <= HOPELESS]
+    return [s for _, s in sorted(kept, key=lambda k: k[0] / math.log2(1.0 + _size(k[1])))]
 
 
 def _size(placed: Placed) -> float:
@@ -81,7 +82,7 @@ def _size(placed: Placed) -> float:
 def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float) -> Pool:
     """The pool with candidates fitted, but for those that the group so far has anyway."""
     small, largest, turned_down, failed = list(pool.small), pool.largest, list(pool.turned_down), list(pool.failed)
-    for start in starts:
+    for start in _promising(surface, largest, starts):
         if largest.holds(start):
             continue
         moved, needs = looked_at(surface, start)
@@ -129,6 +130,8 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     links = [NOTHING]
     while rest := [h for h in rest if not links[-1].holds(h.placed)]:
         here = links[-1]
+        if rest[0].need > limit:
+            break
         level = max(ALIKE * rest[0].need, here.need, EXACT * limit, 0.5 * surface.floor)
         batch = [h for h in rest if h.need <= level]
         found = _join(surface, [here, *batch], known)

@@ -67,11 +67,12 @@ def part(shape: Shape, some: Index) -> Shape:
 
 def doubt(surface: Surface, tolerance: float) -> str:
     """Why a shape supports no decision at this tolerance, or nothing if it does."""
-    if surface.floor <= tolerance or surface.cloud.body != "surface":
+    hidden = surface.noise.p95
+    if hidden <= tolerance:
         return ""
     return (
-        f"the cloud does not even agree with itself: noise alone needs a tolerance of {surface.floor:.1%} of the "
-        f"diagonal, {tolerance:.1%} is asked; give more points, less noise, or a larger tolerance"
+        f"the cloud does not even agree with itself: 5 % of it misses the rest by {hidden:.1%} of the diagonal or "
+        f"more, and a tolerance of {tolerance:.1%} is asked; give more points, less noise, or a larger tolerance"
     )
 
 
@@ -107,7 +108,13 @@ def gather(measured: Measured, rng: np.random.Generator) -> tuple[Evidence, Surf
     shape, moments = measured.shape, measured.moments
     points, normals, weights, labels = _cloud(shape, measured.classes, rng)
     local = (points - moments.center) / moments.scale
-    evidence = Evidence(moments=moments, tuples=measured.tuples, points=local, weights=weights / weights.sum())
+    evidence = Evidence(
+        moments=moments,
+        tuples=measured.tuples,
+        points=local,
+        weights=weights / weights.sum(),
+        atoms=is_few(shape),
+    )
     if is_few(shape):
         return evidence, Surface(cloud=isolated_points(local, labels), diagonal=tight_diagonal(local))
     return evidence, _surface(local, normals, weights, labels, shape.faces is not None, rng)

@@ -63,13 +63,13 @@ def detect(
         measured = measure(shape)
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed))
+    reason = doubt(surface, tolerance)
     with clock("search"):
-        pool = explore(surface, evidence, tolerance)
-        links = chain(surface, pool, BEYOND * max(tolerance, *ladder))
+        pool = Pool() if reason else explore(surface, evidence, tolerance)
+        links = chain(surface, pool, BEYOND * max((tolerance, *ladder)))
     with clock("decide"):
         decision = _decided(links, tolerance)
         steps = tuple(_step(surface, links, t) for t in sorted(ladder))
-    reason = doubt(surface, tolerance)
     return _report(measured, surface, pool, links, decision, tolerance, reason, steps, clock)
 
 

@@ -2,14 +2,14 @@
 
 import math
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
 from symrefine.align.story import Alignment
-from symrefine.detection.result import Detection, FoundAxis, FoundPlane, NearMiss
+from symrefine.detection.result import Alternative, Detection, FoundAxis, FoundPlane, NearMiss
 from symrefine.geometry import Array, Plane
 from symrefine.plane.judge import LineDeviation
 from symrefine.shape import Shape
@@ -44,6 +44,8 @@ def detection_record(
         **opening(SCHEMA, shape, options),
         "classes": _classes(shape),
         "point_group": d.point_group,
+        "confidence": number(d.confidence),
+        "alternatives": alternatives(d.alternatives),
         "center": numbers(d.center, scale),
         "diagonal": number(d.diagonal),
         "tolerance": number(d.tolerance),
@@ -55,7 +57,7 @@ def detection_record(
         "staircase": [
             {
                 "tolerance": number(s.tolerance),
-                "point_group": None if s.undetermined else s.point_group,
+                "point_group": s.point_group,
             }
             for s in d.staircase
         ],
@@ -189,6 +191,18 @@ def _axis(found: FoundAxis, scale: float) -> Record:
         "confidence": number(found.confidence),
         "sigma": {"direction_rad": number(found.sigma_rad), "position": number(found.sigma)},
     }
+
+
+def alternatives(found: Sequence[Alternative]) -> list[Record]:
+    """Other groups with their probability, and what would have to be forgiven: a fraction of the diagonal."""
+    return [
+        {
+            "point_group": a.point_group,
+            "probability": number(a.probability),
+            "forgiven": number(a.forgiven),
+        }
+        for a in found
+    ]
 
 
 def _near_miss(miss: NearMiss, scale: float) -> Record:

@@ -65,7 +65,7 @@ def near_miss_rows(detection: Detection) -> list[Row]:
             name=str(k),
             colour=MISS,
             kind=_kind(m.kind, m.order)
-            + ("" if m.kind == "plane" else f" {order_name(m.order, m.kind == 'improper')}"),
+            + (f" {order_name(m.order, m.kind == 'improper')}" if m.kind in ("axis", "improper") else ""),
             vector=direction(m.direction),
             residual=m.residual,
             score=m.excess,
@@ -77,4 +77,5 @@ def near_miss_rows(detection: Detection) -> list[Row]:
 def _kind(kind: str, order: float) -> str:
     if kind == "axis" and math.isinf(order):
         return "revolution"
-    return {"plane": "mirror plane", "axis": "rotation", "improper": "rotoreflection"}[kind]
+    names = {"plane": "mirror plane", "axis": "rotation", "improper": "rotoreflection", "inversion": "inversion"}
+    return names[kind]

@@ -4,6 +4,7 @@ The n-tuples give an axis or a plane where they do not vanish, the directional s
 azimuthal spectrum the folds about an axis with their phases. Everything is in normalised units (RMS radius 1).
 """
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from symrefine.fit.frame import polish_frame
 from symrefine.fit.placed import Placed
 from symrefine.geometry import Array, frame_with_z
+from symrefine.groups import MAX_FOLD as MAX_ORDER
 from symrefine.groups import PointGroup
 from symrefine.moments.harmonics import harmonic_moments
 from symrefine.moments.moments import Moments
@@ -28,28 +30,36 @@ ROUND_FOLD = 10**6
 PRIMES = (2, 3, 5, 7)
 
 
+# Atoms nearer to an axis than these (RMS radii) may stand on it.
+ON_AXIS = (0.03, 0.15)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Evidence:
-    """What is known before any point is matched: moments, the class of the n-tuples, and points to take azimuths of."""
+    """What is known before any point is matched: moments, the class of the n-tuples, and points to take azimuths of.
+
+    `atoms` says that the points stand for themselves, so that they can be counted.
+    """
 
     moments: Moments
     tuples: TupleClass
     points: Array
     weights: Array
+    atoms: bool = False
 
 
-def mirrors(evidence: Evidence) -> list[Placed]:
-    """Mirrors through the centroid: the n-tuples' own, those across principal axes, those of the spectrum."""
+def proposals(evidence: Evidence) -> Iterator[list[Placed]]:
+    """All that the moments propose, in rounds: what stands about the likeliest axes, mirrors, other axes."""
+    likely = apart(np.concatenate([evidence.tuples.directions[:1], _principal(evidence)]))
+    for direction in likely:
+        yield about(evidence, direction)
     spectral = mirror_candidates(evidence.moments).directions
     normals = np.concatenate([evidence.tuples.directions[::-1], _principal(evidence), spectral])
-    return [placed("Cs", frame_with_z(n)) for n in apart(normals)]
-
-
-def axes(evidence: Evidence) -> list[Array]:
-    """Directions [3] worth trying as axes: the n-tuples' own, principal ones, minima of the whitened spectrum."""
+    yield [placed("Cs", frame_with_z(n)) for n in apart(normals)]
     white = whitened(evidence.moments)
     minima = [local_minima(axis_misses(white, k), count=5).directions for k in PRIMES]
-    return apart(np.concatenate([evidence.tuples.directions[:1], _principal(evidence), *minima]))
+    for direction in apart([*likely, *np.concatenate(minima)])[len(likely) :]:
+        yield about(evidence, direction)
 
 
 def about(evidence: Evidence, direction: Array) -> list[Placed]:
@@ -57,13 +67,20 @@ def about(evidence: Evidence, direction: Array) -> list[Placed]:
     harmonics = harmonic_moments(evidence.moments)
     round_frame = polish_frame(harmonics, frame_with_z(direction), ROUND_FOLD)
     found = [placed("Cinfv", round_frame)]
-    folds = {2, 3}
+    folds = {2, 3, *(_counted(evidence.points, direction) if evidence.atoms else ())}
     for axis in apart(np.stack([round_frame[2], direction]), 0.2 * APART_RAD):
         for candidate in fold_candidates(evidence.points, evidence.weights, axis)[:FOLDS]:
             folds.add(candidate.fold)
             frame = polish_frame(harmonics, candidate.frame, candidate.fold)
             found.append(placed(f"C{candidate.fold}v", frame))
     return [*found, *(placed(f"C{k}", frame_with_z(direction)) for k in sorted(folds, reverse=True))]
+
+
+def _counted(points: Array, direction: Array) -> set[int]:
+    """Orders that atoms allow about a direction: C_n moves all but those on the axis, so n divides their number."""
+    away = np.linalg.norm(frame_with_z(direction)[:2] @ points.T, axis=0)
+    counts = {int((away > near).sum()) for near in ON_AXIS}
+    return {n for count in counts for n in range(2, min(count, MAX_ORDER) + 1) if count % n == 0}
 
 
 def beside(known: Placed) -> list[Placed]:
@@ -98,7 +115,7 @@ def _principal(evidence: Evidence) -> Array:
     return np.asarray(np.linalg.eigh(evidence.moments.covariance)[1].T)
 
 
-def apart(directions: Array, angle_rad: float = APART_RAD) -> list[Array]:
+def apart(directions: Iterable[Array], angle_rad: float = APART_RAD) -> list[Array]:
     """The directions without those within an angle of an earlier one."""
     kept: list[Array] = []
     for d in directions:

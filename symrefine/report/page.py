@@ -29,6 +29,7 @@ def html_page(detection: Detection, shape: Shape, picture: bytes) -> str:
         _facts(detection, shape),
         _found(detection),
         _near_misses(detection),
+        _alternatives(detection),
         _staircase(detection),
         _convergence(detection),
         _tuples(detection),
@@ -68,6 +69,7 @@ def _facts(d: Detection, shape: Shape) -> str:
         ("Centre", coordinates(d.center, d.diagonal)),
         ("Diagonal", f"{d.diagonal:.5g}"),
         ("Tolerance", percent(d.tolerance)),
+        ("Confidence", "none" if d.undetermined else f"{d.confidence:.2f}"),
     ]
     if d.iterations:
         facts.append(("Iterations", str(d.iterations)))
@@ -109,6 +111,20 @@ def _near_misses(d: Detection) -> str:
     )
     heads = ("", "kind", "normal or direction", *_MISS_NAMES, "times the limit")
     return _section("Near misses", told, _table(heads, rows))
+
+
+def _alternatives(d: Detection) -> str:
+    if not d.alternatives:
+        return ""
+    rows = [
+        (escape(symbol(a.point_group)), f"{100 * a.probability:.0f} %", escape(percent(a.forgiven)))
+        for a in d.alternatives
+    ]
+    told = (
+        f"The answer has a probability of {100 * d.confidence:.0f} %. These groups are what the object may have been "
+        "meant to have instead, with what their worst element misses by: the tolerance that would have to be granted."
+    )
+    return _section("What else it may be", told, _table(("group", "probability", "to be forgiven"), rows))
 
 
 def _staircase(d: Detection) -> str:
