@@ -10,17 +10,17 @@ from symrefine.geometry import Array, cross_matrix, random_orthogonal, unit
 from symrefine.shape import Shape
 
 Rng = np.random.Generator
-VERTICES = 1600
+VERTICES, BUMPS = 1600, 9
 
 
 def blob(rng: Rng) -> Instance:
-    """A ball with a dozen smooth bumps and hollows, longer one way than another."""
+    """A ball with smooth bumps and hollows, longer one way than another."""
     index = np.arange(VERTICES) + 0.5
     height, turn = 1.0 - 2.0 * index / VERTICES, np.pi * (1.0 + np.sqrt(5.0)) * index
     flat = np.sqrt(1.0 - height**2)
     directions = np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
-    bumps = unit(rng.normal(size=(12, 3)))
-    widths, heights = rng.uniform(0.4, 0.9, 12), rng.uniform(0.15, 0.4, 12) * rng.choice([-1.0, 1.0], 12)
+    bumps = unit(rng.normal(size=(BUMPS, 3)))
+    widths, heights = rng.uniform(0.4, 0.8, BUMPS), rng.uniform(0.4, 0.9, BUMPS) * rng.choice([-1.0, 1.0], BUMPS)
     radius = np.exp((heights * np.exp((directions @ bumps.T - 1.0) / widths**2)).sum(axis=1))
     ball = hull(directions)
     stretched = radius[:, None] * directions * rng.uniform(0.6, 1.4, 3)
@@ -45,10 +45,9 @@ def bent(rods: int, rng: Rng) -> Instance:
 
 
 def _rod(rng: Rng) -> Part:
-    """A rod along a cubic Bezier curve, its sections carried along without twist."""
-    controls = np.cumsum(
-        np.concatenate([np.zeros((1, 3)), unit(rng.normal(size=(3, 3))) * rng.uniform(0.4, 1.0, (3, 1))]), 0
-    )
+    """A rod along a cubic Bezier curve with steps in all three directions, its sections carried along untwisted."""
+    steps = (random_orthogonal(rng) + rng.normal(scale=0.15, size=(3, 3))) * rng.uniform(0.6, 1.0, (3, 1))
+    controls = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
     t = np.linspace(0.0, 1.0, 25)[:, None]
     weights = np.hstack([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3])
     path = weights @ controls

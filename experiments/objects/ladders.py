@@ -110,7 +110,7 @@ LADDERS: dict[str, Build] = {
             "cubane": "D2 D4h C2v",
             "S8": "D4 C2v",
             "benzene": "D2h C2v",
-            "SF6": "D2d",
+            "SF6": "C4v",
             "adamantane": "D2",
             "ferrocene, eclipsed": "C2v",
             "B12H12": "D2",

@@ -100,7 +100,7 @@ def tab(size: float, rng: Rng) -> tuple[list[Part], list[Part]]:
     outline = tin(rng)
     low = outline[-1][1]
     length = size * rng.uniform(0.9, 1.1)
-    return [spun(outline, FINE)], [block((0.15, 0, low + 0.025), (length, 0.5 * length, 0.02))]
+    return [spun(outline, FINE)], [block((0.15, 0, low + 0.15 * length), (length, 0.5 * length, 0.3 * length))]
 
 
 def dot(rng: Rng) -> tuple[list[Part], list[Part]]:
@@ -115,7 +115,7 @@ def lugs(size: float, rng: Rng) -> tuple[list[Part], list[Part]]:
     """Two lugs on opposite sides of a can."""
     outline = tin(rng)
     radius, height = outline[1][0], outline[2][1]
-    lug = block((radius, 0, 0.8 * height), (0.5 * size, size, size))
+    lug = block((radius, 0, 0.8 * height), (1.2 * size, size, size))
     return [spun(outline, FINE)], [lug, lug.turned(rotation([0, 0, 1], np.pi))]
 
 
