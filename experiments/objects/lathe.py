@@ -159,7 +159,7 @@ ROUND: dict[str, Build] = {
     "tab": partial(with_detail, "Cs", partial(tab, 0.12), False),
     "wide_tab": partial(with_detail, "Cs", partial(tab, 0.35), False),
     "dot": partial(with_detail, "Cs", dot, False),
-    "lugs": partial(with_detail, "C2v", partial(lugs, 0.06), False),
+    "lugs": partial(with_detail, "C2v", partial(lugs, 0.045), False),
     "wide_lugs": partial(with_detail, "C2v", partial(lugs, 0.2), False),
     "label": partial(with_detail, "Cs", label, True),
     "screw": partial(with_detail, "C1", screw, True),

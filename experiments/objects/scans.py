@@ -54,7 +54,7 @@ def cabinet(rng: Rng) -> Scanned:
     feet = [block((x, s * 0.4 * width, -0.06), (0.08, 0.08, 0.12)) for s in (-1, 1) for x in (-0.15, 0.15)]
     body = block((0, 0, 0.5 * height), (depth, width, height))
     screw = _screw((0.5 * depth, 0.4 * width, 0.8 * height), (1, 0, 0), 0.04)
-    return Scanned(parts=[body, *doors, *handles, *feet], screw=screw, moving=1, along=(0, 0, 1))
+    return Scanned(parts=[body, *doors, *handles, *feet], screw=screw, moving=1, along=(-1, 0, 0))
 
 
 def bench(rng: Rng) -> Scanned:

@@ -35,12 +35,16 @@ def quartered(corners: Array) -> Array:
 
 
 def fine(corners: Array, longest: float) -> Array:
-    """Triangles [F, 3, 3] cut into four until no edge is longer."""
+    """Triangles [F, 3, 3] halved across their longest edge until none is longer."""
     done: list[Array] = []
     while len(corners):
-        long = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1) > longest
+        lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+        order = (lengths.argmax(axis=1)[:, None] + np.arange(3)) % 3
+        a, b, c = np.moveaxis(np.take_along_axis(corners, order[:, :, None], axis=1), 1, 0)
+        long = lengths.max(axis=1) > longest
         done.append(corners[~long])
-        corners = quartered(corners[long])
+        halves = [np.stack([a, 0.5 * (a + b), c], axis=1), np.stack([0.5 * (a + b), b, c], axis=1)]
+        corners = np.concatenate([half[long] for half in halves])
     return np.concatenate(done)
 
 
