@@ -20,7 +20,7 @@ def blob(rng: Rng) -> Instance:
     flat = np.sqrt(1.0 - height**2)
     directions = np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
     bumps = unit(rng.normal(size=(BUMPS, 3)))
-    widths, heights = rng.uniform(0.4, 0.8, BUMPS), rng.uniform(0.5, 1.0, BUMPS) * rng.choice([-1.0, 1.0], BUMPS)
+    widths, heights = rng.uniform(0.4, 0.8, BUMPS), rng.uniform(0.6, 1.2, BUMPS) * rng.choice([-1.0, 1.0], BUMPS)
     radius = np.exp((heights * np.exp((directions @ bumps.T - 1.0) / widths**2)).sum(axis=1))
     ball = hull(directions)
     stretched = radius[:, None] * directions * rng.uniform(0.6, 1.4, 3)
