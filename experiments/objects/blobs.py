@@ -3,22 +3,48 @@
 from functools import partial
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from experiments.objects.instances import Build, Instance, of_parts
 from experiments.objects.parts import Part, block, hull, lofted
-from symrefine.geometry import Array, cross_matrix, random_orthogonal, unit
+from experiments.objects.shapes import sample
+from symrefine.geometry import Array, cross_matrix, householder, random_orthogonal, unit
 from symrefine.shape import Shape
 
 Rng = np.random.Generator
 VERTICES, BUMPS = 1600, 9
+# A blob is one that the best of so many mirrors and half turns misses by so much of the diagonal, asked of some of so
+# many points of its surface.
+APART_REL, AXES, PLACES, ASKED = 0.03, 300, 6000, 200
 
 
 def blob(rng: Rng) -> Instance:
-    """A ball with smooth bumps and hollows, longer one way than another."""
-    index = np.arange(VERTICES) + 0.5
-    height, turn = 1.0 - 2.0 * index / VERTICES, np.pi * (1.0 + np.sqrt(5.0)) * index
+    """A ball with smooth bumps and hollows, longer one way than another: the first that no operation nearly fits."""
+    while True:
+        made = _bumpy(rng)
+        if nearest_miss(made.shape) > APART_REL * made.diagonal:
+            return made
+
+
+def nearest_miss(shape: Shape) -> float:
+    """95th percentile of the miss of a surface, the least of mirrors and half turns all around."""
+    points = sample(shape, PLACES, 0.0, np.random.default_rng(0))
+    points = points - points.mean(axis=0)
+    tree = cKDTree(points)
+    images = (sign * householder(n) for n in _around(AXES) for sign in (1.0, -1.0))
+    return min(float(np.quantile(tree.query(points[:ASKED] @ g.T)[0], 0.95)) for g in images)
+
+
+def _around(count: int) -> Array:
+    """Directions [count, 3] that cover the sphere evenly."""
+    index = np.arange(count) + 0.5
+    height, turn = 1.0 - 2.0 * index / count, np.pi * (1.0 + np.sqrt(5.0)) * index
     flat = np.sqrt(1.0 - height**2)
-    directions = np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
+    return np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
+
+
+def _bumpy(rng: Rng) -> Instance:
+    directions = _around(VERTICES)
     bumps = unit(rng.normal(size=(BUMPS, 3)))
     widths, heights = rng.uniform(0.4, 0.8, BUMPS), rng.uniform(0.6, 1.2, BUMPS) * rng.choice([-1.0, 1.0], BUMPS)
     radius = np.exp((heights * np.exp((directions @ bumps.T - 1.0) / widths**2)).sum(axis=1))
