@@ -113,16 +113,24 @@ def extruded(outline: Array, low: float, high: float) -> Part:
 
 def stacked(rings: Array, corners: Array | None = None) -> Part:
     """The solid between rings [H, K, 3] of points around the z axis, from below, closed by fans at both ends."""
-    count = rings.shape[1]
     middle = np.array([[0.0, 0.0, rings[0, :, 2].mean()], [0.0, 0.0, rings[-1, :, 2].mean()]])
+    return _walled(rings, middle, rings.reshape(-1, 3) if corners is None else np.concatenate([rings[0], rings[-1]]))
+
+
+def lofted(rings: Array) -> Part:
+    """The solid between rings [H, K, 3] along any path, anticlockwise as seen from its end, each seen from its mean."""
+    return _walled(rings, rings[[0, -1]].mean(axis=1), rings.reshape(-1, 3))
+
+
+def _walled(rings: Array, middle: Array, marks: Array) -> Part:
+    """The walls between rings [H, K, 3] and a fan from either of two points [2, 3] over the ends."""
+    count = rings.shape[1]
     around, following = np.arange(count), (np.arange(count) + 1) % count
     bottom = len(rings) * count
     fan = np.stack([np.full(count, bottom), following, around], axis=1)
     top = np.stack([np.full(count, bottom + 1), around + bottom - count, following + bottom - count], axis=1)
     faces = np.concatenate([_sides(len(rings), count), fan, top])
-    points = rings.reshape(-1, 3)
-    marks = points if corners is None else np.concatenate([rings[0], rings[-1]])
-    return _part(np.concatenate([points, middle]), faces, marks)
+    return _part(np.concatenate([rings.reshape(-1, 3), middle]), faces, marks)
 
 
 def bored(outside: Array, inside: Array) -> Part:

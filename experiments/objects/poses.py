@@ -1,6 +1,6 @@
 """How an object is shown: in a pose and unit of its own, as a mesh or as noisy points."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,4 +37,5 @@ def observed(mesh: Shape, form: str, points: int, noise_rel: float, rng: np.rand
 
 def posed(shape: Shape, pose: Pose) -> Shape:
     """The same in another pose."""
-    return Shape(points=pose.of(shape.points), faces=shape.faces, measure=shape.measure)
+    normals = None if shape.normals is None else shape.normals @ pose.turn.T
+    return replace(shape, points=pose.of(shape.points), normals=normals)
