@@ -19,7 +19,7 @@ from experiments.studies import boundary
 from experiments.studies.answers import answer_confidence, ladder_faults, ladder_outcome, outcome, within
 from experiments.studies.boundary import VIEWS, Case, plan, run
 from experiments.studies.reliability import fitted
-from symrefine.detect import detect
+from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.geometry import householder, random_orthogonal, rotation
 from symrefine.groups import PointGroup, point_group

@@ -10,7 +10,7 @@ from experiments.objects.built_symmetry import Truth, holds
 from experiments.objects.instances import Instance
 from experiments.objects.poses import Pose
 from experiments.studies.reliability import SURE, claims
-from symrefine.detect import Detection
+from symrefine.detection.result import Detection
 from symrefine.groups import PointGroup, is_subgroup
 from symrefine.shape import Shape
 
@@ -23,9 +23,8 @@ OUTCOMES = ("right", "undetermined", "at least", "unsure and wrong", "sure and w
 
 
 def answer_confidence(found: Detection) -> float:
-    """How sure a detection is of its group: the least sure of its elements; NaN where it claims none."""
-    elements = [e.confidence for e in (*found.planes, *found.axes)]
-    return min(elements, default=math.nan if found.inversion_confidence is None else found.inversion_confidence)
+    """How sure the whole answer is; NaN where there is none."""
+    return math.nan if found.undetermined else found.confidence
 
 
 def outcome(found: Detection, made: Instance, pose: Pose) -> str:

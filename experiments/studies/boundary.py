@@ -26,7 +26,7 @@ from experiments.objects.poses import Pose, observed, posed
 from experiments.studies.answers import OUTCOMES, answer_confidence, ladder_faults, ladder_outcome, outcome
 from experiments.studies.jobs import add_jobs, in_order
 from experiments.studies.reliability import SURE, fitted
-from symrefine.detect import detect
+from symrefine.detection.story import detect
 from symrefine.errors import InputError, SymrefineError
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE

@@ -22,13 +22,13 @@ from experiments.objects.built_symmetry import FAMILIES, Claim, Truth, holds, na
 from experiments.objects.catalogue import FOLDER, catalogue
 from experiments.objects.poses import Pose, observed, posed
 from experiments.studies.jobs import add_jobs, in_order
+from symrefine.decide.posterior import Link, meant
 from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.files import check_target, whole
 from symrefine.geometry import Array
 from symrefine.shape import Shape
-from symrefine.surface.misses import confidence
 
 # Form, points and noise of every look at an object.
 VIEWS = (("mesh", 0, 0.0), ("cloud", 8000, 0.0), ("cloud", 20000, 0.005), ("cloud", 8000, 0.01))
@@ -134,8 +134,13 @@ def claims(found: Detection) -> list[tuple[Claim, float, bool]]:
         for a in found.axes
     ]
     near = [
-        (Claim(kind=m.kind, order=m.order, direction=m.direction, point=m.point), confidence(m.excess), False)
+        (
+            Claim(kind=m.kind, order=m.order, direction=m.direction, point=m.point),
+            meant(Link(need=m.excess), 1.0),
+            False,
+        )
         for m in found.near_misses
+        if m.kind != "inversion"
     ]
     return [*planes, *axes, *near]
 

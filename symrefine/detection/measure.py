@@ -23,6 +23,10 @@ ORDER, PARTS = 8, 16
 SAMPLES, PLANES = 20000, 8000
 # Masses of atoms that differ by more than this fraction are masses of different kinds.
 SAME_MASS = 0.01
+# Variance across, as a fraction of that along, below which points lie on a line: rounding of float32.
+FLAT = 1e-12
+# Points so many times as far out as 99 % of all set the scale: 2 % of their diagonal is 10 % of the object.
+STRAY = 5.0
 # Up to so many distinct points stand for themselves (atoms); more are samples of a surface.
 FEW = 250
 
@@ -65,8 +69,42 @@ def part(shape: Shape, some: Index) -> Shape:
     )
 
 
-def doubt(surface: Surface, tolerance: float) -> str:
+def doubt(measured: Measured, surface: Surface, tolerance: float) -> str:
     """Why a shape supports no decision at this tolerance, or nothing if it does."""
+    return _on_a_line(measured) or _few_decide(measured) or _hidden(surface, tolerance)
+
+
+def _on_a_line(measured: Measured) -> str:
+    """Points on a line look the same from all sides, whatever they were taken from; atoms are a molecule."""
+    _, middle, largest = np.linalg.eigvalsh(measured.moments.covariance)
+    if middle > FLAT * largest or (is_few(measured.shape) and measured.shape.labels is not None):
+        return ""
+    return "all points lie on a line, which says nothing of the rest; label them if they are the atoms of a molecule"
+
+
+def _few_decide(measured: Measured) -> str:
+    """A stray point that sets the scale, or weights that leave all to a few points."""
+    shape = measured.shape
+    if is_few(shape) or shape.faces is not None:
+        return ""
+    away = np.linalg.norm(shape.points - np.median(shape.points, axis=0), axis=1)
+    most = float(np.quantile(away, 0.99))
+    strays = int((away > STRAY * most).sum())
+    if strays:
+        return (
+            f"{strays} of {len(away)} points stand more than {STRAY:g} times as far out as 99 % of them, and set the "
+            "scale that misses are measured by; remove them if they are strays"
+        )
+    if shape.weights is None:
+        return ""
+    count = float(shape.weights.sum() / shape.weights.max())
+    if count > FEW:
+        return ""
+    return f"the largest weight is as much as one of {count:.3g} points; so few support no decision"
+
+
+def _hidden(surface: Surface, tolerance: float) -> str:
+    """Noise that hides what the tolerance tells apart."""
     hidden = surface.noise.p95
     if hidden <= tolerance:
         return ""

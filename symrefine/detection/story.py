@@ -63,13 +63,13 @@ def detect(
         measured = measure(shape)
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed))
-    reason = doubt(surface, tolerance)
+    reason = doubt(measured, surface, tolerance)
     with clock("search"):
         pool = Pool() if reason else explore(surface, evidence, tolerance)
         links = chain(surface, pool, BEYOND * max((tolerance, *ladder)))
     with clock("decide"):
         decision = _decided(links, tolerance)
-        steps = tuple(_step(surface, links, t) for t in sorted(ladder))
+        steps = tuple(_step(measured, surface, links, t) for t in sorted(ladder))
     return _report(measured, surface, pool, links, decision, tolerance, reason, steps, clock)
 
 
@@ -102,9 +102,9 @@ def _decided(links: Sequence[Hypothesis], tolerance: float) -> Decision:
     return decide([Link(need=h.need, lone_mirror=h.group.name == "Cs") for h in links[1:]], tolerance)
 
 
-def _step(surface: Surface, links: Sequence[Hypothesis], tolerance: float) -> Step:
+def _step(measured: Measured, surface: Surface, links: Sequence[Hypothesis], tolerance: float) -> Step:
     """The group at another tolerance, read from the same table."""
-    undetermined = bool(doubt(surface, tolerance))
+    undetermined = bool(doubt(measured, surface, tolerance))
     name = "undetermined" if undetermined else links[_decided(links, tolerance).index].group.name
     return Step(tolerance=tolerance, point_group=name, undetermined=undetermined)
 

@@ -167,7 +167,7 @@ class _Program:
         columns = []
         for (low, high), ends, ratio in zip(self.even, self.ends, self.ratio, strict=True):
             if high is not None:
-                columns.append(np.sqrt(entries[:, low] * entries[:, high]))
+                columns.append(np.sqrt(np.maximum(entries[:, low] * entries[:, high], 0.0)))
             else:
                 norms = [np.sqrt(entries[:, at] ** 2 @ often) for at, often in ends]
                 columns.append(np.max([entries[:, low] ** ratio, *norms], axis=0))
