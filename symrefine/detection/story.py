@@ -68,7 +68,7 @@ def detect(
         pool = Pool() if reason else explore(surface, evidence, tolerance)
         links = chain(surface, pool, BEYOND * max((tolerance, *ladder)))
     with clock("decide"):
-        decision = _decided(links, tolerance)
+        decision = _decided(surface, links, tolerance)
         steps = tuple(_step(measured, surface, links, t) for t in sorted(ladder))
     return _report(measured, surface, pool, links, decision, tolerance, reason, steps, clock)
 
@@ -98,14 +98,15 @@ def _elsewhere(dim: int) -> str:
     )
 
 
-def _decided(links: Sequence[Hypothesis], tolerance: float) -> Decision:
-    return decide([Link(need=h.need, lone_mirror=h.group.name == "Cs") for h in links[1:]], tolerance)
+def _decided(surface: Surface, links: Sequence[Hypothesis], tolerance: float) -> Decision:
+    known = [Link(need=h.need, lone_mirror=h.group.name == "Cs") for h in links[1:]]
+    return decide(known, tolerance, surface.floor)
 
 
 def _step(measured: Measured, surface: Surface, links: Sequence[Hypothesis], tolerance: float) -> Step:
     """The group at another tolerance, read from the same table."""
     undetermined = bool(doubt(measured, surface, tolerance))
-    name = "undetermined" if undetermined else links[_decided(links, tolerance).index].group.name
+    name = "undetermined" if undetermined else links[_decided(surface, links, tolerance).index].group.name
     return Step(tolerance=tolerance, point_group=name, undetermined=undetermined)
 
 

@@ -9,6 +9,8 @@ from symrefine.geometry import Isometry
 from symrefine.surface.misses import ATOM_LIMITS, LIMITS, Deviation, miss_distances, spread_distance, summary
 from symrefine.surface.skin import LocalPlanes
 
+# Standard deviation over mean of the distance to the nearest of random points in a volume (Weibull, shape 3).
+NEAREST_SPREAD = 0.363
 NOTHING = Deviation(mean=0.0, p80=0.0, p95=0.0, p97=0.0, p99=0.0, p994=0.0, max=0.0)
 
 
@@ -55,5 +57,9 @@ class Surface:
 
     @property
     def floor(self) -> float:
-        """The smallest tolerance at which noise alone would still count as symmetric."""
-        return float(np.max(np.array(self.noise.limited) / np.array(LIMITS)))
+        """The smallest tolerance at which what noise alone shows would count as symmetric.
+
+        Of a volume the noise is the distance to the nearest point, which is known; only how it spreads is not.
+        """
+        share = NEAREST_SPREAD if self.cloud.body == "volume" else 1.0
+        return share * float(np.max(np.array(self.noise.limited) / np.array(LIMITS)))
