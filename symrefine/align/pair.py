@@ -5,7 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from symrefine.align.harmonic_fit import HarmonicPair, harmonic_pair
+from symrefine.align.landscape import harmonic_pair
+from symrefine.align.moment_fit import MomentPair
 from symrefine.align.polish import Probes, probes, probes_of
 from symrefine.align.procrustes import Procrustes, procrustes
 from symrefine.align.skin import Skin, isolated, patches, skin, skin_of
@@ -99,7 +100,7 @@ class Evidence:
         return procrustes(ntuples(self.source.moments), ntuples(self.target.moments))
 
     @cached_property
-    def harmonics(self) -> HarmonicPair:
+    def harmonics(self) -> MomentPair:
         """Harmonic moments of both sides."""
         return harmonic_pair(self.source.moments, self.target.moments)
 
