@@ -132,7 +132,7 @@ def covariance(pair: MomentPair, fits: Fits) -> Array:
     """
     matrix, inverse = fits.matrices[:1], np.linalg.pinv(fits.hessians[0], rcond=1e-12, hermitian=True)
     moved = pair.action.tangents(pair.moved(matrix))[0] * pair.weights
-    return inverse @ _jackknife(pair, matrix, moved) @ inverse + misfit(pair, fits) * inverse
+    return inverse @ _jackknife(pair, matrix, moved) @ inverse + max(1.0, misfit(pair, fits)) * inverse
 
 
 def _jackknife(pair: MomentPair, matrix: Array, directions: Array) -> Array:

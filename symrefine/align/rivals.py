@@ -14,9 +14,9 @@ import numpy as np
 from symrefine.align.landscape import hills, landscape
 from symrefine.align.moment_fit import Fits, as_good, best_fits, covariance, exact, fit, misfit, preference
 from symrefine.align.pair import Evidence, few
-from symrefine.align.polish import MAX_OUTER, Polished, Probes, Similarity, polish
-from symrefine.align.skin import Skin
+from symrefine.align.polish import MAX_OUTER, Polished, Similarity, polish
 from symrefine.geometry import Array, frame_with_z, rotation
+from symrefine.surface.skin import LocalPlanes, Skin
 
 # Hills of the landscape that are climbed, for each determinant.
 HILLS = 8
@@ -154,7 +154,7 @@ def _first_good(evidence: Evidence, matrices: Iterator[Array], covariance: Array
     found: list[_Judged] = []
     for m in matrices:
         start = Similarity(matrix=m, shift=np.zeros(3))
-        motion = _polish(evidence, evidence.coarse, start, covariance, LOOK_OUTER).motion
+        motion = _polish(evidence, evidence.surfaces.target, start, covariance, LOOK_OUTER).motion
         found.append(_Judged(motion=motion, excess=evidence.surfaces.excess(motion)))
         if found[-1].excess <= GOOD:
             break
@@ -181,14 +181,14 @@ def _phases(evidence: Evidence, matrix: Array, rivals: Fits) -> Iterator[Array]:
 
 def polished(evidence: Evidence, start: Similarity, covariance: Array) -> Polished:
     """Polish on the points of the evidence from a start whose rotation the moments know with this covariance [3, 3]."""
-    return _polish(evidence, (evidence.probes, evidence.skins[1]), start, covariance, MAX_OUTER)
+    return _polish(evidence, evidence.met, start, covariance, MAX_OUTER)
 
 
 def _polish(
-    evidence: Evidence, points: tuple[Probes, Skin], start: Similarity, covariance: Array, outer: int
+    evidence: Evidence, target: Skin | LocalPlanes, start: Similarity, covariance: Array, outer: int
 ) -> Polished:
     error, known = _start_error(covariance), _information(evidence, covariance)
-    return polish(*points, start, error=error, known=known, scale=evidence.scale, outer=outer)
+    return polish(evidence.moving, target, start, error=error, known=known, scale=evidence.scale, outer=outer)
 
 
 def _information(evidence: Evidence, covariance: Array) -> Array:

@@ -137,7 +137,7 @@ def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: boo
     evidence, motion, covariance = choice.evidence, choice.motion, choice.covariance
     if polish and not choice.exact and evidence.has_points:
         with clock("planes"):
-            _ = evidence.probes
+            _ = evidence.moving, evidence.met
         with clock("polish"):
             done = polished(evidence, motion, covariance)
             motion, covariance = done.motion, done.covariance[:3, :3]
