@@ -22,7 +22,7 @@ SOURCE_PLANES, TARGET_PLANES, FEWEST = 800, 2000, 60
 # Flatness of thin sheets and edges without noise (0.13 at most at the lower quartile); noise of 0.2 % makes it 0.17.
 THIN = 0.15
 # Points of a cloud that planes are fitted to at most, and points that a mesh is sampled at.
-DENSE, SAMPLES = 40000, 10000
+DENSE = 20000
 # Where neither side has more points than this they stand for themselves (atoms), not for a surface.
 FEW = 250
 # Neighbours whose distance tells the density at a point, and the bound of what is made of it, over the median.
@@ -56,27 +56,25 @@ class Side:
         moments = central_moments(points, weights, self.moments.order, parts=parts)
         return Side(shape=self.shape, moments=moments, weights=weights / weights.sum())
 
-    def skin(self, unit: float, rng: np.random.Generator) -> Skin:
-        """The surface about the centre, in units of `unit`."""
-        points, normals = self._points(unit, rng)
-        return make_skin(points, rng, normals=normals, exact=self.is_mesh, thin=THIN)
+    def skin(self, unit: float, samples: int, rng: np.random.Generator) -> Skin:
+        """The surface about the centre, in units of `unit`: of a mesh, as so many samples show it.
 
-    def _points(self, unit: float, rng: np.random.Generator) -> tuple[Array, Array | None]:
-        """Points about the centre, and normals if they are known: of the cloud, or samples of the mesh."""
+        Where one side is a mesh and the other a cloud, planes of both blur edges and curves alike.
+        """
         points, normals = self.shape.points, self.shape.normals
         if self.is_mesh:
-            points, normals, _ = sample_surface(self.shape, SAMPLES, rng)
+            points, normals = sample_surface(self.shape, samples, rng)[0], None
         elif len(points) > DENSE:
             some = rng.choice(len(points), DENSE, replace=False)
             points, normals = points[some], None if normals is None else normals[some]
-        return (points - self.moments.center) / unit, normals
+        return make_skin((points - self.moments.center) / unit, rng, normals=normals, thin=THIN)
 
     def azimuths(self, frame: Array) -> Array:
         """Azimuthal coefficients [K, 4] about the frame's third axis, scaled by what random azimuths would give."""
         points = self.shape.points
         weights = self.weights
         if self.is_mesh:
-            points, _, _ = sample_surface(self.shape, 20000, np.random.default_rng(0))
+            points, _, _ = sample_surface(self.shape, DENSE, np.random.default_rng(0))
             weights = np.full(len(points), 1.0 / len(points))
         local = (points - self.moments.center) @ frame.T / self.moments.scale
         c, sigma = azimuthal_spectrum(local, weights, np.array([0.0, 0.0, 1.0]))
@@ -112,8 +110,9 @@ class Evidence:
     @cached_property
     def _skins(self) -> tuple[Skin, Skin]:
         """Source and target as the points show them, each about its own centre."""
-        sides = zip((self.source, self.target), self._units, strict=True)
-        first, second = (s.skin(unit, self._rng()) for s, unit in sides)
+        sides = self.source, self.target
+        samples = min([DENSE if s.is_mesh else len(s.shape.points) for s in sides])
+        first, second = (s.skin(unit, samples, self._rng()) for s, unit in zip(sides, self._units, strict=True))
         return first, second
 
     def _planes(self, index: int, count: int) -> LocalPlanes:

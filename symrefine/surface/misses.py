@@ -43,6 +43,13 @@ class Deviation:
     p994: float
     max: float
 
+    @classmethod
+    def of(cls, distances: Array) -> "Deviation":
+        """The distribution of distances [N], in fractions of the diagonal."""
+        p80, p95, p97, p99, p994 = (float(q) for q in np.quantile(distances, [0.8, 0.95, 0.97, 0.99, 0.994]))
+        mean, largest = float(distances.mean()), float(distances.max())
+        return cls(mean=mean, p80=p80, p95=p95, p97=p97, p99=p99, p994=p994, max=largest)
+
     def at_least(self, other: "Deviation") -> "Deviation":
         """The larger of the two in every statistic."""
         return Deviation(**{f.name: max(getattr(self, f.name), getattr(other, f.name)) for f in fields(Deviation)})
@@ -58,6 +65,11 @@ class Deviation:
             max(value**2 - b**2, 0.0) ** 0.5 / (limit * tolerance)
             for value, limit, b in zip(own, LIMITS, base, strict=True)
         )
+
+    def over_atom_limits(self, tolerance: float) -> tuple[float, ...]:
+        """Mean, 95th percentile and maximum of atoms, over their limits."""
+        own = (self.mean, self.p95, self.max)
+        return tuple(value / (limit * tolerance) for value, limit in zip(own, ATOM_LIMITS, strict=True))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,12 +109,11 @@ class Judge:
     def __call__(self, motions: Iterable[Isometry], *, stride: int = 1) -> Verdict:
         """Verdict on one or several operations together (the worst of each statistic)."""
         motions = tuple(motions)
-        found = [_summary(miss_distances(self.cloud, m, stride=stride) / self.diagonal) for m in motions]
+        found = [Deviation.of(miss_distances(self.cloud, m, stride=stride) / self.diagonal) for m in motions]
         worst = reduce(Deviation.at_least, found)
         ratios = worst.over_limits(self.tolerance, self.floor)
         if self.cloud.body == "atoms":
-            own = (worst.mean, worst.p95, worst.max)
-            ratios = tuple(value / (limit * self.tolerance) for value, limit in zip(own, ATOM_LIMITS, strict=True))
+            ratios = worst.over_atom_limits(self.tolerance)
         if self.cloud.body == "volume":
             # Of a volume the nearest points tell the outline only; how the mass spreads tells the rest.
             spread = max(spread_distance(self.cloud.points, m) for m in motions) / self.diagonal
@@ -124,10 +135,10 @@ def make_judge(cloud: LocalPlanes, diagonal: float, tolerance: float, floor: Dev
     if floor is not None:
         return Judge(cloud=cloud, diagonal=diagonal, tolerance=tolerance, floor=floor)
     if cloud.body == "atoms":
-        return Judge(cloud=cloud, diagonal=diagonal, tolerance=tolerance, floor=_summary(np.zeros(1)))
+        return Judge(cloud=cloud, diagonal=diagonal, tolerance=tolerance, floor=Deviation.of(np.zeros(1)))
     some = slice(None, None, max(1, len(cloud.points) // OWN))
     own = disc_distances(cloud, cloud.points[some], cloud.classes(some), skip_self=True) / diagonal
-    return Judge(cloud=cloud, diagonal=diagonal, tolerance=tolerance, floor=_summary(own))
+    return Judge(cloud=cloud, diagonal=diagonal, tolerance=tolerance, floor=Deviation.of(own))
 
 
 def split_floor(one: LocalPlanes, other: LocalPlanes, diagonal: float) -> Deviation:
@@ -137,7 +148,7 @@ def split_floor(one: LocalPlanes, other: LocalPlanes, diagonal: float) -> Deviat
     says less than independent points would show; halves say more than the whole would, by their wider spacing.
     """
     across = [disc_distances(a, b.points, b.labels) for a, b in ((one, other), (other, one))]
-    return _summary(HALF_SPACING * np.concatenate(across) / diagonal)
+    return Deviation.of(HALF_SPACING * np.concatenate(across) / diagonal)
 
 
 def miss_distances(cloud: LocalPlanes, motion: Isometry, *, stride: int = 1) -> Array:
@@ -179,12 +190,6 @@ def spread_distance(points: Array, motion: Isometry) -> float:
     root = (vectors * np.sqrt(np.clip(values, 0.0, None))) @ vectors.T
     common = np.sqrt(np.clip(np.linalg.eigvalsh(root @ moved @ root), 0.0, None)).sum()
     return float(np.sqrt(max(2.0 * (np.trace(own) - common), 0.0)))
-
-
-def _summary(distances: Array) -> Deviation:
-    p80, p95, p97, p99, p994 = (float(q) for q in np.quantile(distances, [0.8, 0.95, 0.97, 0.99, 0.994]))
-    mean, largest = float(distances.mean()), float(distances.max())
-    return Deviation(mean=mean, p80=p80, p95=p95, p97=p97, p99=p99, p994=p994, max=largest)
 
 
 def confidence(excess: float) -> float:
