@@ -139,7 +139,8 @@ def _model(met: _Met, start: Similarity, at: Array, prior: Array, scale: float) 
     """Robust cost over the pairs, in units of their variance at a motion, and of what is known beforehand."""
     first = met.errors(start.moved(at)) ** 2
     weights = met.worth * geman_mcclure(first, scale)
-    variance = max(met.redundancy * float(weights @ first) / float(weights.sum()), float(np.finfo(float).eps))
+    squares = float(weights @ first) / (met.each * float(weights.sum()))
+    variance = max(met.redundancy * squares, float(np.finfo(float).eps))
 
     def linearise(x: Array) -> Linearisation:
         motion = start.moved(x)
@@ -176,6 +177,6 @@ def _step(linearise: Callable[[Array], Linearisation], at: Array) -> tuple[Array
         full = linearise(at + basis @ y)
         return replace(full, gradient=basis.T @ full.gradient, hessian=basis.T @ full.hessian @ basis)
 
-    found = minimise(within, np.zeros(basis.shape[1]))
+    found = minimise(within, np.zeros(basis.shape[1]), tolerance=SETTLED)
     sigmas = float(np.sqrt(found.x @ found.hessian @ found.x / max(1, len(found.x))))
     return basis @ found.x, basis @ np.linalg.inv(found.hessian) @ basis.T, sigmas
