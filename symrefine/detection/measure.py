@@ -11,7 +11,7 @@ from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import TupleClass, classify
 from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
-from symrefine.surface.misses import summary
+from symrefine.surface.misses import Deviation
 from symrefine.surface.noise import noise_distances
 from symrefine.surface.skin import LocalPlanes, fills_volume, isolated_points, local_planes
 from symrefine.surface.surface import Surface
@@ -181,7 +181,7 @@ def _surface(
 
     diagonal = tight_diagonal(cloud.points)
     noise = noise_distances(len(local), half, rng)
-    return Surface(cloud=cloud, diagonal=diagonal, noise=summary(noise / diagonal))
+    return Surface(cloud=cloud, diagonal=diagonal, noise=Deviation.of(noise / diagonal))
 
 
 def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Surface:
@@ -193,7 +193,7 @@ def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Su
 
     diagonal = tight_diagonal(points)
     noise = noise_distances(len(points), some_of, rng)
-    return Surface(cloud=some_of(np.arange(len(points))), diagonal=diagonal, noise=summary(noise / diagonal))
+    return Surface(cloud=some_of(np.arange(len(points))), diagonal=diagonal, noise=Deviation.of(noise / diagonal))
 
 
 def _cloud(
