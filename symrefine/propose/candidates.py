@@ -49,7 +49,7 @@ class Evidence:
 
 
 def proposals(evidence: Evidence) -> Iterator[list[Placed]]:
-    """All that the moments propose, in rounds: about the likeliest axes, mirrors and the inversion, about other axes."""
+    """All that the moments propose, in rounds: about the likeliest axes, mirrors and inversion, about other axes."""
     likely = apart(np.concatenate([evidence.tuples.directions[:1], _principal(evidence)]))
     for direction in likely:
         yield about(evidence, direction)
