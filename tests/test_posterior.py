@@ -1,0 +1,102 @@
+"""How sure the groups of a chain are: laws of probability, of order, and of what a tolerance forgives."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from symrefine.decide.posterior import Link, decide, meant
+
+NEED = st.floats(0.0, 0.5)
+TOLERANCE = st.floats(1e-3, 0.2)
+LINK = st.builds(Link, need=NEED, lone_mirror=st.booleans())
+# Each group lies in the next, so it needs no more; a lone mirror can only be the first.
+CHAIN = st.tuples(st.lists(NEED, max_size=6), st.booleans()).map(
+    lambda c: [Link(need=n, lone_mirror=c[1] and i == 0) for i, n in enumerate(sorted(c[0]))]
+)
+
+
+@given(CHAIN, TOLERANCE)
+def test_the_groups_of_a_chain_share_one_probability(links, tolerance):
+    found = decide(links, tolerance)
+    assert len(found.probabilities) == len(found.inside) == len(links) + 1
+    assert math.fsum(found.probabilities) == pytest.approx(1.0)
+    assert min(found.probabilities) >= 0.0
+
+
+@given(CHAIN, TOLERANCE)
+def test_a_larger_group_is_never_surer_to_be_inside(links, tolerance):
+    found = decide(links, tolerance)
+    assert found.inside[0] == 1.0
+    assert list(found.inside) == sorted(found.inside, reverse=True)
+    beyond = math.fsum(found.probabilities[found.index :])
+    assert beyond == pytest.approx(found.inside[found.index])
+
+
+@given(CHAIN, TOLERANCE)
+def test_the_decision_is_the_likeliest_group(links, tolerance):
+    found = decide(links, tolerance)
+    assert found.probabilities[found.index] == max(found.probabilities)
+
+
+@given(TOLERANCE)
+def test_without_links_there_is_no_symmetry_for_certain(tolerance):
+    found = decide([], tolerance)
+    assert (found.index, found.probabilities, found.inside) == (0, (1.0,), (1.0,))
+
+
+@given(st.lists(st.just(Link(need=0.0)), min_size=1, max_size=5), TOLERANCE)
+def test_what_needs_nothing_is_certain(links, tolerance):
+    found = decide(links, tolerance)
+    assert found.index == len(links)
+    assert found.probabilities[-1] == 1.0
+
+
+@given(NEED, NEED, st.booleans(), TOLERANCE, TOLERANCE)
+def test_more_need_is_less_meant_and_more_tolerance_more(a, b, lone, s, t):
+    few, much = (Link(need=n, lone_mirror=lone) for n in sorted((a, b)))
+    strict, loose = sorted((s, t))
+    assert meant(few, strict) >= meant(much, strict)
+    assert meant(much, loose) >= meant(much, strict)
+    assert 0.0 <= meant(much, strict) <= 1.0
+
+
+@given(NEED, TOLERANCE)
+def test_a_lone_mirror_is_forgiven_no_less(need, tolerance):
+    assert meant(Link(need=need, lone_mirror=True), tolerance) >= meant(Link(need=need), tolerance)
+
+
+@pytest.mark.parametrize("lone", [False, True])
+def test_a_quarter_of_the_tolerance_is_forgiven_and_four_times_it_is_not(lone):
+    """Whatever the constants: otherwise the tolerance would not mean what it says."""
+    assert meant(Link(need=0.005, lone_mirror=lone), 0.02) > 0.5 > meant(Link(need=0.08, lone_mirror=lone), 0.02)
+
+
+@given(CHAIN, TOLERANCE, st.sampled_from([0.25, 3.0]))
+def test_only_needs_over_tolerances_count(links, tolerance, unit):
+    found = decide(links, tolerance)
+    scaled = [Link(need=unit * link.need, lone_mirror=link.lone_mirror) for link in links]
+    again = decide(scaled, unit * tolerance)
+    assert again.probabilities == pytest.approx(found.probabilities, abs=1e-9)
+
+
+@given(CHAIN, TOLERANCE, TOLERANCE)
+def test_a_larger_tolerance_makes_every_group_likelier_inside(links, s, t):
+    strict, loose = (decide(links, x) for x in sorted((s, t)))
+    assert all(b >= a for a, b in zip(strict.inside, loose.inside, strict=True))
+
+
+@given(CHAIN, TOLERANCE, TOLERANCE)
+def test_a_larger_tolerance_never_decides_for_a_smaller_group(links, s, t):
+    strict, loose = (decide(links, x).index for x in sorted((s, t)))
+    assert strict <= loose
+
+
+@given(CHAIN, NEED, TOLERANCE)
+def test_a_group_that_needs_too_much_changes_nothing_below_it(links, need, tolerance):
+    """A further link takes its probability from the last group alone."""
+    last = Link(need=max([need, *(link.need for link in links)]))
+    without, along = decide(links, tolerance), decide([*links, last], tolerance)
+    assert along.probabilities[: len(links)] == without.probabilities[:-1]
+    assert along.inside[:-1] == without.inside

@@ -1,0 +1,429 @@
+"""The surface as a judge: distances to discs, what an operation needs to be forgiven, what noise alone shows."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from experiments.objects.shapes import bottle, box, join, mug, sample, stool, table
+from symrefine.geometry import Isometry, Plane, householder, random_orthogonal, rotation, tight_diagonal
+from symrefine.moments.moments import shape_moments
+from symrefine.moments.quadrature import sample_surface
+from symrefine.surface.misses import (
+    ATOM_LIMITS,
+    LIMITS,
+    TOLERANCE,
+    Deviation,
+    disc_distances,
+    miss_distances,
+    spread_distance,
+    summary,
+)
+from symrefine.surface.noise import noise_distances
+from symrefine.surface.skin import isolated_points, local_planes
+from symrefine.surface.surface import NOTHING, Surface
+
+Z = np.array([0.0, 0, 1])
+
+
+def surface_of(shape, noise=0.0, *, count=4000, seed=0):
+    """The surface of a sample about the shape's true centroid, turned by nothing, with what noise alone shows."""
+    rng = np.random.default_rng(seed)
+    moments = shape_moments(shape, 2)
+    points = (sample(shape, count, noise, rng) - moments.center) / moments.scale
+    cloud = local_planes(points, count // 2, rng)
+    diagonal = tight_diagonal(cloud.points)
+    own = noise_distances(points, None, lambda p, c: local_planes(p, count // 4, rng, labels=c), rng)
+    return Surface(cloud=cloud, diagonal=diagonal, noise=summary(own / diagonal))
+
+
+def sheet(count=900, seed=1):
+    """A flat square grid in z = 0 with exact normals, spacing 1/15."""
+    side = int(np.sqrt(count))
+    x, y = np.meshgrid(np.linspace(-1, 1, side), np.linspace(-1, 1, side))
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(side * side)])
+    normals = np.broadcast_to(Z, points.shape)
+    return local_planes(points, len(points), np.random.default_rng(seed), normals=normals, exact=True)
+
+
+def about(matrix):
+    return Isometry.about(np.zeros(3), matrix)
+
+
+def mirror(angle):
+    """Reflection across the plane through the z axis at an angle from the x axis."""
+    return about(householder([-np.sin(angle), np.cos(angle), 0]))
+
+
+# Distances
+
+
+@pytest.mark.parametrize("height", [0.0, 1e-7, 0.01, -0.03])
+def test_above_a_flat_surface_the_distance_is_the_height(height):
+    rng = np.random.default_rng(2)
+    queries = np.column_stack([rng.uniform(-0.9, 0.9, (200, 2)), np.full(200, height)])
+    np.testing.assert_allclose(disc_distances(sheet(), queries), abs(height), atol=1e-12)
+
+
+def test_beside_a_surface_the_distance_grows_to_that_of_its_nearest_point():
+    cloud = sheet()
+    beside = np.array([[1.0 + d, 0.0, 0.0] for d in (0.0, 0.2, 0.5, 2.0)])
+    found = disc_distances(cloud, beside)
+    nearest = np.linalg.norm(beside[:, None] - cloud.points, axis=2).min(axis=1)
+    assert np.all(np.diff(found) > 0)
+    np.testing.assert_allclose(found[2:], nearest[2:], rtol=1e-9)
+    assert np.all(found <= nearest + 1e-12)
+
+
+def test_distances_never_exceed_that_of_the_nearest_centre():
+    cloud, rng = surface_of(mug()).cloud, np.random.default_rng(3)
+    queries = rng.uniform(-2, 2, (500, 3))
+    nearest = cloud.tree.query(queries)[0]
+    found = disc_distances(cloud, queries)
+    assert found.min() >= 0
+    assert np.all(found <= nearest + 1e-9)
+
+
+def test_a_point_is_not_compared_with_its_own_disc():
+    cloud = sheet()
+    lifted = cloud.points.copy()
+    lifted[450, 2] = 0.3
+    bumpy = local_planes(lifted, len(lifted), np.random.default_rng(4), normals=cloud.normals, exact=True)
+    with_self, without = (disc_distances(bumpy, bumpy.points, skip_self=s)[450] for s in (False, True))
+    assert with_self == pytest.approx(0.0, abs=1e-12)
+    assert without == pytest.approx(0.3, rel=0.05)
+
+
+@pytest.mark.parametrize("det", [1, -1])
+def test_distances_do_not_depend_on_the_pose(det):
+    rng = np.random.default_rng(5)
+    points, normals, _ = sample_surface(mug(), 1500, rng)
+    matrix, queries = random_orthogonal(rng, 3, det), points + 0.02 * rng.standard_normal(points.shape)
+    clouds = [
+        local_planes(points @ r.T, 1500, np.random.default_rng(0), normals=normals @ r.T, exact=True)
+        for r in (np.eye(3), matrix)
+    ]
+    once, turned = (disc_distances(c, queries @ r.T) for c, r in zip(clouds, (np.eye(3), matrix), strict=True))
+    np.testing.assert_allclose(turned, once, atol=1e-9)
+
+
+def test_stride_takes_every_so_manieth_point():
+    cloud = surface_of(table()).cloud
+    every, third = (miss_distances(cloud, mirror(0.2), stride=s) for s in (1, 3))
+    np.testing.assert_array_equal(third, every[::3])
+
+
+# Deviations
+
+
+def test_statistics_are_ordered_and_fractions_of_the_diagonal():
+    surface = surface_of(table())
+    found = surface.deviation([mirror(0.1)])
+    assert 0 < found.mean < found.p95 <= found.p97 <= found.p99 <= found.p994 <= found.max < 1
+    distances = miss_distances(surface.cloud, mirror(0.1)) / surface.diagonal
+    assert found.mean == pytest.approx(distances.mean())
+    assert found.max == pytest.approx(distances.max())
+    for name, level in (("p80", 0.8), ("p95", 0.95), ("p97", 0.97), ("p99", 0.99), ("p994", 0.994)):
+        assert getattr(found, name) == pytest.approx(np.quantile(distances, level))
+
+
+def test_an_exact_symmetry_misses_by_nothing():
+    rng = np.random.default_rng(6)
+    half, normals, _ = sample_surface(mug(), 1500, rng)
+    flip = np.array([1.0, -1, 1])
+    points, normals = np.concatenate([half, half * flip]), np.concatenate([normals, normals * flip])
+    cloud = local_planes(points, 3000, rng, normals=normals, exact=True)
+    surface = Surface(cloud=cloud, diagonal=tight_diagonal(points))
+    assert surface.deviation([mirror(0.0)]).max < 1e-9
+    assert surface.need([mirror(0.0)]) < 1e-8
+    assert surface.need([mirror(np.pi / 3)]) > 0.01
+
+
+def test_several_operations_are_as_bad_as_the_worst_of_them_in_every_statistic():
+    surface = surface_of(table())
+    motions = [mirror(0.0), mirror(0.3), about(rotation(Z, 0.2))]
+    each = [surface.deviation([m]) for m in motions]
+    together = surface.deviation(motions)
+    for field in fields(Deviation):
+        assert getattr(together, field.name) == max(getattr(d, field.name) for d in each)
+    assert surface.need(motions) >= max(surface.need([m]) for m in motions)
+    assert surface.need(motions[:1]) < 0.5 * surface.need(motions)
+
+
+def test_a_glance_tells_about_what_all_points_do():
+    surface = surface_of(table())
+    assert surface.stride(400) == 5
+    assert surface.stride(10**9) == 1
+    few, all_of_them = (surface.need([mirror(0.3)], sources=n) for n in (400, 10**9))
+    assert 0.6 < few / all_of_them < 1.7
+
+
+# What an operation needs
+
+STATISTICS = ("mean", "p80", "p95", "p97", "p99", "p994", "max")
+LIMITED = [0, 2, 3, 4, 5]
+FLAT = local_planes(np.random.default_rng(0).random((12, 3)), 12, np.random.default_rng(0))
+SOME_ATOMS = isolated_points(np.random.default_rng(0).random((12, 3)))
+# A mean is below the 80th percentile of no distribution in particular; that is no condition of what follows.
+MISSES = st.lists(st.floats(0.0, 0.5), min_size=7, max_size=7).map(np.sort)
+
+
+def deviation_of(values):
+    return Deviation(**dict(zip(STATISTICS, map(float, values), strict=True)))
+
+
+def judge(noise=None, cloud=FLAT):
+    return Surface(cloud=cloud, diagonal=1.0, noise=NOTHING if noise is None else deviation_of(noise))
+
+
+@given(MISSES, MISSES, MISSES)
+def test_more_miss_needs_more_and_more_noise_less(miss, other, noise):
+    worse, louder = np.maximum(miss, other), np.maximum(noise, other)
+    needed = judge(noise).needed(deviation_of(miss))
+    assert judge(noise).needed(deviation_of(worse)) >= needed
+    assert judge(louder).needed(deviation_of(miss)) <= needed
+    atoms = judge(noise, SOME_ATOMS)
+    assert atoms.needed(deviation_of(worse)) >= atoms.needed(deviation_of(miss))
+
+
+@given(MISSES, st.floats(0.0, 1.0))
+def test_a_miss_within_the_noise_needs_nothing(noise, share):
+    assert judge(noise).needed(deviation_of(share * noise)) == 0.0
+
+
+@given(MISSES, MISSES, st.sampled_from([1e-3, 0.1, 3.0]), st.floats(0.0, 0.2))
+def test_what_is_needed_is_in_the_unit_of_the_misses(miss, noise, unit, spread):
+    needed = judge(noise).needed(deviation_of(miss), spread)
+    scaled = judge(unit * noise).needed(deviation_of(unit * miss), unit * spread)
+    # The square root amplifies rounding where miss and noise are about equal.
+    assert scaled == pytest.approx(unit * needed, rel=1e-6, abs=unit * 1e-7)
+
+
+@given(MISSES, MISSES)
+def test_what_is_needed_is_the_smallest_tolerance_that_all_statistics_keep(miss, noise):
+    needed = judge(noise).needed(deviation_of(miss))
+    beyond = np.clip(miss**2 - noise**2, 0.0, None)[LIMITED]
+    slack = (needed * np.array(LIMITS)) ** 2 - beyond
+    assert slack.min() == pytest.approx(0.0, abs=1e-12)
+
+
+@given(MISSES, MISSES)
+def test_every_atom_counts_and_no_noise_excuses_it(miss, noise):
+    atoms = judge(noise, SOME_ATOMS)
+    needed = atoms.needed(deviation_of(miss))
+    assert (needed * np.array(ATOM_LIMITS) - miss[[0, 2, 6]]).min() == pytest.approx(0.0, abs=1e-12)
+    moved = miss.copy()
+    moved[6] = 1.0
+    assert atoms.needed(deviation_of(moved)) == pytest.approx(1.0 / ATOM_LIMITS[2])
+
+
+@given(MISSES, st.floats(0.0, 0.5))
+def test_spread_counts_as_a_mean_does(miss, spread):
+    plain, spread_out = judge().needed(deviation_of(miss)), judge().needed(deviation_of(miss), spread)
+    assert spread_out == pytest.approx(max(plain, spread / LIMITS[0]))
+
+
+@given(MISSES)
+def test_the_floor_is_what_a_miss_as_large_as_the_noise_needs_without_any(noise):
+    assert judge(noise).floor == pytest.approx(judge().needed(deviation_of(noise)))
+    assert judge().floor == 0.0
+
+
+def test_noise_and_miss_add_up_in_squares():
+    """A miss m under noise s shows as the root of m^2 + s^2; what is needed is that of m alone."""
+    rng = np.random.default_rng(8)
+    miss, noise = rng.uniform(0.001, 0.05, (2, 7))
+    assert judge(noise).needed(deviation_of(np.hypot(miss, noise))) == pytest.approx(judge().needed(deviation_of(miss)))
+
+
+def lifted(share, height):
+    """An exact sheet of which a share of isolated points stands higher, by a fraction of the diagonal."""
+    flat = sheet(10000)
+    raised = flat.points.copy()
+    diagonal = tight_diagonal(raised)
+    some = np.random.default_rng(9).permutation(len(raised))[: round(share * len(raised))]
+    raised[some, 2] += height * diagonal
+    cloud = local_planes(raised, len(raised), np.random.default_rng(0), normals=flat.normals, exact=True)
+    return Surface(cloud=cloud, diagonal=diagonal)
+
+
+def test_the_more_of_a_surface_stands_out_the_more_it_needs_and_specks_need_nothing():
+    needs = [lifted(share, 0.045).need([about(householder(Z))]) for share in (0.08, 0.04, 0.02, 0.008, 0.003)]
+    assert needs == sorted(needs, reverse=True)
+    assert needs[-2] > TOLERANCE > needs[-1]
+
+
+@pytest.mark.parametrize(("limit", "share"), [(1, 0.08), (2, 0.04), (3, 0.02), (4, 0.008)])
+def test_every_limit_decides_alone_about_what_it_is_there_for(limit, share):
+    """A share between two percentiles that misses by a little more, or less, than the limit of the upper one."""
+    flat = about(householder(Z))
+    for factor in (0.95, 1.05):
+        needed = lifted(share, factor * LIMITS[limit] * TOLERANCE).need([flat])
+        assert needed == pytest.approx(factor * TOLERANCE, rel=1e-2)
+
+
+@pytest.mark.parametrize("shift", [0.002, 0.006])
+def test_where_all_miss_alike_the_mean_decides(shift):
+    surface = lifted(0.0, 0.0)
+    up = Isometry(matrix=np.eye(3), shift=shift * surface.diagonal * Z)
+    assert surface.need([up]) == pytest.approx(shift / LIMITS[0], rel=1e-6)
+
+
+def test_the_spread_of_a_body_tells_turns_that_its_outline_does_not():
+    """Covariances with common axes: the distance of the roots, sqrt(2) |a - b| for a quarter turn."""
+    rng = np.random.default_rng(11)
+    points = rng.standard_normal((4000, 3))
+    points -= points.mean(axis=0)
+    points = points @ np.linalg.inv(np.linalg.cholesky(np.cov(points.T))).T * [1.0, 0.6, 0.3]
+    turn = random_orthogonal(rng)
+    for r in (np.eye(3), turn):
+        quarter, half = (about(r @ rotation(Z, a) @ r.T) for a in (np.pi / 2, np.pi))
+        assert spread_distance(points @ r.T, quarter) == pytest.approx(np.sqrt(2) * 0.4, rel=1e-9)
+        assert spread_distance(points @ r.T, half) < 1e-6
+
+
+def test_of_a_volume_the_spread_counts():
+    rng = np.random.default_rng(12)
+    points = rng.standard_normal((6000, 3)) * [1.0, 0.8, 0.8]
+    surface = Surface(cloud=isolated_points(points, body="volume"), diagonal=tight_diagonal(points))
+    quiet = Surface(
+        cloud=surface.cloud, diagonal=surface.diagonal, noise=surface.deviation([about(np.diag([-1, 1, 1]))])
+    )
+    quarter, half = ([about(rotation(Z, a))] for a in (np.pi / 2, np.pi))
+    assert quiet.need(quarter) == pytest.approx(np.sqrt(2) * 0.2 / surface.diagonal / LIMITS[0], rel=0.15)
+    assert quiet.need(quarter) > 2 * quiet.need(half)
+
+
+def test_only_the_discs_of_its_own_class_count():
+    """Two sheets of two classes, a query between: the distance to its own, however near the other is."""
+    flat = sheet()
+    points = np.concatenate([flat.points, flat.points + [0, 0, 0.5]])
+    labels, normals = np.repeat([0, 1], len(flat.points)), np.tile(Z, (2 * len(flat.points), 1))
+    cloud = local_planes(points, len(points), np.random.default_rng(0), normals=normals, labels=labels, exact=True)
+    queries = np.array([[0.1, 0.2, 0.1]] * 2)
+    np.testing.assert_allclose(disc_distances(cloud, queries, np.array([0, 1])), [0.1, 0.4], atol=1e-9)
+
+
+def test_the_only_point_of_its_class_has_nothing_to_miss():
+    flat = sheet()
+    points, labels = flat.points.copy(), np.zeros(len(flat.points), dtype=int)
+    points[17, 2], labels[17] = 1.0, 1
+    cloud = local_planes(points, len(points), np.random.default_rng(0), normals=flat.normals, labels=labels, exact=True)
+    found = disc_distances(cloud, points, labels, skip_self=True)
+    assert found[17] == 0.0
+    assert np.isfinite(found).all()
+
+
+# What noise alone shows
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.005, 0.02])
+@pytest.mark.parametrize("name", ["table", "mug"])
+def test_a_symmetric_object_misses_its_image_by_about_the_noise(name, noise):
+    """Against its image under the true mirror it shows what its halves show against one another, in every statistic."""
+    surface = surface_of({"table": table, "mug": mug}[name](), noise, seed=13)
+    shown = surface.deviation([mirror(0.0)])
+    # The edges of a clean sample are blurred by spacing, which is sqrt(2) wider in halves, and to the second order.
+    least = 0.3 if noise == 0.0 else 0.5
+    for statistic in ("mean", "p80", "p95", "p97", "p99"):
+        assert least < getattr(shown, statistic) / getattr(surface.noise, statistic) < 2.0
+    assert surface.need([mirror(0.0)]) <= max(surface.floor, 0.5 * TOLERANCE)
+
+
+def test_noise_is_measured_by_both_halves_and_grows_with_the_noise():
+    shown = []
+    for noise in (0.0, 0.01, 0.03):
+        rng = np.random.default_rng(14)
+        points = rng.standard_normal((2001, 3))
+        points = points / np.linalg.norm(points, axis=1, keepdims=True) + noise * rng.standard_normal((2001, 3))
+        distances = noise_distances(points, None, lambda p, _, r=rng: local_planes(p, len(p), r), rng)
+        assert distances.shape == (2001,)
+        assert distances.min() >= 0.0
+        shown.append(np.quantile(distances, 0.95))
+    assert shown == sorted(shown)
+    assert shown[2] > 2 * shown[0] > 0
+
+
+@pytest.mark.parametrize("noise", [0.01, 0.03])
+def test_noise_is_what_another_sample_would_miss_by(noise):
+    """Another sample as dense as the whole misses it by about what the halves promise."""
+    rng = np.random.default_rng(10)
+    points, another = (p / np.linalg.norm(p, axis=1, keepdims=True) for p in rng.standard_normal((2, 1600, 3)))
+    points, another = (p + noise * rng.standard_normal(p.shape) for p in (points, another))
+    whole, other = (local_planes(p, len(p), rng) for p in (points, another))
+    promised = noise_distances(points, None, lambda p, _: local_planes(p, len(p), rng), rng)
+    found = disc_distances(whole, other.points)
+    # Both are estimates: neighbouring planes of one sample share their points, those of two samples do not.
+    assert 0.6 < promised.mean() / found.mean() < 1.6
+    assert 0.6 < np.quantile(promised, 0.95) / np.quantile(found, 0.95) < 1.6
+
+
+def test_noise_is_measured_class_by_class():
+    """Two sheets of two classes: halves of a class meet that class alone, however near the other is."""
+    rng = np.random.default_rng(15)
+    points = np.column_stack([rng.uniform(-1, 1, (2000, 2)), np.zeros(2000)])
+    labels = np.repeat([0, 1], 1000)
+    points[labels == 1, 0] += 4.0
+    made = []
+
+    def planes(p, c):
+        made.append((p, c))
+        return local_planes(p, len(p), rng, labels=c)
+
+    # Random edges overlap by less than a disc.
+    assert np.quantile(noise_distances(points, labels, planes, rng), 0.9) < 1e-9
+    for p, c in made:
+        np.testing.assert_array_equal(c == 1, p[:, 0] > 2)
+    assert sorted(len(p) for p, _ in made) == [1000, 1000]
+
+
+# True and false elements
+
+TRUE = {
+    "table": (table(), [mirror(k * np.pi / 4) for k in range(4)] + [about(rotation(Z, np.pi / 2))]),
+    "stool": (stool(5), [mirror(k * np.pi / 5) for k in range(5)] + [about(rotation(Z, 2 * np.pi / 5))]),
+    "mug": (mug(), [mirror(0.0)]),
+    "bottle": (bottle(), [mirror(0.7), about(rotation(Z, 1.0))]),
+    "box": (
+        join([box((0, 0, 0), (1, 0.7, 0.4))]),
+        [about(np.diag(s)) for s in ([-1, 1, 1], [1, -1, -1], [-1, -1, -1])],
+    ),
+}
+FALSE = {
+    "table": (table(), [mirror(np.pi / 8), about(rotation(Z, np.pi / 3)), about(householder(Z))]),
+    "stool": (stool(5), [mirror(np.pi / 10), about(rotation(Z, np.pi / 5)), about(rotation(Z, np.pi / 2))]),
+    # All of them leave the body, nine tenths of the mug, as it is.
+    "mug": (mug(), [mirror(np.radians(a)) for a in (20, 45, 90, 135, 160)] + [about(rotation(Z, 1.0))]),
+    "bottle": (bottle(), [about(householder(Z)), about(rotation([1, 0, 0], np.pi))]),
+    "box": (join([box((0, 0, 0), (1, 0.7, 0.4))]), [mirror(np.pi / 4), about(rotation(Z, np.pi / 2))]),
+}
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("name", TRUE)
+def test_true_elements_need_less_than_false_ones(name, noise):
+    shape, true = TRUE[name]
+    surface = surface_of(shape, noise, count=6000)
+    held, missed = ([surface.need([m]) for m in motions] for motions in (true, FALSE[name][1]))
+    assert max(held) < 0.5 * min(missed)
+    assert surface.need(true) < 0.6 * TOLERANCE < 1.2 * TOLERANCE < min(missed)
+
+
+def test_the_need_of_a_wrong_plane_grows_with_its_angle_and_offset():
+    surface = surface_of(mug())
+    angles = [surface.need([mirror(np.radians(a))]) for a in (0, 3, 6, 12)]
+    assert angles == sorted(angles)
+    off = [surface.need([Isometry.reflection(Plane(normal=[0, 1, 0], offset=d))]) for d in (0, 0.05, 0.1, 0.2)]
+    assert off == sorted(off)
+
+
+def test_one_atom_out_of_place_breaks_the_symmetry():
+    rng = np.random.default_rng(7)
+    half = rng.standard_normal((60, 3))
+    atoms = np.concatenate([half, half * [1, -1, 1]])
+    for moved, holds in ((0.0, True), (2.0, False)):
+        atoms[0, 1] += moved
+        surface = Surface(cloud=isolated_points(atoms), diagonal=tight_diagonal(atoms))
+        assert (surface.need([mirror(0.0)]) <= TOLERANCE) == holds
