@@ -11,7 +11,6 @@ import numpy as np
 from symrefine.align.story import Alignment
 from symrefine.detection.result import Detection, FoundAxis, FoundPlane, NearMiss
 from symrefine.geometry import Array, Plane
-from symrefine.plane.judge import LineDeviation
 from symrefine.shape import Shape
 from symrefine.surface.misses import Deviation
 
@@ -208,7 +207,7 @@ def order(value: float) -> int | str:
     return "inf" if math.isinf(value) else round(value)
 
 
-def residual(deviation: Deviation | LineDeviation) -> Record:
+def residual(deviation: Deviation) -> Record:
     """The distribution of a miss, fractions of the diagonal."""
     names = ("mean", "p95", "p99", "max")
     return {name: number(getattr(deviation, name), 1.0) for name in names}

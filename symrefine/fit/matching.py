@@ -68,12 +68,13 @@ def _robust(error: Array, floor: float, robust: float) -> Array:
 
 
 def pair_equations(cloud: LocalPlanes, pairs: Pairs) -> tuple[Array, Array, Array, Array]:
-    """Sources, targets and directions [E, 3] and weights [E] of the equations `(T x - y).n = 0` that the pairs make.
+    """Sources, targets and directions [E, n] and weights [E] of the equations `(T x - y).n = 0` that the pairs make.
 
-    One for each pair of local planes, along the target's normal; three for each pair of isolated points.
+    One for each pair of local planes, along the target's normal; one along each axis for each pair of isolated points.
     """
     sources, targets = cloud.points[pairs.sources], cloud.points[pairs.targets]
     if not cloud.isolated:
         return sources, targets, cloud.normals[pairs.targets], pairs.weights
-    directions = np.tile(np.eye(3), (len(sources), 1))
-    return np.repeat(sources, 3, axis=0), np.repeat(targets, 3, axis=0), directions, np.repeat(pairs.weights, 3)
+    dim = sources.shape[1]
+    directions = np.tile(np.eye(dim), (len(sources), 1))
+    return np.repeat(sources, dim, axis=0), np.repeat(targets, dim, axis=0), directions, np.repeat(pairs.weights, dim)

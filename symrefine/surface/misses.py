@@ -47,6 +47,10 @@ class Deviation:
         """The larger of the two in every statistic."""
         return Deviation(**{f.name: max(getattr(self, f.name), getattr(other, f.name)) for f in fields(Deviation)})
 
+    def scaled(self, factor: float) -> "Deviation":
+        """Each statistic so many times as large."""
+        return Deviation(**{f.name: factor * getattr(self, f.name) for f in fields(Deviation)})
+
     @property
     def limited(self) -> tuple[float, ...]:
         """The statistics that have limits."""
