@@ -169,7 +169,9 @@ def test_what_noise_hides_is_not_decided(name: str) -> None:
     }[name]
     found = detect_planar(points)
     assert "more points" in found.undetermined
-    assert found.point_group == "C1"
+    assert found.point_group == "undetermined"
+    assert found.confidence == 0.0
+    assert found.group.name == "C1"
     assert not found.lines
     assert found.rotation is None
 
@@ -199,7 +201,7 @@ def test_too_few_pixels() -> None:
     y, x = np.mgrid[:16, :16] - 7.5
     inside = np.maximum(abs(x), abs(y)) < 4.6
     found = detect_planar(np.column_stack([x[inside], y[inside]]))
-    assert found.undetermined.startswith("the pixels could hide anything: 5 % of the outline may be off by ")
+    assert found.undetermined.startswith("the pixels could hide anything: what they leave unknown alone needs ")
 
 
 def test_same_input_same_answer() -> None:
@@ -291,7 +293,7 @@ def arrow(tmp_path: Path) -> Path:
 def test_detect_prints_a_picture(arrow: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert invoke(["detect", str(arrow), "--threshold", "otsu"]) == 0
     shown = capsys.readouterr().out
-    assert shown.startswith(f"{arrow}: D1, 1 mirror line; tolerance 2 %, confidence 0.9")
+    assert shown.startswith(f"{arrow}: D1, 1 mirror line; tolerance 2 %, confidence 1.00")
     assert "n-tuples lie on one line: a mirror line at most" in shown
     assert "v(p,p')" in shown
     assert "(8, 9)" in shown

@@ -1,4 +1,4 @@
-"""How sure detection in the plane is, and the experiment that its map from miss to confidence comes from."""
+"""How sure detection in the plane is: the experiment that holds its confidence against the truth."""
 
 from pathlib import Path
 
@@ -8,43 +8,7 @@ import pytest
 from experiments.objects.drawings import DRAWINGS
 from experiments.objects.pictures import fit
 from experiments.studies import planar_reliability as study
-from experiments.studies.planar_reliability import Case, Element
-from experiments.studies.reliability import fitted
-from symrefine.plane.judge import EVEN, STEEPNESS, confidence
-
-
-def test_confidence_falls_from_one_to_nothing() -> None:
-    misses = np.linspace(0.0, 3.0, 301)
-    sure = np.array([confidence(e) for e in misses])
-    assert sure[0] == 1.0
-    assert np.all(np.diff(sure) < 0.0)
-    assert confidence(EVEN) == pytest.approx(0.5)
-    assert confidence(EVEN * 19.0 ** (-1.0 / STEEPNESS)) == pytest.approx(0.95)
-    # What just holds is hardly ever meant so; what does not, still less.
-    assert confidence(1.0) < 0.15
-    assert confidence(float("inf")) == 0.0
-
-
-def test_the_fit_finds_the_map_that_made_the_rows() -> None:
-    rng = np.random.default_rng(0)
-    case = [Case(drawing="heart", seed=k) for k in range(4000)]
-    excess = np.exp(rng.uniform(np.log(0.02), np.log(1.0), len(case)))
-    right = rng.random(len(case)) < 1.0 / (1.0 + (excess / 0.3) ** 3.0)
-    rows = [
-        Element(case=c, kind="line", excess=float(e), claimed=True, right=bool(r))
-        for c, e, r in zip(case, excess, right, strict=True)
-    ]
-    even, steep = study.fitted_map(rows)
-    assert even == pytest.approx(0.3, rel=0.05)
-    assert steep == pytest.approx(3.0, rel=0.1)
-    # The elements of one look stand or fall together: those of a star are no more than that of a heart.
-    assert study.fitted_map([r for r in rows for _ in range(6 if r.right else 1)]) == pytest.approx((even, steep))
-
-
-def test_both_halves_have_drawings_of_all_kinds() -> None:
-    for half in (True, False):
-        groups = {d.group for name, d in DRAWINGS.items() if fitted(name) is half}
-        assert {"D1", "C2", "C4" if half else "C3"} <= groups
+from experiments.studies.planar_reliability import Case
 
 
 @pytest.mark.parametrize("name", ["heart", "letter Z", "octagon", "letter A", "pinwheel of 3"])
@@ -76,16 +40,14 @@ def test_the_hole_of_a_ring_moved_leaves_the_line_along_it() -> None:
 
 def test_elements_of_a_drawing_are_right_and_those_lost_are_not() -> None:
     whole = study.elements(Case(drawing="heart", side=128))
-    assert [(r.kind, r.right) for r in whole if r.claimed] == [("line", True)]
-    assert not any(r.right for r in whole if not r.claimed)
-    lost = study.elements(Case(drawing="heart", moved_rel=0.05, side=128, seed=3))
-    assert lost
+    assert [(r.kind, r.right) for r in whole] == [("line", True)]
+    lost = study.elements(Case(drawing="heart", moved_rel=0.01, side=128, seed=3))
     assert not any(r.right for r in lost)
     star = study.elements(Case(drawing="star", side=128))
-    assert sum(r.claimed and r.right for r in star) == 6
+    assert sum(r.right for r in star) == 6
     row = star[0].judged()
     assert (row.family, row.object, row.right) == ("whole", "star", True)
-    assert row.confidence == pytest.approx(confidence(star[0].excess))
+    assert row.confidence == star[0].confidence > 0.9
 
 
 def test_a_third_of_all_looks_is_broken() -> None:
@@ -101,8 +63,8 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkey
     assert capsys.readouterr().err.count("\n") == 1
     few = [Case(drawing=n, moved_rel=m, side=128, seed=7) for n in ("heart", "star") for m in (0.0, 0.03)]
     monkeypatch.setattr(study, "plan", lambda **_: iter(few))
-    assert study.main(["--quick", "--fit", "--figure", str(tmp_path / "plot.png")]) == 0
+    assert study.main(["--quick", "--figure", str(tmp_path / "plot.png")]) == 0
     told = capsys.readouterr().out
     assert "4 looks at 2 drawings" in told
-    assert "not fitted to" in told
+    assert "moved by 3%" in told
     assert (tmp_path / "plot.png").stat().st_size > 1000

@@ -74,12 +74,12 @@ def repeated(points: Array, fold: int) -> list[Layer]:
     return [(turned(points, 2.0 * np.pi * k / fold), 1.0) for k in range(fold)]
 
 
-def letter(text: str) -> tuple[Layer, ...]:
-    """A letter in DejaVu Sans Bold, which matplotlib brings; what lies inside another outline is a hole."""
+def letter(text: str, family: str = "DejaVu Sans", weight: str = "bold") -> tuple[Layer, ...]:
+    """A letter in a font that matplotlib brings; what lies inside another outline is a hole."""
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import TextPath
 
-    outline = TextPath((0, 0), text, size=400.0, prop=FontProperties(family="DejaVu Sans", weight="bold"))
+    outline = TextPath((0, 0), text, size=400.0, prop=FontProperties(family=family, weight=weight))
     parts = sorted((np.asarray(p) for p in outline.to_polygons()), key=lambda p: -abs(_area(p)))
     sign = np.sign(_area(parts[0]))
     middle = 0.5 * (parts[0].min(axis=0) + parts[0].max(axis=0))

@@ -1,12 +1,11 @@
 """Whether 95 % sure means 95 % right in the plane.
 
-    python -m experiments.studies.planar_reliability [--quick] [--fit] [--seed N] [--figure PATH] [--jobs N]
+    python -m experiments.studies.planar_reliability [--quick] [--seed N] [--figure PATH] [--jobs N]
 
-Mirror lines and turns claimed, and candidates turned down, of the drawings of `planar_images` and `planar_cases` in
-random poses, clean, blurred and with grain; and of the same drawings with one part moved by 1 to 5 % of the diagonal.
-An element is right if the drawing as it was made has it: a line within 3 degrees and 2 % of the diagonal, turns by
-their order. `--fit` prints the constants of `planar.judge.confidence` that suit half of the drawings best; the table
-tells that half and the other one apart.
+Mirror lines and turns claimed of the drawings of `planar_images` and `planar_cases` in random poses, clean, blurred and
+with grain; and of the same drawings with one part moved by 1 to 5 % of the diagonal. An element is right if the drawing
+as it was made has it: a line within 3 degrees and 2 % of the diagonal, turns by their order. The map from need to
+probability is that of space (`decide.posterior`), fitted to none of these pictures.
 """
 
 import argparse
@@ -22,11 +21,10 @@ from experiments.objects.drawings import DRAWINGS, Drawing, Layer
 from experiments.objects.pictures import Pose, coverage, fit, picture, random_pose
 from experiments.studies.jobs import add_jobs, in_order
 from experiments.studies.planar_images import Trial, examine
-from experiments.studies.reliability import Judged, bins, fitted, plausible, plot, summary
+from experiments.studies.reliability import Judged, bins, plausible, plot, summary
 from symrefine.errors import InputError
 from symrefine.files import check_target
 from symrefine.geometry import Array
-from symrefine.plane.judge import confidence
 
 FINISHES = ("clean", "blurred", "noisy")
 # How far a part is moved, over the diagonal, taken as twice the reach; 0 leaves the drawing as it is.
@@ -56,12 +54,11 @@ class Case:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Element:
-    """A line or turns with their miss over the limit, whether they were claimed, and whether they are there."""
+    """A line or turns that were claimed, how surely, and whether they are there."""
 
     case: Case
     kind: str
-    excess: float
-    claimed: bool
+    confidence: float
     right: bool
 
     def judged(self) -> Judged:
@@ -72,8 +69,8 @@ class Element:
             family="broken" if self.case.moved_rel else "whole",
             view=look,
             kind=self.kind,
-            claimed=self.claimed,
-            confidence=confidence(self.excess),
+            claimed=True,
+            confidence=self.confidence,
             right=self.right,
         )
 
@@ -98,7 +95,7 @@ def look(case: Case) -> Trial:
 
 
 def elements(case: Case) -> list[Element]:
-    """All that is claimed or turned down in a case; of a detection that says it is undetermined, nothing."""
+    """All that is claimed in a case; of a detection that says it is undetermined, nothing."""
     trial = look(case)
     found = trial.detection
     if found.undetermined:
@@ -115,13 +112,10 @@ def elements(case: Case) -> list[Element]:
         fold = trial.drawing.fold
         return fold == 0 or (bool(np.isfinite(order)) and fold % int(order) == 0)
 
-    rows = [("line", f.excess, True, line(f.line.normal, f.line.offset)) for f in found.lines]
+    rows = [("line", f.confidence, line(f.line.normal, f.line.offset)) for f in found.lines]
     if found.rotation is not None:
-        rows.append(("turns", found.rotation.excess, True, turns(found.rotation.order)))
-    for m in found.near_misses:
-        right = turns(m.order) if m.line is None else line(m.line.normal, m.line.offset)
-        rows.append(("turns" if m.line is None else "line", m.excess, False, right))
-    return [Element(case=case, kind=k, excess=e, claimed=c, right=bool(r)) for k, e, c, r in rows]
+        rows.append(("turns", found.rotation.confidence, turns(found.rotation.order)))
+    return [Element(case=case, kind=k, confidence=c, right=bool(r)) for k, c, r in rows]
 
 
 # --- broken drawings --------------------------------------------------------------------------------------------------
@@ -200,33 +194,12 @@ def _dense(points: Array, spacing: float) -> Array:
     return np.concatenate(pieces)
 
 
-# --- fit and report ---------------------------------------------------------------------------------------------------
-
-
-def fitted_map(rows: Sequence[Element]) -> tuple[float, float]:
-    """Constants (even, steepness) of `1 / (1 + (excess / even)^steepness)` of the greatest likelihood.
-
-    The elements of one look stand or fall together, so that each look counts as one.
-    """
-    from scipy.optimize import minimize
-
-    looks = [r.case for r in rows]
-    counts = {case: looks.count(case) for case in set(looks)}
-    weights = np.array([1.0 / counts[case] for case in looks])
-    log_excess = np.log(np.maximum([r.excess for r in rows], 1e-3))
-    right = np.array([r.right for r in rows])
-
-    def loss(x: Array) -> float:
-        wrong_odds = np.exp(x[1]) * (log_excess - x[0])
-        return float(weights @ np.logaddexp(0.0, np.where(right, wrong_odds, -wrong_odds)))
-
-    best = minimize(loss, np.array([np.log(0.5), np.log(6.0)]), method="Nelder-Mead")
-    return float(np.exp(best.x[0])), float(np.exp(best.x[1]))
+# --- report ---------------------------------------------------------------------------------------------------------
 
 
 def report(rows: Sequence[Element]) -> Iterator[str]:
-    """Confidence against truth of what is claimed, then in a line for each half of the drawings and each finish."""
-    every = [r.judged() for r in rows if r.claimed]
+    """Confidence against truth of what is claimed, then in a line for each finish and each distance."""
+    every = [r.judged() for r in rows]
     yield "confidence    elements  mean confidence %  right %  looks  right, each once %  95 % interval"
     for b in bins(every):
         low, high = plausible(b.right_each, b.looks)
@@ -239,14 +212,12 @@ def report(rows: Sequence[Element]) -> Iterator[str]:
     yield "                elements   Brier   gap %   count  right %  each once %"
     mixes = {
         "all": rows,
-        "fitted to": [r for r in rows if fitted(r.case.drawing)],
-        "not fitted to": [r for r in rows if not fitted(r.case.drawing)],
         **{finish: [r for r in rows if r.case.finish == finish] for finish in FINISHES},
         "whole": [r for r in rows if not r.case.moved_rel],
         **{f"moved by {m:.0%}": [r for r in rows if r.case.moved_rel == m] for m in MOVED if m},
     }
     for label, some in mixes.items():
-        s = summary([r.judged() for r in some if r.claimed])
+        s = summary([r.judged() for r in some])
         yield (
             f"{label:14s}  {s.count:8d}  {s.brier:.4f}  {100 * s.gap:6.2f}  {s.sure:6d}  {100 * s.sure_right:7.2f}"
             f"  {100 * s.sure_right_each:11.2f}"
@@ -257,7 +228,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Print the tables; 2 if the plot has no place to go."""
     parser = argparse.ArgumentParser(prog="python -m experiments.studies.planar_reliability")
     parser.add_argument("--quick", action="store_true", help="four drawings only")
-    parser.add_argument("--fit", action="store_true", help="print the constants that suit half of the drawings best")
     parser.add_argument("--seed", type=int, default=0, help="of poses, grain and moved parts (default: %(default)s)")
     parser.add_argument("--figure", type=Path, help="where a plot goes")
     add_jobs(parser)
@@ -271,9 +241,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     cases = list(plan(quick=args.quick, seed=args.seed))
     rows = [row for found in in_order(elements, cases, args.jobs) for row in found]
     print(f"{len(cases)} looks at {len({c.drawing for c in cases})} drawings")
-    if args.fit:
-        even, steep = fitted_map([r for r in rows if fitted(r.case.drawing)])
-        print(f"constants of the half fitted to: even at {even:.3f}, steepness {steep:.2f}")
     print("\n".join(report(rows)))
     if args.figure is not None:
         plot([r.judged() for r in rows], args.figure)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symrefine.fit.gauss_newton import Linearisation, minimise
-from symrefine.fit.matching import geman_mcclure, in_three, meet, robust_scale, worth
+from symrefine.fit.matching import each_coordinate, geman_mcclure, meet, robust_scale, worth
 from symrefine.fit.refine import SETTLED, WITHIN_NOISE
 from symrefine.fit.residual import SIZE, design_rows, gram
 from symrefine.geometry import Array, Isometry, cross_matrix, rotation
@@ -128,7 +128,7 @@ def _phi(motion: Similarity) -> Array:
 def _met(source: LocalPlanes, target: Skin | LocalPlanes, motion: Similarity, reach: float) -> _Met:
     own, met = meet(source, target, motion, reach)
     if target.isolated:
-        rows = design_rows(*in_three(own.points, met.points))
+        rows = design_rows(*each_coordinate(own.points, met.points))
         return _Met(rows=rows, worth=np.ones(len(own.points)), each=3, redundancy=1.0)
     rows = design_rows(own.points, met.points, met.normals)
     redundancy = max(source.redundancy, target.shared_by(len(rows)))

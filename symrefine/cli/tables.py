@@ -108,6 +108,8 @@ def _elements(record: Record) -> str:
 def planar_lines(record: Record) -> Iterator[Table | str]:
     """Everything a table can say about one detection in the plane."""
     yield f"{record['source']}: {planar_headline(record)}"
+    if record["alternatives"]:
+        yield f"it may also be {_alternatives(record)}"
     yield f"n-tuples {_DOUBLETS[record['ntuples']['kind']]}"
     centre = ", ".join(_length(x, record) for x in record["center"])
     yield f"centre ({centre}), diagonal {_length(record['diagonal'], record)} in units of the file"
@@ -140,6 +142,15 @@ def planar_headline(record: Record) -> str:
     turns = f", turns of order {rotation['order']}" if rotation else ""
     meaning = "round" if name == "O(2)" else lines + turns
     return f"{name}, {meaning}; {tolerance}, confidence {record['confidence']:.2f}"
+
+
+def _alternatives(record: Record) -> str:
+    """Other groups with their probabilities, and what one has to forgive to believe them."""
+    told = [
+        f"{a['point_group']} ({a['probability']:.2f}, needs a tolerance of {100 * a['forgiven']:.2g} %)"
+        for a in record["alternatives"]
+    ]
+    return ", ".join(told)
 
 
 def _planar_elements(record: Record) -> Table:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from symrefine.decide.alternatives import Alternative
 from symrefine.fit.refine import Iterate
 from symrefine.geometry import Array, Axis, Plane, read_only
 from symrefine.groups import PointGroup
@@ -49,19 +50,6 @@ class Step:
     tolerance: float
     point_group: str
     undetermined: bool
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Alternative:
-    """Another group that the object may have been meant to have.
-
-    `forgiven` is what its worst element misses by, as the smallest tolerance at which it would hold (fraction of the
-    diagonal): what one has to forgive to believe it.
-    """
-
-    point_group: str
-    probability: float
-    forgiven: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

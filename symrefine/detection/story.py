@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
+from symrefine.decide.alternatives import alternatives
 from symrefine.decide.chain import Pool, chain, explore
 from symrefine.decide.hypotheses import Element, Hypothesis
 from symrefine.decide.posterior import Decision, Link, decide
 from symrefine.detection.measure import Measured, doubt, gather, measure, part
-from symrefine.detection.result import Alternative, Detection, FoundAxis, FoundPlane, NearMiss, Step
+from symrefine.detection.result import Detection, FoundAxis, FoundPlane, NearMiss, Step
 from symrefine.errors import InputError
 from symrefine.fit.refine import Iterate
 from symrefine.geometry import Array, Axis, Plane, check_tolerance, cross_matrix
@@ -24,8 +25,8 @@ from symrefine.surface.surface import Surface
 LADDER = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08)
 # Groups that need up to so many tolerances are asked for as alternatives.
 BEYOND = 1.5
-# Candidates turned down, and alternatives, that are told of; and the least probability that is worth telling.
-NEAR, LEAST = 8, 0.01
+# Candidates turned down that are told of.
+NEAR = 8
 
 
 def detect(
@@ -141,6 +142,7 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
     reason = found.doubt(tolerance)
     index = 0 if reason else decision.index
     chosen = links[index]
+    told = alternatives([h.group.name for h in links], [h.need for h in links], decision, -1 if reason else index)
     history = chosen.history
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
     planes = [e for e in chosen.elements if e.operations.kind == "plane"]
@@ -149,7 +151,7 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
     return Detection(
         point_group="undetermined" if reason else chosen.group.name,
         confidence=0.0 if reason else decision.probabilities[index],
-        alternatives=_alternatives(links, decision, -1 if reason else index),
+        alternatives=tuple(told),
         group=chosen.group,
         center=origin + scale * chosen.placed.center,
         planes=tuple(
@@ -200,16 +202,6 @@ def _confidence(element: Element, links: Sequence[Hypothesis], decision: Decisio
         if link.elements and link.group.distance_rad(matrix)[0] < math.radians(5.0):
             return inside
     return decision.inside[decision.index]
-
-
-def _alternatives(links: Sequence[Hypothesis], decision: Decision, index: int) -> tuple[Alternative, ...]:
-    """The other groups of the chain that are worth telling, likeliest first."""
-    found = [
-        Alternative(point_group=h.group.name, probability=p, forgiven=h.need)
-        for i, (h, p) in enumerate(zip(links, decision.probabilities, strict=True))
-        if i != index and p >= LEAST
-    ]
-    return tuple(sorted(found, key=lambda a: -a.probability)[:NEAR])
 
 
 def _turned_down(pool: Pool, links: Sequence[Hypothesis], chosen: Hypothesis) -> list[Element]:

@@ -26,6 +26,14 @@ def planar_record(
         **opening(SCHEMA, shape, options),
         "point_group": d.point_group,
         "confidence": number(d.confidence),
+        "alternatives": [
+            {
+                "point_group": a.point_group,
+                "probability": number(a.probability),
+                "forgiven": number(a.forgiven),
+            }
+            for a in d.alternatives
+        ],
         "center": numbers(d.center, scale),
         "diagonal": number(d.diagonal),
         "tolerance": number(d.tolerance),
@@ -59,7 +67,7 @@ def _line(found: FoundLine, scale: float) -> Record:
 
 
 def _near_miss(miss: PlanarNearMiss, scale: float) -> Record:
-    """`excess` is the miss over what the tolerance allows, the worst of its statistics."""
+    """`excess` is the smallest tolerance at which it would hold, over the tolerance asked for."""
     nowhere = {"normal": None, "offset": None}
     return {
         "kind": "rotation" if miss.line is None else "line",

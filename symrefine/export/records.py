@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from symrefine.align.story import Alignment
-from symrefine.detection.result import Alternative, Detection, FoundAxis, FoundPlane, NearMiss
+from symrefine.decide.alternatives import Alternative
+from symrefine.detection.result import Detection, FoundAxis, FoundPlane, NearMiss
 from symrefine.geometry import Array, Plane
-from symrefine.plane.judge import LineDeviation
 from symrefine.shape import Shape
 from symrefine.surface.misses import Deviation
 
@@ -222,7 +222,7 @@ def order(value: float) -> int | str:
     return "inf" if math.isinf(value) else round(value)
 
 
-def residual(deviation: Deviation | LineDeviation) -> Record:
+def residual(deviation: Deviation) -> Record:
     """The distribution of a miss, fractions of the diagonal."""
     names = ("mean", "p95", "p99", "max")
     return {name: number(getattr(deviation, name), 1.0) for name in names}

@@ -99,16 +99,17 @@ def geman_mcclure(error2: Array, scale: float) -> Array:
 
 
 def pair_equations(cloud: LocalPlanes, pairs: Pairs) -> tuple[Array, Array, Array, Array]:
-    """Sources, targets and directions [E, 3] and weights [E] of the equations `(T x - y).n = 0` that the pairs make.
+    """Sources, targets and directions [E, n] and weights [E] of the equations `(T x - y).n = 0` that the pairs make.
 
-    One for each pair of local planes, along the target's normal; three for each pair of isolated points.
+    One for each pair of local planes, along the target's normal; one along each axis for each pair of isolated points.
     """
     sources, targets = cloud.points[pairs.sources], cloud.points[pairs.targets]
     if not cloud.isolated:
         return sources, targets, cloud.normals[pairs.targets], pairs.weights
-    return (*in_three(sources, targets), np.repeat(pairs.weights, 3))
+    return (*each_coordinate(sources, targets), np.repeat(pairs.weights, sources.shape[1]))
 
 
-def in_three(sources: Array, targets: Array) -> tuple[Array, Array, Array]:
-    """Sources, targets and directions [3P, 3] of the equations that pairs of points [P, 3] make, three for each."""
-    return np.repeat(sources, 3, axis=0), np.repeat(targets, 3, axis=0), np.tile(np.eye(3), (len(sources), 1))
+def each_coordinate(sources: Array, targets: Array) -> tuple[Array, Array, Array]:
+    """Sources, targets and directions [nP, n] of the equations that pairs of points [P, n] make, n for each."""
+    dim = sources.shape[1]
+    return np.repeat(sources, dim, axis=0), np.repeat(targets, dim, axis=0), np.tile(np.eye(dim), (len(sources), 1))

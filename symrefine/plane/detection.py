@@ -1,44 +1,37 @@
-"""Detection in the plane: shape -> moments -> doublets and angular spectrum -> candidates -> fit -> judge -> group."""
+"""Detection in the plane: shape -> outlines -> proposals -> fits -> needs -> the group, and how sure."""
 
-import math
-import time
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from symrefine.clock import Clock
+from symrefine.decide.alternatives import Alternative, alternatives
+from symrefine.decide.posterior import Decision, Link, decide
 from symrefine.errors import InputError
-from symrefine.geometry import Array, Plane, read_only
+from symrefine.geometry import Array, Plane, check_tolerance, read_only
 from symrefine.groups import PointGroup2D
-from symrefine.moments.moments import shape_moments
+from symrefine.moments.moments import Moments, shape_moments
 from symrefine.ntuples.contract import NTuples
+from symrefine.plane.chain import Element, Hypothesis, chain, explore
 from symrefine.plane.doublets import ORDER, DoubletClass, classify_doublets, planar_doublets
-from symrefine.plane.judge import LineDeviation, confidence
-from symrefine.plane.outline import Outlines, make_outlines
-from symrefine.plane.placed import Placed
-from symrefine.plane.search import Found, search, unclaimed
-from symrefine.plane.spectrum import FLOOR, angular_spectrum
+from symrefine.plane.outline import NOISES, Outlines, make_outlines
 from symrefine.shape import Shape
-from symrefine.surface.misses import TOLERANCE
+from symrefine.surface.misses import TOLERANCE, Deviation
 
-PARTS = 32
-NEAR = 8
-# What the outline may be off by, in tolerances: beyond the first, pixels are too coarse for any decision, and samples
-# beyond 1; below the second, both are as good as exact; between, a near miss may hold: of pixels one that lies within
-# the limit, of samples one that exceeds it by no more than so many times that share.
-COARSE_PIXELS, QUIET, HIDDEN = 2.5, 0.25, 1.5
+# Parts of the jackknife; groups that need up to so many tolerances are asked for as alternatives; candidates turned
+# down that are told of.
+PARTS, BEYOND, NEAR = 32, 1.5, 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FoundLine:
-    """A mirror line `normal.x = offset` in input units: its miss in fractions of the diagonal, and how sure it is.
-
-    `excess` is the miss over what the tolerance allows, at most 1.
-    """
+    """A mirror line `normal.x = offset` in input units: its miss in fractions of the diagonal, and how sure it is."""
 
     line: Plane
-    residual: LineDeviation
-    excess: float
+    residual: Deviation
     confidence: float
 
 
@@ -47,19 +40,21 @@ class FoundRotation:
     """The turns about the centre: `order` is `math.inf` for a round object; `residual` is that of the worst of them."""
 
     order: float
-    residual: LineDeviation
-    excess: float
+    residual: Deviation
     confidence: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlanarNearMiss:
-    """A line, or a turn of some order about a centre (`line` None), that was fitted and turned down."""
+    """A line, or a turn of some order about a centre (`line` None), that was fitted and turned down.
+
+    `excess` is the smallest tolerance at which it would hold, over the tolerance asked for.
+    """
 
     line: Plane | None
     center: Array
     order: float
-    residual: LineDeviation
+    residual: Deviation
     excess: float
 
 
@@ -68,8 +63,11 @@ class PlanarDetection:
     """Everything `detect_planar` found, in the frame and units of the input.
 
     Attributes:
-        point_group: "C1" when there is nothing, "D1" for one line, "Cn", "Dn", or "O(2)" for a round object.
-        group: the same with the direction of a mirror line.
+        point_group: "C1" when there is nothing, "D1" for one line, "Cn", "Dn", or "O(2)" for a round object;
+            "undetermined" where the data support no decision.
+        confidence: probability that this is the group: the worst element kept and the best turned down both count.
+        alternatives: the groups it may be instead, likeliest first.
+        group: the same with the direction of a mirror line; C1 where nothing is decided.
         center: [2] a point that all operations leave in place; on the line nearest to the centroid for D1.
         lines: mirror lines, best first; none are listed for O(2), where every line through the centre is one.
         rotation: the turns, or None where there is but the identity.
@@ -83,6 +81,8 @@ class PlanarDetection:
     """
 
     point_group: str
+    confidence: float
+    alternatives: tuple[Alternative, ...]
     group: PointGroup2D
     center: Array
     lines: tuple[FoundLine, ...]
@@ -97,14 +97,6 @@ class PlanarDetection:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", read_only(self.center))
-
-    @property
-    def confidence(self) -> float:
-        """How sure the group is: its least sure element, or for C1 that the nearest miss is one."""
-        found = [line.confidence for line in self.lines]
-        if self.rotation is not None:
-            found.append(self.rotation.confidence)
-        return min(found, default=1.0 - confidence(min((m.excess for m in self.near_misses), default=math.inf)))
 
 
 def detect_planar(
@@ -121,7 +113,7 @@ def detect_planar(
         weights: [N] masses of the points; not with a `Shape`, which carries its own. Weights count: where they differ,
             the outlines of three levels of weight must agree.
         tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal: 95 % of the
-            outline must come within it, 99 % within 1.4 of it, and the mean within 0.28 (see `verify`).
+            outline must come within 0.75 of it, 99 % within 1.6, the mean within 0.22 (see `surface.misses`).
         seed: of the random choices (subsets of large clouds).
 
     Raises:
@@ -134,115 +126,110 @@ def detect_planar(
         raise InputError("weights belong to the Shape; give them there, or give an array of points")
     if shape.dim != 2:
         raise InputError(f"{shape.source}: detect_planar takes 2-D shapes; these points have {shape.dim} coordinates")
-    if not 0.0 < tolerance <= 0.2:
-        raise InputError(f"tolerance is {tolerance}; expected a fraction of the diagonal in (0, 0.2]")
-    clock = _Clock()
-    frame = shape_moments(shape, 2)
-    rng = np.random.default_rng(seed)
-    outlines = make_outlines(shape.points, shape.weights, frame.center, frame.scale, tolerance, rng)
-    clock("outlines")
-    moments = shape_moments(shape, ORDER, parts=PARTS if outlines.sampled else 0)
-    doublets = classify_doublets(moments, tolerance, outlines.pixel_noise)
-    floor = float(np.hypot(FLOOR, outlines.pixel_noise))
-    spectrum = angular_spectrum(outlines.cells, outlines.masses, sampled=outlines.sampled, floor=floor)
-    clock("moments")
-    found = search(outlines, spectrum, None if doublets.kind == "centre" else doublets.angle_rad)
-    clock("search")
-    doubt = _doubt(outlines, found, tolerance)
-    found = _in_input_units(unclaimed(found) if doubt else found, frame.center, frame.scale)
-    return _report(found, doublets, planar_doublets(moments), outlines.diagonal * frame.scale, tolerance, doubt, clock)
+    check_tolerance(tolerance)
+    clock = Clock()
+    with clock("moments"):
+        frame = shape_moments(shape, 2)
+        outlines = make_outlines(shape.points, shape.weights, frame.center, frame.scale, np.random.default_rng(seed))
+        moments = shape_moments(shape, ORDER, parts=PARTS if outlines.sampled else 0)
+        doublets = classify_doublets(moments, tolerance, outlines.pixel_noise)
+    with clock("search"):
+        pool = explore(outlines, None if doublets.kind == "centre" else doublets.angle_rad, BEYOND * tolerance)
+        links = chain(outlines, pool, BEYOND * tolerance)
+    with clock("decide"):
+        decision, hopeless = _decided(links, tolerance)
+        reason = "" if hopeless else _doubt(outlines, tolerance)
+    return _report(links, pool, decision, reason, moments, doublets, outlines, tolerance, clock)
 
 
-class _Clock:
-    """Wall-clock seconds by stage, each told when it ends."""
+def _decided(links: Sequence[Hypothesis], tolerance: float) -> tuple[Decision, bool]:
+    """The group, as likely as it is on average over what noise may be, and whether it is C1 whatever that is."""
+    lone = [h.placed.mirrored and h.placed.fold == 1 for h in links[1:]]
+    each = [
+        decide([Link(need=h.needs[k], lone_mirror=m) for h, m in zip(links[1:], lone, strict=True)], tolerance)
+        for k in range(len(NOISES))
+    ]
+    inside = tuple(np.mean([d.inside for d in each], axis=0).tolist())
+    own = tuple(here - beyond for here, beyond in pairwise((*inside, 0.0)))
+    decision = Decision(index=own.index(max(own)), probabilities=own, inside=inside)
+    return decision, not any(d.index for d in each)
 
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self.last = time.perf_counter()
 
-    def __call__(self, stage: str) -> None:
-        now = time.perf_counter()
-        self.seconds[stage], self.last = now - self.last, now
-
-
-def _in_input_units(found: Found, origin: Array, scale: float) -> Found:
-    def moved(placed: Placed) -> Placed:
-        return replace(placed, center=origin + scale * placed.center)
-
-    return replace(
-        found,
-        placed=moved(found.placed),
-        lines=tuple(replace(c, placed=moved(c.placed)) for c in found.lines),
-        rejected=tuple(replace(c, placed=moved(c.placed)) for c in found.rejected),
+def _doubt(outlines: Outlines, tolerance: float) -> str:
+    """Why the points do not tell a symmetry from none at this tolerance, or nothing if they do."""
+    if outlines.floor <= tolerance:
+        return ""
+    what, more = ("noise", "points, less noise") if outlines.sampled else ("pixels", "pixels")
+    return (
+        f"the {what} could hide anything: what they leave unknown alone needs a tolerance of {outlines.floor:.1%} of "
+        f"the diagonal, {tolerance:.1%} is asked; give more {more}, or a larger tolerance"
     )
 
 
 def _report(
-    found: Found,
+    links: Sequence[Hypothesis],
+    pool: Sequence[Hypothesis],
+    decision: Decision,
+    reason: str,
+    moments: Moments,
     doublets: DoubletClass,
-    vectors: NTuples,
-    diagonal: float,
+    outlines: Outlines,
     tolerance: float,
-    doubt: str,
-    clock: _Clock,
+    clock: Clock,
 ) -> PlanarDetection:
-    turns = found.turns
-    rotation = None
-    if turns is not None:
-        rotation = FoundRotation(
-            order=found.placed.fold,
-            residual=turns.deviation,
-            excess=turns.excess,
-            confidence=confidence(turns.excess),
-        )
+    origin, scale = moments.center, moments.scale
+    index = 0 if reason else decision.index
+    chosen = links[index]
+    told = alternatives(
+        [h.placed.group.name for h in links], [h.need for h in links], decision, -1 if reason else index
+    )
+
+    def sure(element: Element) -> float:
+        """That the true group holds the first group of the chain which has the element."""
+        return next(p for h, p in zip(links, decision.inside, strict=True) if h.placed.holds(element.placed))
+
+    def line(element: Element) -> Plane:
+        (found,) = element.placed.lines()
+        return Plane(normal=found.normal, offset=scale * found.offset + float(found.normal @ origin))
+
+    turns = next((e for e in chosen.elements if not e.is_line), None)
     return PlanarDetection(
-        point_group=found.placed.group.name,
-        group=found.placed.group,
-        center=found.placed.center,
+        point_group="undetermined" if reason else chosen.placed.group.name,
+        confidence=0.0 if reason else decision.probabilities[index],
+        alternatives=tuple(told),
+        group=chosen.placed.group,
+        center=origin + scale * chosen.placed.center,
         lines=tuple(
-            FoundLine(
-                line=c.placed.lines()[0],
-                residual=c.verdict.deviation,
-                excess=c.verdict.excess,
-                confidence=confidence(c.verdict.excess),
-            )
-            for c in found.lines
+            FoundLine(line=line(e), residual=e.deviation, confidence=sure(e))
+            for e in sorted(chosen.elements, key=lambda e: e.need)
+            if e.is_line
         ),
-        rotation=rotation,
+        rotation=None
+        if turns is None
+        else FoundRotation(order=turns.placed.fold, residual=turns.deviation, confidence=sure(turns)),
         near_misses=tuple(
             PlanarNearMiss(
-                line=c.placed.lines()[0] if c.is_line else None,
-                center=c.placed.center,
-                order=c.placed.fold,
-                residual=c.verdict.deviation,
-                excess=c.verdict.excess,
+                line=line(e) if e.is_line else None,
+                center=origin + scale * e.placed.center,
+                order=e.placed.fold,
+                residual=e.deviation,
+                excess=e.need / tolerance,
             )
-            for c in found.rejected[:NEAR]
+            for e in _turned_down(pool, chosen)
         ),
         doublets=doublets,
-        vectors=vectors,
+        vectors=planar_doublets(moments),
         tolerance=tolerance,
-        diagonal=diagonal,
-        undetermined=doubt,
+        diagonal=outlines.diagonal * scale,
+        undetermined=reason,
         timings=clock.seconds,
     )
 
 
-def _doubt(outlines: Outlines, found: Found, tolerance: float) -> str:
-    """Why the points support no decision at this tolerance, or nothing if they do."""
-    floor = max(j.floor.p95 for j in outlines.judges)
-    share = floor / tolerance
-    more = "points or less noise" if outlines.sampled else "pixels"
-    if share > (1.0 if outlines.sampled else COARSE_PIXELS):
-        return (
-            f"the {'noise' if outlines.sampled else 'pixels'} could hide anything: 5 % of the outline may be off by "
-            f"{floor:.1%} of the diagonal or more, against a tolerance of {tolerance:.1%}; give more {more}, or a "
-            "larger tolerance"
-        )
-    nearest = min((c.verdict.excess for c in found.rejected), default=math.inf)
-    if share <= QUIET or nearest >= (1.0 + HIDDEN * share if outlines.sampled else 1.0):
-        return ""
-    return (
-        f"a near miss (by {nearest:.2f} times the limit) may be a symmetry: 5 % of the outline may be off by "
-        f"{floor:.1%} of the diagonal or more, against a tolerance of {tolerance:.1%}; give more {more}"
-    )
+def _turned_down(pool: Sequence[Hypothesis], chosen: Hypothesis) -> list[Element]:
+    """Elements that were fitted and judged and are not in the group, best first."""
+    found: list[Element] = []
+    for e in sorted((e for h in pool for e in h.elements), key=lambda e: e.need):
+        if not any(p.holds(e.placed) for p in (chosen.placed, *(o.placed for o in found if o.is_line == e.is_line))):
+            found.append(e)
+    return found[:NEAR]

@@ -1,4 +1,4 @@
-"""Cn and Dn placed in the plane, and fitted to the outlines: Gauss-Newton over centre and angle with re-matching."""
+"""Cn, Dn and O(2) placed in the plane, and fitted to the outlines: Gauss-Newton over centre and angle, re-matched."""
 
 import math
 from collections.abc import Sequence
@@ -7,23 +7,23 @@ from typing import TypeVar
 
 import numpy as np
 
-from symrefine.fit.matching import match
+from symrefine.fit.gauss_newton import Linearisation, minimise
+from symrefine.fit.matching import match, pair_equations
 from symrefine.geometry import Array, Isometry, Plane, read_only
 from symrefine.groups import PointGroup2D
 from symrefine.plane.outline import Outlines
-from symrefine.surface.skin import LocalPlanes
 
 T = TypeVar("T")
 # Turns that no finite fold below 36 shares.
 IRRATIONAL_TURNS = tuple(2.0 * math.pi * share for share in (0.0823, 0.1381966, 0.2360680, 0.4270510))
-# Operations of one kind that are judged together, and that are fitted.
-MOST, FITTED = 8, 4
-MAX_STEPS = 16
-# A step shorter than this (radians, RMS radii) ends the fit.
-SETTLED = 5e-5
-# How far the moments may put a line or a centre wrong, radians and RMS radii.
-START_ERROR = 0.1
-_QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
+# Operations of one kind that are judged together, those that are fitted, and the points that they are fitted to.
+MOST, FITTED, SOURCES = 8, 4, 1000
+# Matches at most; one that moves nothing by more than the second (radians, RMS radii) is the last.
+MATCHES, SETTLED = 16, 5e-5
+# How far what is proposed may be off, radians and RMS radii: 250 samples put the centroid wrong by 0.05.
+START_ERROR = 0.05
+# Mirror lines that are nearer than this are one.
+SAME_RAD = math.radians(3.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -51,6 +51,16 @@ class Placed:
         """Number of operations."""
         return self.group.order
 
+    def holds(self, other: "Placed") -> bool:
+        """Whether it has all operations of another group, as far as fold and angle tell."""
+        if math.isinf(self.fold):
+            return True
+        if math.isinf(other.fold) or self.fold % other.fold:
+            return False
+        period = math.pi / self.fold
+        apart = abs((self.angle_rad - other.angle_rad + 0.5 * period) % period - 0.5 * period)
+        return not other.mirrored or (self.mirrored and apart < min(SAME_RAD, 0.25 * period))
+
     def lines(self) -> tuple[Plane, ...]:
         """The mirror lines of a finite group."""
         if math.isinf(self.fold):
@@ -70,11 +80,22 @@ class Placed:
         c, s = math.cos(angle_rad), math.sin(angle_rad)
         return Isometry.about(self.center, [[c, -s], [s, c]])
 
-    def generators(self, most: int = MOST) -> tuple[Isometry, ...]:
-        """Mirrors that generate the group, or turns where it has none."""
+    def wide_turn(self) -> Isometry:
+        """A generator of the turns far from the identity, which every object nearly bears."""
+        n = int(self.fold)
+        golden = 0.5 * (3.0 - math.sqrt(5.0))
+        power = min((k for k in range(1, n) if math.gcd(k, n) == 1), key=lambda k: abs(k / n - golden))
+        return self.turn(2.0 * math.pi * power / n)
+
+    def generators(self) -> tuple[Isometry, ...]:
+        """Mirrors that generate the group, or turns where it has none; no more than are fitted."""
         if not self.mirrored or math.isinf(self.fold):
-            return _some(self.turns(), most)
-        return tuple(Isometry.reflection(line) for line in _some(self.lines(), most))
+            return _some(self.turns(), FITTED)
+        return tuple(Isometry.reflection(line) for line in _some(self.lines(), FITTED))
+
+    def moved(self, x: Array) -> "Placed":
+        """Moved by a shift and turned by an angle, x [3]."""
+        return replace(self, center=self.center + x[:2], angle_rad=self.angle_rad + float(x[2]))
 
 
 def _some(items: Sequence[T], most: int) -> tuple[T, ...]:
@@ -82,46 +103,44 @@ def _some(items: Sequence[T], most: int) -> tuple[T, ...]:
     return tuple(items[k * len(items) // most] for k in range(most)) if len(items) > most else tuple(items)
 
 
-def fitted(outlines: Outlines, start: Placed, *, steps: int = MAX_STEPS, sources: int = 1000) -> Placed:
-    """The group where the points and their images agree best, from where the moments put it."""
+def fitted(outlines: Outlines, start: Placed) -> Placed:
+    """The group where the points and their images agree best, from where it was proposed."""
     placed, error = start, START_ERROR
-    for _ in range(steps):
-        hessian, gradient = np.zeros((3, 3)), np.zeros(3)
-        for judge in outlines.judges:
-            stride = max(1, len(judge.cloud.points) // sources)
-            for motion in placed.generators(FITTED):
-                rows, errors, weights = _equations(judge.cloud, motion, placed, error, stride)
-                hessian += rows.T @ (weights[:, None] * rows)
-                gradient += rows.T @ (weights * errors)
-        size = float(np.trace(hessian))
-        if size == 0.0:
-            return placed
-        x = -np.linalg.solve(hessian + 1e-6 * size * np.eye(3), gradient)
+    for _ in range(MATCHES):
+        matched = [
+            [
+                pair_equations(s.cloud, match(s.cloud, motion, error, stride=s.stride(SOURCES)))
+                for motion in placed.generators()
+            ]
+            for s in outlines.surfaces
+        ]
+
+        def linearise(x: Array, placed: Placed = placed, matched: list[list[Equations]] = matched) -> Linearisation:
+            return _linearised(placed.moved(x), matched)
+
+        x = minimise(linearise, np.zeros(3), max_steps=1, tolerance=SETTLED).x
         length = float(np.abs(x).max())
-        x *= min(1.0, START_ERROR / max(length, 1e-300))
-        placed = replace(placed, center=placed.center + x[:2], angle_rad=placed.angle_rad + x[2])
-        error = min(START_ERROR, 4.0 * length)
+        placed, error = placed.moved(x), min(START_ERROR, 4.0 * length)
         if length < SETTLED:
             break
     return placed
 
 
-def _equations(
-    cloud: LocalPlanes, motion: Isometry, placed: Placed, error: float, stride: int
-) -> tuple[Array, Array, Array]:
-    """Rows [E, 3] by centre and angle, residuals [E] and weights [E] of `(M (x - c) + c - y).n = 0` over the pairs."""
-    pairs = match(cloud, motion, error, stride=stride)
-    sources, targets = cloud.points[pairs.sources], cloud.points[pairs.targets]
-    missed = motion.apply(sources) - targets
-    by_angle = np.zeros_like(sources)
-    if placed.mirrored and not math.isinf(placed.fold):
-        by_angle = 2.0 * motion.turn(sources - placed.center) @ _QUARTER_TURN.T
-    by_center = np.eye(2) - motion.matrix
-    if cloud.isolated:
-        rows = np.concatenate(
-            [np.column_stack([np.tile(by_center[k], (len(sources), 1)), by_angle[:, k]]) for k in (0, 1)]
-        )
-        return rows, missed.T.ravel(), np.tile(pairs.weights, 2)
-    normals = cloud.normals[pairs.targets]
-    rows = np.column_stack([normals @ by_center, np.einsum("ij,ij->i", normals, by_angle)])
-    return rows, np.einsum("ij,ij->i", normals, missed), pairs.weights
+Equations = tuple[Array, Array, Array, Array]
+
+
+def _linearised(placed: Placed, matched: Sequence[Sequence[Equations]]) -> Linearisation:
+    """Of `(M (x - c) + c - y).n = 0` over all pairs, by centre and angle."""
+    cost, gradient, hessian = 0.0, np.zeros(3), np.zeros((3, 3))
+    turning = placed.mirrored and not math.isinf(placed.fold)
+    for outline in matched:
+        for motion, (sources, targets, normals, weights) in zip(placed.generators(), outline, strict=True):
+            arm = motion.turn(sources - placed.center)
+            # A mirror line that turns by an angle turns the images by twice that, a quarter turn ahead of them.
+            by_angle = 2.0 * (normals[:, 1] * arm[:, 0] - normals[:, 0] * arm[:, 1]) * turning
+            rows = np.column_stack([normals @ (np.eye(2) - motion.matrix), by_angle])
+            errors = np.einsum("ij,ij->i", normals, motion.apply(sources) - targets)
+            cost += float(weights @ errors**2)
+            gradient += rows.T @ (weights * errors)
+            hessian += rows.T @ (weights[:, None] * rows)
+    return Linearisation(cost=cost, gradient=gradient, hessian=hessian)

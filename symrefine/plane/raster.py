@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symrefine.geometry import Array, read_only
 from symrefine.shape import Index
 
-# Points that make a grid, and the share of them that must have a neighbour one step away.
+# Points that make a grid, and the share of their weight that must have a neighbour one step away.
 FEWEST, JOINED = 64, 0.9
 # Cells of the grid for each point, at most: points rounded to a few digits stand on a grid too, an empty one.
 SPARSE = 50
@@ -61,7 +60,7 @@ def raster_of(points: Array, weights: Array | None) -> Raster | None:
     row, column, origin, step = found
     values = np.zeros((row.max() + 1, column.max() + 1))
     np.add.at(values, (row, column), 1.0 if weights is None else weights)
-    return Raster(values=values, origin=origin, step=step) if _is_joined(values > 0) else None
+    return Raster(values=values, origin=origin, step=step) if _is_joined(values) else None
 
 
 def _upright_step(points: Array) -> Array | None:
@@ -112,10 +111,10 @@ def _on_grid(points: Array, step: Array) -> tuple[Index, Index, Array, Array] | 
     return row, column, start + np.array([first.real, first.imag]), np.array([along.real, along.imag])
 
 
-def _is_joined(filled: NDArray[np.bool_]) -> bool:
-    padded = np.pad(filled, 1)
+def _is_joined(values: Array) -> bool:
+    padded = np.pad(values > 0, 1)
     beside = padded[:-2, 1:-1] | padded[2:, 1:-1] | padded[1:-1, :-2] | padded[1:-1, 2:]
-    return bool(beside[filled].mean() >= JOINED)
+    return bool(np.average(beside, weights=values) >= JOINED)
 
 
 def coarser(raster: Raster, longest: int) -> Raster:
@@ -129,6 +128,14 @@ def coarser(raster: Raster, longest: int) -> Raster:
     blocks = padded.reshape(rows, by, columns, by).mean(axis=(1, 3))
     middle = np.array(0.5 * (by - 1))
     return Raster(values=blocks, origin=raster.place(middle, middle), step=by * raster.step)
+
+
+def between(raster: Raster) -> Raster:
+    """What pixels half a step aside would show: the means of four neighbours, at the corners that they share."""
+    padded = np.pad(raster.values, 1)
+    means = 0.25 * (padded[1:, 1:] + padded[:-1, 1:] + padded[1:, :-1] + padded[:-1, :-1])
+    corner = np.array(-0.5)
+    return Raster(values=means, origin=raster.place(corner, corner), step=raster.step)
 
 
 def outlines(raster: Raster, levels: Array) -> list[Array]:

@@ -61,6 +61,10 @@ class Deviation:
         """The same of points that stand for themselves."""
         return max(v / limit for v, limit in zip((self.mean, self.p95, self.max), ATOM_LIMITS, strict=True))
 
+    def scaled(self, factor: float) -> "Deviation":
+        """Each statistic so many times as large."""
+        return Deviation(**{f.name: factor * getattr(self, f.name) for f in fields(Deviation)})
+
     @property
     def limited(self) -> tuple[float, ...]:
         """The statistics that have limits."""

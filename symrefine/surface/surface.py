@@ -1,7 +1,7 @@
 """The denoised surface as a judge: by how much an operation misses it, and what noise alone would show."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from symrefine.geometry import Isometry
 from symrefine.surface.misses import LIMITS, Deviation, miss_distances, spread_distance
@@ -19,6 +19,10 @@ class Surface:
     cloud: LocalPlanes
     diagonal: float
     noise: Deviation = NOTHING
+
+    def with_noise(self, factor: float) -> "Surface":
+        """The same surface, if noise were so many times as large."""
+        return replace(self, noise=self.noise.scaled(factor))
 
     def stride(self, sources: int) -> int:
         """Stride that leaves about `sources` local planes."""
