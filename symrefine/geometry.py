@@ -134,6 +134,17 @@ def random_orthogonal(rng: np.random.Generator, dim: int = 3, det: int = 1) -> A
     return q
 
 
+def orthogonal_factor(matrices: Array, *, proper: bool = False) -> Array:
+    """The orthogonal matrices nearest to `matrices` [..., n, n], of either determinant, or of +1 where `proper`.
+
+    With M = sum_i t_i s_i' it is the R that minimises `sum_i |t_i - R s_i|^2` (Schoenemann 1966; Kabsch 1976).
+    """
+    u, _, vt = np.linalg.svd(matrices)
+    if proper:
+        u[..., -1] *= np.sign(np.linalg.det(u @ vt))[..., None]
+    return np.asarray(u @ vt)
+
+
 def line_angle_rad(a: ArrayLike, b: ArrayLike) -> float:
     """Angle in [0, pi/2] between two unsigned directions, accurate for small angles too."""
     u, v = unit(a), unit(b)

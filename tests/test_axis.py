@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, stool, table
-from symrefine.fit.frame import _weights, polish_frame, to_polar_axis_rotation
-from symrefine.geometry import line_angle_rad, random_orthogonal, rotation, unit
+from symrefine.fit.frame import polish_frame
+from symrefine.geometry import line_angle_rad, random_orthogonal, rotation
 from symrefine.moments.harmonics import harmonic_moments
 from symrefine.moments.moments import central_moments, shape_moments
 from symrefine.moments.quadrature import sample_surface
@@ -251,11 +251,6 @@ def test_polish_improves_on_samples(shape, fold, noise):
     assert np.ptp(errors) < 0.02  # from wherever it starts it ends in the same place
 
 
-@pytest.mark.parametrize("n", [[0.36, -0.48, 0.8], [1e-7, 0, 1], [0, 0, 1], [0, 0, -1], [0, -1, 0]])
-def test_to_polar_axis_rotation_ends_at_the_pole(n):
-    np.testing.assert_allclose(to_polar_axis_rotation(unit(n)) @ unit(n), [0, 0, 1], atol=1e-15)
-
-
 def test_no_step_of_the_polish_leaves_what_a_linear_model_says():
     """From far off it goes there by small turns, each less than nine degrees."""
     harmonics = harmonic_moments(shape_moments(table(), ORDER))
@@ -264,17 +259,6 @@ def test_no_step_of_the_polish_leaves_what_a_linear_model_says():
         turned = polish_frame(harmonics, frame, 4, steps=1)
         assert np.arccos(np.clip((np.trace(turned @ frame.T) - 1) / 2, -1, 1)) < np.radians(9.0)
         frame = turned
-
-
-def test_coefficients_count_by_the_inverse_of_their_variance():
-    """Jackknife replicates of known spread; the weight of an order is one over its variance, whatever the frame."""
-    rng = np.random.default_rng(12)
-    parts, sigma = 4000, np.array([0.1, 0.01])
-    # A replicate leaves out one part of many: it deviates by the root of parts - 1 less than a sample of its own.
-    replicates = sigma[:, None] * rng.standard_normal((parts, 2, 7)) / np.sqrt(parts - 1)
-    found = _weights(np.concatenate([np.ones((1, 2, 7)), replicates]))
-    np.testing.assert_allclose(found[:, 0], sigma**-2.0, rtol=0.05)
-    np.testing.assert_array_equal(_weights(np.ones((1, 2, 7))), np.ones((2, 1)))
 
 
 def test_a_noisy_order_does_not_turn_a_precise_one():

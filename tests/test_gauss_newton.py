@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares, rosen
 
-from symrefine.fit.gauss_newton import Linearisation, minimise
+from symrefine.fit.gauss_newton import Linearisation, Linearisations, minimise, minimise_all
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -127,3 +127,64 @@ def test_the_start_is_not_touched_and_the_solution_is_read_only():
     for array in (found.x, found.hessian):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0.0
+
+
+# Many at once
+
+
+def many(residual, jacobian):
+    def linearise(x):
+        r, J = (np.array([f(row) for row in x]) for f in (residual, jacobian))
+        return Linearisations(
+            costs=(r**2).sum(axis=1), gradients=np.einsum("kri,kr->ki", J, r), hessians=J.transpose(0, 2, 1) @ J
+        )
+
+    return linearise
+
+
+@pytest.mark.parametrize(
+    ("residual", "jacobian"), [(rosenbrock, rosenbrock_jacobian), (exponential, exponential_jacobian)]
+)
+def test_each_start_ends_where_it_would_alone(residual, jacobian):
+    starts = np.array([[-1.2, 1.0], [1.0, 0.1], [0.5, 0.5], [2.0, 1.5]])
+    found = minimise_all(many(residual, jacobian), starts, max_steps=40, longest=0.5)
+    for k, start in enumerate(starts):
+        alone = minimise(problem(residual, jacobian), start, max_steps=40, longest=0.5)
+        np.testing.assert_allclose(found.x[k], alone.x, rtol=1e-12)
+        assert found.costs[k] == pytest.approx(alone.cost, rel=1e-12)
+        assert (found.steps[k], found.converged[k]) == (alone.steps, alone.converged)
+
+
+def test_no_step_is_longer_than_allowed():
+    A, b = np.eye(2), np.array([3.0, 4.0])
+    for count in range(1, 5):
+        found = minimise(linear(A, b), np.zeros(2), max_steps=count, longest=1.0)
+        np.testing.assert_allclose(found.x, count * b / 5.0, rtol=1e-9)
+        assert not found.converged
+
+
+def test_a_standstill_ends_what_a_tolerance_would_not():
+    residual, jacobian = exponential, exponential_jacobian
+    starts = np.array([[1.0, 0.1]])
+    patient = minimise_all(many(residual, jacobian), starts, max_steps=100, tolerance=1e-12)
+    hasty = minimise_all(many(residual, jacobian), starts, max_steps=100, tolerance=1e-12, standstill=1e-3)
+    assert patient.converged.all()
+    assert hasty.converged.all()
+    assert hasty.steps[0] < patient.steps[0]
+    assert hasty.costs[0] == pytest.approx(patient.costs[0], rel=1e-3)
+
+
+def test_points_that_move_on_a_circle_stay_on_it():
+    target = np.array([np.cos(2.0), np.sin(2.0)])
+
+    def turned(x, step):
+        c, s = np.cos(step[0]), np.sin(step[0])
+        return np.array([[c, -s], [s, c]]) @ x
+
+    def linearise(x):
+        r, J = x - target, np.array([[-x[1]], [x[0]]])
+        return Linearisation(cost=float(r @ r), gradient=J.T @ r, hessian=J.T @ J)
+
+    found = minimise(linearise, np.array([1.0, 0.0]), move=turned, max_steps=20)
+    assert found.converged
+    np.testing.assert_allclose(found.x, target, atol=1e-9)

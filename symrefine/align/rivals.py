@@ -11,32 +11,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.align.harmonic_fit import (
-    HarmonicFit,
-    fit,
-    hills,
-    landscape,
-    mismatch,
-    preference,
-    rotation_covariance,
-)
+from symrefine.align.landscape import hills, landscape
+from symrefine.align.moment_fit import Fits, as_good, best_fits, covariance, exact, fit, misfit, preference
 from symrefine.align.pair import Evidence, few
-from symrefine.align.polish import MAX_OUTER, Polished, Probes, Similarity, polish
-from symrefine.align.skin import Skin
+from symrefine.align.polish import MAX_OUTER, Polished, Similarity, polish
 from symrefine.geometry import Array, frame_with_z, rotation
+from symrefine.surface.skin import LocalPlanes, Skin
 
-# Hills of the landscape that are climbed, for each determinant: a few steps for all, the rest for those in sight.
+# Hills of the landscape that are climbed, for each determinant.
 HILLS = 8
-FIRST_STEPS, LAST_STEPS = 4, 8
-IN_SIGHT = 30.0
-# A map whose cost exceeds the best by this factor, and by this much per coefficient, is out; measured on 52 objects,
-# costs of true maps scatter between 0.02 and 2.5 per coefficient.
-RIVAL = 5.0
-PER_COEFFICIENT = 2.0
 # Above this cost per coefficient the moments hardly fit, and the densities may differ; above the second not at all.
 UNEVEN, MISFIT = 4.0, 20.0
-# Moments that agree to this are those of the same points.
-ROUNDING = 1e-7
 # Singular values of the n-tuples this many times beyond significance make the landscape unnecessary.
 CLEAR = 2.5
 # Standard deviations by which the moments must prefer one determinant to decide it alone.
@@ -97,59 +82,42 @@ def choose(evidence: Evidence, *, reflections: bool = True) -> Choice:
 
 
 def _choose(evidence: Evidence, reflections: bool) -> Choice:
-    fitted = candidates(evidence, (1, -1) if reflections else (1,))
-    exact = fitted.matrices[mismatch(evidence.harmonics, fitted.matrices) < ROUNDING]
-    if len(exact):
-        best = Similarity(matrix=exact[int(np.argmax(np.linalg.det(exact)))], shift=np.zeros(3))
-        return Choice(evidence=evidence, motion=best, covariance=np.zeros((3, 3)), exact=True, misfit=0.0, excess=0.0)
-    rivals, misfit = _rivals(evidence, fitted), float(fitted.costs[0]) / evidence.harmonics.size
-    covariance = _covariance(evidence, fitted, max(1.0, misfit))
-    motion, excess = Similarity(matrix=rivals.matrices[0], shift=np.zeros(3)), 0.0
-    if (len(rivals.costs) > 1 or misfit > MISFIT) and evidence.has_points:
-        judged = _judged(evidence, rivals, covariance)
-        motion, excess = judged.motion, judged.excess
-    return Choice(evidence=evidence, motion=motion, covariance=covariance, exact=False, misfit=misfit, excess=excess)
-
-
-def _rivals(evidence: Evidence, fitted: HarmonicFit) -> HarmonicFit:
-    """Fits that sampling noise cannot tell from the best; of the best one's determinant alone if that is decided."""
     pair = evidence.harmonics
-    near = fitted[fitted.costs <= fitted.costs[0] * RIVAL + PER_COEFFICIENT * pair.size]
-    signs = np.sign(np.linalg.det(near.matrices))
+    fitted = candidates(evidence, (1, -1) if reflections else (1,))
+    same = exact(pair, fitted)
+    if len(same.costs):
+        best = Similarity(matrix=same.matrices[int(np.argmax(same.signs))], shift=np.zeros(3))
+        return Choice(evidence=evidence, motion=best, covariance=np.zeros((3, 3)), exact=True, misfit=0.0, excess=0.0)
+    rivals, unlike, spread = _rivals(evidence, fitted), misfit(pair, fitted), covariance(pair, fitted)
+    motion, excess = Similarity(matrix=rivals.matrices[0], shift=np.zeros(3)), 0.0
+    if (len(rivals.costs) > 1 or unlike > MISFIT) and evidence.has_points:
+        judged = _judged(evidence, rivals, spread)
+        motion, excess = judged.motion, judged.excess
+    return Choice(evidence=evidence, motion=motion, covariance=spread, exact=False, misfit=unlike, excess=excess)
+
+
+def _rivals(evidence: Evidence, fitted: Fits) -> Fits:
+    """Fits that sampling noise cannot tell from the best; of the best one's determinant alone if that is decided."""
+    pair, near = evidence.harmonics, as_good(evidence.harmonics, fitted)
+    signs = near.signs
     mirrored = np.flatnonzero(signs != signs[0])
-    misfit = max(1.0, float(fitted.costs[0]) / pair.size)
-    if len(mirrored) and preference(pair, near.matrices[0], near.matrices[mirrored[0]]) > DECIDED * np.sqrt(misfit):
+    noise = np.sqrt(max(1.0, misfit(pair, fitted)))
+    if len(mirrored) and preference(pair, near.matrices[0], near.matrices[mirrored[0]]) > DECIDED * noise:
         return near[np.flatnonzero(signs == signs[0])]
     return near
 
 
-def candidates(evidence: Evidence, determinants: tuple[int, ...]) -> HarmonicFit:
+def candidates(evidence: Evidence, determinants: tuple[int, ...]) -> Fits:
     """Maps that explain the moments, by rising cost."""
     closed, pair = evidence.closed, evidence.harmonics
     starts = [m for m in (closed.matrix, closed.flipped) if int(np.sign(np.linalg.det(m))) in determinants]
     if closed.singular_values[1] > CLEAR * closed.significance:
-        fitted = fit(pair, np.array(starts), steps=FIRST_STEPS + LAST_STEPS)
+        fitted = fit(pair, np.array(starts))
         if fitted.costs[0] < UNEVEN * pair.size:
             return fitted
-    scores = dict(zip((1, -1), landscape(evidence.source.moments, evidence.target.moments, pair), strict=True))
+    scores = dict(zip((1, -1), landscape(evidence.source.moments, evidence.target.moments), strict=True))
     climbed = [hills(scores[d], d, count=HILLS) for d in determinants]
-    coarse = fit(pair, np.concatenate([starts, *climbed]), steps=FIRST_STEPS)
-    near = coarse[coarse.costs <= IN_SIGHT * (coarse.costs[0] + pair.size)]
-    return _distinct(fit(pair, near.matrices, steps=LAST_STEPS))
-
-
-def _distinct(fitted: HarmonicFit) -> HarmonicFit:
-    kept: list[int] = []
-    for i, m in enumerate(fitted.matrices):
-        if all(np.linalg.norm(m - fitted.matrices[k]) > 0.02 for k in kept):
-            kept.append(i)
-    return fitted[np.array(kept)]
-
-
-def _covariance(evidence: Evidence, fitted: HarmonicFit, misfit: float) -> Array:
-    """Covariance of the best fit from the jackknife and from what the moments misfit beyond their noise."""
-    inverse = np.linalg.pinv(fitted.hessians[0], rcond=1e-12, hermitian=True)
-    return misfit * (rotation_covariance(evidence.harmonics, fitted.matrices[0], fitted.hessians[0]) + inverse)
+    return best_fits(pair, np.concatenate([starts, *climbed]))
 
 
 def _start_error(covariance: Array) -> float:
@@ -163,11 +131,11 @@ class _Judged:
     excess: float
 
 
-def _judged(evidence: Evidence, rivals: HarmonicFit, covariance: Array) -> _Judged:
+def _judged(evidence: Evidence, rivals: Fits, covariance: Array) -> _Judged:
     """The rival that the points confirm best; the proper one if its mirror image does no better."""
     best: dict[int, _Judged] = {}
-    for det in _by_cost(rivals.matrices):
-        of_det = [m for m in rivals.matrices if np.linalg.det(m) * det > 0.0]
+    for det in dict.fromkeys(int(sign) for sign in rivals.signs):  # by cost
+        of_det = rivals.matrices[rivals.signs == det]
         beaten = any(b.excess <= GOOD for b in best.values())
         found = _first_good(evidence, iter(of_det[: LAST_CHANCE if beaten else JUDGED]), covariance)
         nearest = min(f.excess for f in found)
@@ -181,24 +149,19 @@ def _judged(evidence: Evidence, rivals: HarmonicFit, covariance: Array) -> _Judg
     return proper if as_good else improper
 
 
-def _by_cost(matrices: Array) -> list[int]:
-    """The determinants among matrices, in the order in which they first occur."""
-    return list(dict.fromkeys(int(s) for s in np.sign(np.linalg.det(matrices))))
-
-
 def _first_good(evidence: Evidence, matrices: Iterator[Array], covariance: Array) -> list[_Judged]:
     """Polish and judge one after the other until one is good."""
     found: list[_Judged] = []
     for m in matrices:
         start = Similarity(matrix=m, shift=np.zeros(3))
-        motion = _polish(evidence, evidence.coarse, start, covariance, LOOK_OUTER).motion
+        motion = _polish(evidence, evidence.surfaces.target, start, covariance, LOOK_OUTER).motion
         found.append(_Judged(motion=motion, excess=evidence.surfaces.excess(motion)))
         if found[-1].excess <= GOOD:
             break
     return found
 
 
-def _phases(evidence: Evidence, matrix: Array, rivals: HarmonicFit) -> Iterator[Array]:
+def _phases(evidence: Evidence, matrix: Array, rivals: Fits) -> Iterator[Array]:
     """The best turns about the axis that the moments know least about, from the azimuths of both clouds.
 
     With c_k the azimuthal coefficients about that axis, a turn by phi multiplies those of the source by exp(i k phi).
@@ -218,14 +181,14 @@ def _phases(evidence: Evidence, matrix: Array, rivals: HarmonicFit) -> Iterator[
 
 def polished(evidence: Evidence, start: Similarity, covariance: Array) -> Polished:
     """Polish on the points of the evidence from a start whose rotation the moments know with this covariance [3, 3]."""
-    return _polish(evidence, (evidence.probes, evidence.skins[1]), start, covariance, MAX_OUTER)
+    return _polish(evidence, evidence.met, start, covariance, MAX_OUTER)
 
 
 def _polish(
-    evidence: Evidence, points: tuple[Probes, Skin], start: Similarity, covariance: Array, outer: int
+    evidence: Evidence, target: Skin | LocalPlanes, start: Similarity, covariance: Array, outer: int
 ) -> Polished:
     error, known = _start_error(covariance), _information(evidence, covariance)
-    return polish(*points, start, error=error, known=known, scale=evidence.scale, outer=outer)
+    return polish(evidence.moving, target, start, error=error, known=known, scale=evidence.scale, outer=outer)
 
 
 def _information(evidence: Evidence, covariance: Array) -> Array:

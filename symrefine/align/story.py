@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from symrefine.align.alignment import OK, OPEN, Alignment
 from symrefine.align.coset import Coset, coset_of_group, coset_of_list, lifted
-from symrefine.align.moment_fit import moment_fit
+from symrefine.align.moment_fit import ROUNDING
 from symrefine.align.pair import Evidence, Side, few
 from symrefine.align.polish import Similarity
-from symrefine.align.procrustes import procrustes
-from symrefine.align.rivals import MISFIT, ROUNDING, choose, polished
+from symrefine.align.rivals import MISFIT, choose, polished
+from symrefine.align.span import span_fit
 from symrefine.clock import Clock
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
@@ -138,7 +138,7 @@ def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: boo
     evidence, motion, covariance = choice.evidence, choice.motion, choice.covariance
     if polish and not choice.exact and evidence.has_points:
         with clock("planes"):
-            _ = evidence.probes
+            _ = evidence.moving, evidence.met
         with clock("polish"):
             done = polished(evidence, motion, covariance)
             motion, covariance = done.motion, done.covariance[:3, :3]
@@ -220,7 +220,7 @@ def _align_moments(sides: tuple[Side, Side], scale: bool, reflections: bool, clo
         source, target = _within(a, bases[0][:rank]), _within(b, bases[1][:rank])
         orders = [t for t in PAPER_ORDERS if max(t) <= source.order]
         tuples = ntuples(source, orders), ntuples(target, orders)
-        found = moment_fit(source, target, tuples, procrustes(*tuples), reflections=reflections or rank < dim)
+        found = span_fit(source, target, tuples, reflections=reflections or rank < dim)
     factor = b.moments.scale / a.moments.scale if scale else 1.0
     if rank == dim:
         coset = coset_of_list(found.matrices, a.moments.center, b.moments.center, factor, found.free)

@@ -1,21 +1,13 @@
-"""A judgement of how well two surfaces meet: denoised points of one against the discs of the other."""
+"""How well two surfaces meet, by the judge's own limits: denoised points of one against the discs of the other."""
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from symrefine.align.polish import Similarity
-from symrefine.geometry import Array, tight_diagonal
-from symrefine.surface.misses import disc_distances
+from symrefine.geometry import Array, Isometry, tight_diagonal
+from symrefine.surface.misses import Deviation, disc_distances
 from symrefine.surface.skin import LocalPlanes
-
-# Two surfaces agree at tolerance t if mean, 95th, 99th and 99.5th percentile of the miss stay below these multiples of
-# t, beyond what sampling explains. Looser than for one surface and its image, as two samplings and densities meet here;
-# the bounds by which `rivals` tells maps apart were measured with them.
-LIMITS = (0.28, 1.0, 1.4, 1.75)
-# Queries that settle what a surface shows against itself.
-FLOOR_QUERIES = 400
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,36 +24,22 @@ class Surfaces:
         return tight_diagonal(self.target.points)
 
     @cached_property
-    def floor(self) -> Array:
-        """Miss [5] that sampling alone explains: each surface against itself, and what only one of the two blurs.
+    def floor(self) -> Deviation:
+        """What sampling alone explains: each surface against itself, and what only one of the two blurs.
 
         Local planes merge the two faces of a thin sheet, or follow each, as the density of the points has it.
         """
-        both = (self.source, self.target)
-        if self.target.isolated:
-            return np.zeros(5)
-        own = [disc_distances(s, s.points[:: _stride(s, FLOOR_QUERIES)], skip_self=True) for s in both]
+        own = [np.sort(disc_distances(s, s.points, skip_self=True)) for s in (self.source, self.target)]
+        quantiles = np.linspace(0.0, 1.0, len(own[0]))
+        both = own[0] + np.quantile(own[1], quantiles)
         blurred = abs(float(self.source.thickness.mean() - self.target.thickness.mean()))
-        return (np.sum([_statistics(d) for d in own], axis=0) + blurred) / self.diagonal
+        return Deviation.of((both + blurred) / self.diagonal)
 
-    def misses(self, motion: Similarity, *, queries: int = 10**9) -> Array:
+    def misses(self, motion: Isometry) -> Array:
         """Distances from the moved source to the target, fractions of the diagonal."""
-        points = self.source.points[:: _stride(self.source, queries)]
-        return disc_distances(self.target, motion.apply(points)) / self.diagonal
+        return disc_distances(self.target, motion.apply(self.source.points)) / self.diagonal
 
-    def excess(self, motion: Similarity, *, queries: int = 10**9) -> float:
-        """Largest of mean, 95th, 99th and 99.5th percentile of the miss over its limit; <= 1 if the surfaces agree.
-
-        Of isolated points every one counts.
-        """
-        own = _statistics(self.misses(motion, queries=queries))
-        limits = np.array([*LIMITS, LIMITS[-1] if self.target.isolated else np.inf])
-        return float(np.max(own / (limits * self.tolerance + self.floor)))
-
-
-def _statistics(distances: Array) -> Array:
-    return np.array([distances.mean(), *np.quantile(distances, [0.95, 0.99, 0.995, 1.0])])
-
-
-def _stride(surface: LocalPlanes, count: int) -> int:
-    return max(1, len(surface.points) // count)
+    def excess(self, motion: Isometry) -> float:
+        """The largest statistic of the miss over its limit; <= 1 if the surfaces agree. Of atoms every one counts."""
+        miss = Deviation.of(self.misses(motion))
+        return (miss.need_of_atoms if self.target.isolated else miss.need(self.floor)) / self.tolerance

@@ -18,9 +18,10 @@ from symrefine.surface.misses import Deviation
 from symrefine.surface.surface import Surface
 
 # Sources of a glance, a look, a fit, the judgement of all elements together and of each at least: what they cost.
-GLANCE, LOOK, FITTED, JUDGED, JUDGED_EACH = 120, 400, 3000, 16000, 600
-# How far the moments may put a start wrong, and directions of fitted elements (radians).
-START_ERROR, DIRECTION_ERROR = 0.1, np.radians(1.5)
+GLANCE, LOOK, FITTED, JUDGED, JUDGED_EACH = 120, 400, 3000, 12000, 600
+# How far the moments may put a start wrong (radians, RMS radii; 0.04 was the most of 698 true ones), and directions of
+# fitted elements.
+START_ERROR, DIRECTION_ERROR = 0.05, np.radians(1.5)
 # Elements nearer than this (radians) are the same.
 SAME_RAD = np.radians(4.0)
 
@@ -91,7 +92,7 @@ def fitted(surface: Surface, start: Placed, *, error: float = START_ERROR, befor
     history = tuple(refine(surface.cloud, state, start_error_rad=error, max_outer=10, stride=stride))
     placed = start.moved(history[-1].state)
     parts = elements(placed.group)
-    each = max(JUDGED_EACH, JUDGED // len(parts))
+    each = min(max(JUDGED_EACH, JUDGED // len(parts)), JUDGED // 3)
     found = tuple(_judged(surface, part, placed.center, each) for part in parts)
     return Hypothesis(placed=placed, elements=found, need=max(e.need for e in found), history=history, before=before)
 

@@ -1,8 +1,8 @@
 """How sure each group of a chain is: the only place where needs are weighed against the tolerance.
 
 The chain is ordinal: its groups lie one inside the next. `inside[i]`, the probability that the true group holds the
-i-th group, is a logistic function of what that group needs over the tolerance, so the probability that it is the i-th
-itself is `inside[i] - inside[i + 1]`: the worst element kept and the best one turned down both count.
+i-th group, is a logistic function of the logarithm of what that group needs over the tolerance, so the probability that
+it is the i-th itself is `inside[i] - inside[i + 1]`: the worst element kept and the best one turned down both count.
 """
 
 from collections.abc import Sequence
@@ -10,10 +10,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 # Of the logistic curve: the need over the tolerance at which half of the groups are meant, and how fast they become
-# fewer. Fitted to half of the objects of `experiments.studies.reliability`, checked on the other half.
-EVEN, STEEPNESS = 0.68, 8.0
+# fewer. Calibrated on intact, broken and noisy objects by `python -m experiments.studies.reliability --fit`.
+EVEN, STEEPNESS = 0.68, 6.0
 # The same of a lone mirror: bodies and devices that are meant to have just one are made less exactly than others.
 EVEN_MIRROR = 1.02
+# How much of what noise alone needs is left to doubt, once it was subtracted in squares.
+UNKNOWN = 0.7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,21 +35,23 @@ class Decision:
     inside: tuple[float, ...]
 
 
-def decide(links: Sequence[Link], tolerance: float) -> Decision:
+def decide(links: Sequence[Link], tolerance: float, noise: float = 0.0) -> Decision:
     """The likeliest group of a chain.
 
     Args:
         links: the groups beyond C1, each inside the next, needs as fractions of the diagonal.
         tolerance: largest miss that counts as symmetric.
+        noise: what noise alone would need.
     """
     inside = [1.0]
     for link in links:
-        inside.append(min(inside[-1], meant(link, tolerance)))
+        inside.append(min(inside[-1], meant(link, tolerance, noise)))
     own = [here - beyond for here, beyond in pairwise([*inside, 0.0])]
     return Decision(index=max(range(len(own)), key=own.__getitem__), probabilities=tuple(own), inside=tuple(inside))
 
 
-def meant(link: Link, tolerance: float) -> float:
-    """Probability that a group is meant, from what it needs."""
+def meant(link: Link, tolerance: float, noise: float = 0.0) -> float:
+    """Probability that a group is meant, from what it needs; noise and need add up in squares."""
     even = EVEN_MIRROR if link.lone_mirror else EVEN
-    return float(1.0 / (1.0 + (link.need / (even * tolerance)) ** STEEPNESS))
+    squares = (link.need / even) ** 2 + (UNKNOWN * noise) ** 2
+    return float(1.0 / (1.0 + (squares / tolerance**2) ** (STEEPNESS / 2.0)))

@@ -1,7 +1,6 @@
 """What is known of a shape before any symmetry is looked for: moments, n-tuples, and a surface to judge by."""
 
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -12,15 +11,16 @@ from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import TupleClass, classify
 from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
-from symrefine.surface.misses import summary
+from symrefine.surface.misses import Deviation
 from symrefine.surface.noise import noise_distances
-from symrefine.surface.skin import fills_volume, isolated_points, local_planes
+from symrefine.surface.skin import LocalPlanes, fills_volume, isolated_points, local_planes
 from symrefine.surface.surface import Surface
 
 # Order of the moments, and parts of their jackknife.
 ORDER, PARTS = 8, 16
-# Samples of a mesh, and of points of a filled cloud at most; local planes of the surface.
-SAMPLES, PLANES = 20000, 8000
+# Points of a filled cloud at most; local planes of the surface of a cloud; the same of a mesh, whose normals are known,
+# and samples they are taken of.
+SAMPLES, PLANES, EXACT_PLANES, EXACT_SAMPLES = 20000, 8000, 20000, 40000
 # Masses of atoms that differ by more than this fraction are masses of different kinds.
 SAME_MASS = 0.01
 # Variance across, as a fraction of that along, below which points lie on a line: rounding of float32.
@@ -168,22 +168,32 @@ def _surface(
     if tree is not None and normals is None and fills_volume(local, tree, np.random.default_rng(0)):
         return _volume(local, labels, rng)
     chance = None if exact or np.ptp(weights) == 0.0 else weights
-    cloud = local_planes(local, PLANES, rng, normals=normals, labels=labels, weights=chance, exact=exact, tree=tree)
+    count = EXACT_PLANES if exact else PLANES
+    cloud = local_planes(local, count, rng, normals=normals, labels=labels, weights=chance, exact=exact, tree=tree)
+
+    def half(some: Index) -> LocalPlanes:
+        # Exact normals need no neighbours, so that halves can be as dense as the whole.
+        own = normals[some] if exact and normals is not None else None
+        classes = None if labels is None else labels[some]
+        return local_planes(
+            local[some], PLANES if exact else PLANES // 4, rng, normals=own, labels=classes, exact=exact
+        )
+
     diagonal = tight_diagonal(cloud.points)
-    if exact:
-        return Surface(cloud=cloud, diagonal=diagonal)
-    noise = noise_distances(local, labels, lambda p, c: local_planes(p, PLANES // 4, rng, labels=c), rng)
-    return Surface(cloud=cloud, diagonal=diagonal, noise=summary(noise / diagonal))
+    noise = noise_distances(len(local), half, rng)
+    return Surface(cloud=cloud, diagonal=diagonal, noise=Deviation.of(noise / diagonal))
 
 
 def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Surface:
     pick = np.sort(rng.choice(len(points), min(SAMPLES, len(points)), replace=False))
     points, labels = points[pick], None if labels is None else labels[pick]
+
+    def some_of(some: Index) -> LocalPlanes:
+        return isolated_points(points[some], None if labels is None else labels[some], body="volume")
+
     diagonal = tight_diagonal(points)
-    noise = noise_distances(points, labels, partial(isolated_points, body="volume"), rng)
-    return Surface(
-        cloud=isolated_points(points, labels, body="volume"), diagonal=diagonal, noise=summary(noise / diagonal)
-    )
+    noise = noise_distances(len(points), some_of, rng)
+    return Surface(cloud=some_of(np.arange(len(points))), diagonal=diagonal, noise=Deviation.of(noise / diagonal))
 
 
 def _cloud(
@@ -191,7 +201,7 @@ def _cloud(
 ) -> tuple[Array, Array | None, Array, Index | None]:
     """Points, normals, weights and classes: samples with exact normals for a mesh, else the points themselves."""
     if shape.faces is not None:
-        points, normals, face = sample_surface(shape, SAMPLES, rng)
+        points, normals, face = sample_surface(shape, EXACT_SAMPLES, rng)
         return points, normals, np.ones(len(points)), None if classes is None else classes[face]
     weights = np.ones(len(shape.points)) if shape.weights is None else shape.weights
     return shape.points, shape.normals, weights, classes

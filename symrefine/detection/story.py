@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,22 +56,51 @@ def detect(
         InputError: not a 3-D shape, or tolerances outside (0, 0.2].
         DegenerateShapeError: the points do not spread.
     """
-    shape = _given(shape, weights, normals, labels)
+    found = examined(
+        _given(shape, weights, normals, labels), tolerance=tolerance, ladder=ladder, seed=seed, clock=(clock := Clock())
+    )
+    with clock("decide"):
+        decision = found.decided(tolerance)
+        steps = tuple(_step(found, t) for t in sorted(ladder))
+    return _report(found, decision, tolerance, steps, clock)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Examined:
+    """What a decision is made from: the table of needs as a chain of groups, each inside the next, C1 first."""
+
+    measured: Measured
+    surface: Surface
+    pool: Pool
+    links: tuple[Hypothesis, ...]
+
+    def decided(self, tolerance: float) -> Decision:
+        """The likeliest group of the chain at a tolerance."""
+        known = [Link(need=h.need, lone_mirror=h.group.name == "Cs") for h in self.links[1:]]
+        return decide(known, tolerance, self.surface.floor)
+
+    def doubt(self, tolerance: float) -> str:
+        """Why the data support no decision at a tolerance, or nothing if they do."""
+        return doubt(self.measured, self.surface, tolerance)
+
+
+def examined(
+    shape: Shape, *, tolerance: float = TOLERANCE, ladder: Sequence[float] = (), seed: int = 0, clock: Clock
+) -> Examined:
+    """Everything before the decision: what the moments propose, fitted, judged and put into a chain.
+
+    Args and errors as of `detect`.
+    """
     for t in (tolerance, *ladder):
         check_tolerance(t)
-    clock = Clock()
     with clock("moments"):
         measured = measure(shape)
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed))
-    reason = doubt(measured, surface, tolerance)
     with clock("search"):
-        pool = Pool() if reason else explore(surface, evidence, tolerance)
+        pool = Pool() if doubt(measured, surface, tolerance) else explore(surface, evidence, tolerance)
         links = chain(surface, pool, BEYOND * max((tolerance, *ladder)))
-    with clock("decide"):
-        decision = _decided(links, tolerance)
-        steps = tuple(_step(measured, surface, links, t) for t in sorted(ladder))
-    return _report(measured, surface, pool, links, decision, tolerance, reason, steps, clock)
+    return Examined(measured=measured, surface=surface, pool=pool, links=links)
 
 
 def _given(
@@ -98,29 +128,17 @@ def _elsewhere(dim: int) -> str:
     )
 
 
-def _decided(links: Sequence[Hypothesis], tolerance: float) -> Decision:
-    return decide([Link(need=h.need, lone_mirror=h.group.name == "Cs") for h in links[1:]], tolerance)
-
-
-def _step(measured: Measured, surface: Surface, links: Sequence[Hypothesis], tolerance: float) -> Step:
+def _step(found: Examined, tolerance: float) -> Step:
     """The group at another tolerance, read from the same table."""
-    undetermined = bool(doubt(measured, surface, tolerance))
-    name = "undetermined" if undetermined else links[_decided(links, tolerance).index].group.name
+    undetermined = bool(found.doubt(tolerance))
+    name = "undetermined" if undetermined else found.links[found.decided(tolerance).index].group.name
     return Step(tolerance=tolerance, point_group=name, undetermined=undetermined)
 
 
-def _report(
-    measured: Measured,
-    surface: Surface,
-    pool: Pool,
-    links: Sequence[Hypothesis],
-    decision: Decision,
-    tolerance: float,
-    reason: str,
-    steps: tuple[Step, ...],
-    clock: Clock,
-) -> Detection:
+def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[Step, ...], clock: Clock) -> Detection:
+    measured, surface, links = found.measured, found.surface, found.links
     origin, scale = measured.moments.center, measured.moments.scale
+    reason = found.doubt(tolerance)
     index = 0 if reason else decision.index
     chosen = links[index]
     history = chosen.history
@@ -159,7 +177,7 @@ def _report(
         inversion=chosen.group.has_inversion,
         inversion_residual=None if inversion is None else inversion.deviation,
         inversion_confidence=None if inversion is None else sure[id(inversion)],
-        near_misses=tuple(_near_miss(e, origin, scale, tolerance) for e in _turned_down(pool, links, chosen)),
+        near_misses=tuple(_near_miss(e, origin, scale, tolerance) for e in _turned_down(found.pool, links, chosen)),
         iterations=chosen.iterations,
         tolerance=tolerance,
         diagonal=surface.diagonal * scale,

@@ -1,9 +1,10 @@
-"""Damped Gauss-Newton on a small dense problem; it knows nothing of symmetry."""
+"""Damped Gauss-Newton on small dense problems, one or many side by side; it knows nothing of symmetry."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symrefine.geometry import Array, read_only
 
@@ -15,6 +16,23 @@ class Linearisation:
     cost: float
     gradient: Array
     hessian: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Linearisations:
+    """The same at K points: costs [K], gradients [K, n] and matrices [K, n, n]."""
+
+    costs: Array
+    gradients: Array
+    hessians: Array
+
+    def where(self, chosen: NDArray[np.bool_], other: "Linearisations") -> "Linearisations":
+        """These at the chosen points [K], the other's elsewhere."""
+        return Linearisations(
+            costs=np.where(chosen, self.costs, other.costs),
+            gradients=np.where(chosen[:, None], self.gradients, other.gradients),
+            hessians=np.where(chosen[:, None, None], self.hessians, other.hessians),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,30 +50,104 @@ class Solution:
         object.__setattr__(self, "hessian", read_only(self.hessian))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Solutions:
+    """The same for K problems: x [K, ...], costs [K], hessians [K, n, n], accepted steps [K], converged [K]."""
+
+    x: Array
+    costs: Array
+    hessians: Array
+    steps: NDArray[np.intp]
+    converged: NDArray[np.bool_]
+
+
 def minimise(
-    linearise: Callable[[Array], Linearisation], start: Array, *, max_steps: int = 6, tolerance: float = 1e-6
+    linearise: Callable[[Array], Linearisation],
+    start: Array,
+    *,
+    move: Callable[[Array, Array], Array] = np.add,
+    max_steps: int = 6,
+    tolerance: float = 1e-6,
+    longest: float = np.inf,
 ) -> Solution:
     """Minimise `r(x)'r(x)` from `start` by Gauss-Newton steps, damped (Levenberg) only when a step fails to descend.
 
     Args:
-        linearise: cost, gradient and Gauss-Newton matrix at x [n].
-        start: [n].
+        linearise: cost, gradient [n] and Gauss-Newton matrix [n, n] in small steps from x.
+        start: [n], or whatever `move` moves.
+        move: x after a step [n].
         max_steps: evaluations after the first.
         tolerance: converged once a step is shorter than this.
+        longest: steps are cut to this length.
     """
-    x, here = np.array(start, dtype=np.float64), linearise(start)
-    damping, taken = 0.0, 0
+
+    def alone(x: Array) -> Linearisations:
+        here = linearise(x[0])
+        return Linearisations(costs=np.array([here.cost]), gradients=here.gradient[None], hessians=here.hessian[None])
+
+    found = minimise_all(
+        alone,
+        np.array(start, dtype=np.float64)[None],
+        move=lambda x, step: move(x[0], step[0])[None],
+        max_steps=max_steps,
+        tolerance=tolerance,
+        longest=longest,
+    )
+    return Solution(
+        x=found.x[0],
+        cost=float(found.costs[0]),
+        hessian=found.hessians[0],
+        steps=int(found.steps[0]),
+        converged=bool(found.converged[0]),
+    )
+
+
+def minimise_all(
+    linearise: Callable[[Array], Linearisations],
+    starts: Array,
+    *,
+    move: Callable[[Array, Array], Array] = np.add,
+    max_steps: int = 6,
+    tolerance: float = 1e-6,
+    longest: float = np.inf,
+    standstill: float = 0.0,
+) -> Solutions:
+    """`minimise` from K starts [K, ...] at once; each ends where it would alone.
+
+    Args:
+        linearise: at x [K, ...].
+        starts: [K, ...].
+        move: x [K, ...] after steps [K, n].
+        max_steps: evaluations after the first.
+        tolerance: a start has converged once its step is shorter than this.
+        longest: steps are cut to this length.
+        standstill: share of its cost that a step must gain; with less a start has converged too.
+    """
+    x, here = np.array(starts, dtype=np.float64), linearise(starts)
+    damping, steps = np.zeros(len(x)), np.zeros(len(x), dtype=np.intp)
+    converged = np.zeros(len(x), dtype=np.bool_)
     for _ in range(max_steps):
-        scale = np.diag(here.hessian).max()
-        if scale <= 0.0:
-            return Solution(x=x, cost=here.cost, hessian=here.hessian, steps=taken, converged=True)
-        matrix = here.hessian + scale * max(damping, 1e-12) * np.eye(x.size)
-        step = -np.linalg.solve(matrix, here.gradient)
-        trial = linearise(x + step)
-        if trial.cost <= here.cost:
-            x, here, damping, taken = x + step, trial, damping / 10, taken + 1
-        else:
-            damping = max(10 * damping, 1e-4)
-        if np.linalg.norm(step) < tolerance:
-            return Solution(x=x, cost=here.cost, hessian=here.hessian, steps=taken, converged=True)
-    return Solution(x=x, cost=here.cost, hessian=here.hessian, steps=taken, converged=False)
+        scale = np.diagonal(here.hessians, axis1=1, axis2=2).max(axis=1, initial=0.0)
+        converged = converged | (scale <= 0.0)
+        if converged.all():
+            break
+        step = _steps(here, scale, damping)
+        length = np.linalg.norm(step, axis=1)
+        step *= np.minimum(1.0, longest / np.maximum(length, 1e-300))[:, None]
+        trial = move(x, step)
+        there = linearise(trial)
+        better = (there.costs <= here.costs) & ~converged
+        still = (length < tolerance) | (better & (here.costs - there.costs < standstill * there.costs))
+        x = np.where(better.reshape(-1, *[1] * (x.ndim - 1)), trial, x)
+        here = there.where(better, here)
+        steps += better
+        damping = np.where(better, damping / 10, np.maximum(10 * damping, 1e-4))
+        converged = converged | still
+    return Solutions(x=x, costs=here.costs, hessians=here.hessians, steps=steps, converged=converged)
+
+
+def _steps(here: Linearisations, scale: Array, damping: Array) -> Array:
+    """Damped Gauss-Newton steps [K, n]; zero where nothing changes the residual."""
+    ridge = np.where(scale > 0.0, scale * np.maximum(damping, 1e-12), 1.0)
+    damped = here.hessians + ridge[:, None, None] * np.eye(here.gradients.shape[1])
+    return -np.linalg.solve(damped, here.gradients[:, :, None])[:, :, 0]

@@ -3,16 +3,19 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symrefine.geometry import Array, Isometry
 from symrefine.shape import Index
-from symrefine.surface.skin import LocalPlanes
+from symrefine.surface.skin import LocalPlanes, Planes, Skin
 
 # Flatness at which a local plane counts for little in a residual.
 WORTH = 1.0
 # Robust scale over the median absolute residual (three standard deviations), and its bound from below in spacings.
 ROBUST = 4.4
 SCALE_FLOOR = 0.1
+# Cosine of the largest angle between the normals of a pair.
+AGREE = np.sqrt(0.5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,30 +44,58 @@ def match(
     """
     source = np.arange(0, len(cloud.points), stride)
     moved = motion.apply(cloud.points[source])
-    reach = 3.0 * (cloud.spacing + uncertainty)
+    reach = _reach(cloud.spacing, uncertainty)
     distance, target = cloud.nearest(moved, cloud.classes(source), distance_upper_bound=reach)
-    floor = max(SCALE_FLOOR * cloud.spacing, uncertainty)
     keep = np.isfinite(distance)
     if not cloud.isolated:
         travel = np.linalg.norm(moved - cloud.points[source], axis=1)
         keep &= travel > cloud.spacing
     source, target, moved = source[keep], target[keep], moved[keep]
     if cloud.isolated:
-        return Pairs(sources=source, targets=target, weights=_robust(distance[keep], floor, robust))
-    turned = motion.turn(cloud.normals[source])
-    agree = np.abs(np.einsum("ij,ij->i", turned, cloud.normals[target])) > np.sqrt(0.5)
+        scale = robust_scale(distance[keep], cloud.spacing, uncertainty, robust)
+        return Pairs(sources=source, targets=target, weights=geman_mcclure(distance[keep] ** 2, scale))
+    agree = _facing(motion.turn(cloud.normals[source]), cloud.normals[target])
     source, target, moved = source[agree], target[agree], moved[agree]
     error = np.einsum("ij,ij->i", moved - cloud.points[target], cloud.normals[target])
-    flat = np.exp(-((cloud.flatness[source] / WORTH) ** 2) - (cloud.flatness[target] / WORTH) ** 2)
-    return Pairs(sources=source, targets=target, weights=flat * _robust(error, floor, robust))
+    flat = worth(cloud.flatness[source], cloud.flatness[target])
+    scale = robust_scale(error, cloud.spacing, uncertainty, robust)
+    return Pairs(sources=source, targets=target, weights=flat * geman_mcclure(error**2, scale))
 
 
-def _robust(error: Array, floor: float, robust: float) -> Array:
-    """Geman-McClure weights [N] at a scale from the residuals [N], not below `floor`."""
-    if error.size == 0:
-        return np.empty(0)
-    scale2 = max(robust * float(np.median(np.abs(error))), floor) ** 2
-    return (scale2 / (scale2 + error**2)) ** 2
+def meet(
+    source: LocalPlanes, target: Skin | LocalPlanes, motion: Isometry, uncertainty: float
+) -> tuple[Planes, Planes]:
+    """The local planes of one object that, moved, meet planes of another by the same rules, and these planes."""
+    distance, met = target.met_by(motion.apply(source.points))
+    keep = distance < _reach(target.spacing, uncertainty)
+    if not target.isolated:
+        keep &= _facing(motion.turn(source.normals), met.normals)
+    return source.chosen(keep), met.chosen(keep)
+
+
+def _reach(spacing: float, uncertainty: float) -> float:
+    """How far apart a pair may be."""
+    return 3.0 * (spacing + uncertainty)
+
+
+def _facing(moved: Array, normals: Array) -> NDArray[np.bool_]:
+    return np.asarray(np.abs(np.einsum("ij,ij->i", moved, normals)) > AGREE)
+
+
+def worth(source: Array, target: Array) -> Array:
+    """What pairs [N] of planes count for, from the flatness of both."""
+    return np.asarray(np.exp(-((source / WORTH) ** 2) - (target / WORTH) ** 2))
+
+
+def robust_scale(error: Array, spacing: float, uncertainty: float, robust: float = ROBUST) -> float:
+    """Scale of the Geman-McClure weights from residuals [N], bounded from below."""
+    middle = float(np.median(np.abs(error))) if error.size else 0.0
+    return max(robust * middle, SCALE_FLOOR * spacing, uncertainty)
+
+
+def geman_mcclure(error2: Array, scale: float) -> Array:
+    """Weights [N] from squared residuals [N]: those with which least squares minimises `sum s^2 e^2 / (s^2 + e^2)`."""
+    return np.asarray((scale**2 / (scale**2 + error2)) ** 2)
 
 
 def pair_equations(cloud: LocalPlanes, pairs: Pairs) -> tuple[Array, Array, Array, Array]:
@@ -75,5 +106,9 @@ def pair_equations(cloud: LocalPlanes, pairs: Pairs) -> tuple[Array, Array, Arra
     sources, targets = cloud.points[pairs.sources], cloud.points[pairs.targets]
     if not cloud.isolated:
         return sources, targets, cloud.normals[pairs.targets], pairs.weights
-    directions = np.tile(np.eye(3), (len(sources), 1))
-    return np.repeat(sources, 3, axis=0), np.repeat(targets, 3, axis=0), directions, np.repeat(pairs.weights, 3)
+    return (*in_three(sources, targets), np.repeat(pairs.weights, 3))
+
+
+def in_three(sources: Array, targets: Array) -> tuple[Array, Array, Array]:
+    """Sources, targets and directions [3P, 3] of the equations that pairs of points [P, 3] make, three for each."""
+    return np.repeat(sources, 3, axis=0), np.repeat(targets, 3, axis=0), np.tile(np.eye(3), (len(sources), 1))

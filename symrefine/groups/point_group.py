@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.errors import InputError
-from symrefine.geometry import Array, read_only, unit
+from symrefine.geometry import Array, orthogonal_factor, read_only, unit
 from symrefine.groups.names import Symbol, parse
 from symrefine.groups.orthogonal import chord_angles, nearest_operations, nearest_orthogonal
 from symrefine.groups.standard import Elements, OrderedAxis, standard_elements, standard_operations
@@ -150,7 +150,7 @@ class PointGroup:
         if family == "Kh":
             return [turned]
         if family == "K":
-            return [_nearest_rotation(turned)]
+            return [orthogonal_factor(turned, proper=True)]
         parts = _ENDS.get(family, [(1, 1), (1, -1), (-1, 1), (-1, -1)])
         return [_nearest_about_z(turned, z_sign, det) for z_sign, det in parts]
 
@@ -183,13 +183,6 @@ def is_subgroup(a: PointGroup, b: PointGroup, tolerance_rad: float = _DEFAULT_TO
     if b.is_finite and not a.is_finite:
         return False
     return bool(b.distance_rad(a.sampled(7).operations()).max() <= tolerance_rad)
-
-
-def _nearest_rotation(operations: Array) -> Array:
-    """A rotation nearest to each operation [k, 3, 3]: itself, or one of many where its determinant is -1."""
-    u, _, vt = np.linalg.svd(operations)
-    u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
-    return np.asarray(u @ vt)
 
 
 def _turned(axes: Iterable[OrderedAxis], frame: Array) -> list[OrderedAxis]:

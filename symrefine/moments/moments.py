@@ -286,12 +286,20 @@ def recentred(values: Array, dim: int, order: int) -> Array:
 
 def transformed(moments: Moments, matrix: Array) -> Moments:
     """Moments of the points after x -> matrix x about the centre, in the same units; replicates are left behind."""
-    values: Array = np.empty_like(moments.values)
-    for degree in range(moments.order + 1):
-        tensor = moments.tensor(degree)
+    values = turned_values(moments.values[None], matrix[None], moments.order)[0, 0]
+    return replace(moments, values=values, replicates=np.empty((0, values.size)))
+
+
+def turned_values(values: Array, matrices: Array, order: int) -> Array:
+    """Moments [K, P, C] of P sets of moments [P, C] to `order` after x -> R x, for K matrices R [K, n, n]."""
+    dim, to_last = matrices.shape[1], matrices.transpose(0, 2, 1)[:, None]
+    out = np.empty((len(matrices), *values.shape))
+    for degree in range(order + 1):
+        index = tensor_index(dim, degree, order)
+        tensor = values[None][..., index.ravel()]
         for _ in range(degree):
             # Contract the leading index and append the new one: after `degree` rounds every index has had its turn.
-            tensor = np.tensordot(tensor, matrix, axes=([0], [1]))
-        index = tensor_index(moments.dim, degree, moments.order)
-        values[index.ravel()] = tensor.ravel()
-    return replace(moments, values=values, replicates=np.empty((0, values.size)))
+            tensor = tensor.reshape(*tensor.shape[:2], dim, dim ** (degree - 1)).swapaxes(2, 3) @ to_last
+            tensor = tensor.reshape(*tensor.shape[:2], dim**degree)
+        out[..., index.ravel()] = tensor
+    return out

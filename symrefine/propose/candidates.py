@@ -49,13 +49,13 @@ class Evidence:
 
 
 def proposals(evidence: Evidence) -> Iterator[list[Placed]]:
-    """All that the moments propose, in rounds: what stands about the likeliest axes, mirrors, other axes."""
+    """All that the moments propose, in rounds: about the likeliest axes, mirrors and inversion, about other axes."""
     likely = apart(np.concatenate([evidence.tuples.directions[:1], _principal(evidence)]))
     for direction in likely:
         yield about(evidence, direction)
     spectral = mirror_candidates(evidence.moments).directions
     normals = np.concatenate([evidence.tuples.directions[::-1], _principal(evidence), spectral])
-    yield [placed("Cs", frame_with_z(n)) for n in apart(normals)]
+    yield [placed("Ci", np.eye(3)), *(placed("Cs", frame_with_z(n)) for n in apart(normals))]
     white = whitened(evidence.moments)
     minima = [local_minima(axis_misses(white, k), count=5).directions for k in PRIMES]
     for direction in apart([*likely, *np.concatenate(minima)])[len(likely) :]:

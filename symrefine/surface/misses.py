@@ -36,9 +36,30 @@ class Deviation:
     p994: float
     max: float
 
+    @classmethod
+    def of(cls, distances: Array) -> "Deviation":
+        """The distribution of distances [N], in fractions of the diagonal."""
+        p80, p95, p97, p99, p994 = (float(q) for q in np.quantile(distances, [0.8, 0.95, 0.97, 0.99, 0.994]))
+        mean, largest = float(distances.mean()), float(distances.max())
+        return cls(mean=mean, p80=p80, p95=p95, p97=p97, p99=p99, p994=p994, max=largest)
+
     def at_least(self, other: "Deviation") -> "Deviation":
         """The larger of the two in every statistic."""
         return Deviation(**{f.name: max(getattr(self, f.name), getattr(other, f.name)) for f in fields(Deviation)})
+
+    def need(self, noise: "Deviation") -> float:
+        """The smallest tolerance, a fraction of the diagonal, at which a miss still counts as symmetric.
+
+        Each statistic may reach its own multiple of the tolerance beyond what noise alone shows; noise and miss add up
+        in squares.
+        """
+        own, base = np.array(self.limited), np.array(noise.limited)
+        return float(np.max(np.sqrt(np.maximum(own**2 - base**2, 0.0)) / np.array(LIMITS)))
+
+    @property
+    def need_of_atoms(self) -> float:
+        """The same of points that stand for themselves."""
+        return max(v / limit for v, limit in zip((self.mean, self.p95, self.max), ATOM_LIMITS, strict=True))
 
     @property
     def limited(self) -> tuple[float, ...]:
@@ -85,10 +106,3 @@ def spread_distance(points: Array, motion: Isometry) -> float:
     root = (vectors * np.sqrt(np.clip(values, 0.0, None))) @ vectors.T
     common = np.sqrt(np.clip(np.linalg.eigvalsh(root @ moved @ root), 0.0, None)).sum()
     return float(np.sqrt(max(2.0 * (np.trace(own) - common), 0.0)))
-
-
-def summary(distances: Array) -> Deviation:
-    """Statistics of distances [M]."""
-    p80, p95, p97, p99, p994 = (float(q) for q in np.quantile(distances, [0.8, 0.95, 0.97, 0.99, 0.994]))
-    mean, largest = float(distances.mean()), float(distances.max())
-    return Deviation(mean=mean, p80=p80, p95=p95, p97=p97, p99=p99, p994=p994, max=largest)

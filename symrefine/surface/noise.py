@@ -12,23 +12,23 @@ from symrefine.surface.skin import LocalPlanes
 # Of halves over the whole: noise of local planes is the same in both, but halves stand sqrt(2) times as far apart, and
 # what is made of spacing grows with it; the geometric mean of the two.
 HALVES = 2.0**0.25
+# Points of each half that are asked.
+ASKED = 4000
 
 
-def noise_distances(
-    points: Array, labels: Index | None, planes: Callable[[Array, Index | None], LocalPlanes], rng: np.random.Generator
-) -> Array:
-    """Distances [M] between the surfaces that two halves of a cloud [N, 3] make, scaled to that of the whole.
+def noise_distances(count: int, planes: Callable[[Index], LocalPlanes], rng: np.random.Generator) -> Array:
+    """Distances [M] between the surfaces that two halves of a cloud make, scaled to that of the whole.
 
     An object with an exact symmetry differs from its image by as much: both are made of points of their own.
 
     Args:
-        labels: [N] classes, or None.
-        planes: what makes a surface of points and classes.
+        count: points of the cloud.
+        planes: the surface that some of them make, given their indices.
     """
-    order = rng.permutation(len(points))
-    one, other = (
-        planes(points[half], None if labels is None else labels[half])
-        for half in (np.sort(order[::2]), np.sort(order[1::2]))
-    )
-    across = [disc_distances(a, b.points, b.labels) for a, b in ((one, other), (other, one))]
+    order = rng.permutation(count)
+    one, other = (planes(np.sort(order[k::2])) for k in (0, 1))
+    across = []
+    for here, there in ((one, other), (other, one)):
+        some = slice(None, None, max(1, len(there.points) // ASKED))
+        across.append(disc_distances(here, there.points[some], there.classes(some)))
     return np.concatenate(across) / HALVES

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from symrefine.geometry import Isometry
-from symrefine.surface.misses import ATOM_LIMITS, LIMITS, Deviation, miss_distances, spread_distance, summary
+from symrefine.surface.misses import LIMITS, Deviation, miss_distances, spread_distance
 from symrefine.surface.skin import LocalPlanes
 
+# Standard deviation over mean of the distance to the nearest of random points in a volume (Weibull, shape 3).
+NEAREST_SPREAD = 0.363
 NOTHING = Deviation(mean=0.0, p80=0.0, p95=0.0, p97=0.0, p99=0.0, p994=0.0, max=0.0)
 
 
@@ -29,7 +29,7 @@ class Surface:
         stride = self.stride(sources)
         worst = NOTHING
         for motion in motions:
-            worst = worst.at_least(summary(miss_distances(self.cloud, motion, stride=stride) / self.diagonal))
+            worst = worst.at_least(Deviation.of(miss_distances(self.cloud, motion, stride=stride) / self.diagonal))
         return worst
 
     def need(self, motions: Sequence[Isometry], *, sources: int = 10**9) -> float:
@@ -42,18 +42,16 @@ class Surface:
         return self.needed(deviation, spread)
 
     def needed(self, deviation: Deviation, spread: float = 0.0) -> float:
-        """The smallest tolerance, a fraction of the diagonal, at which a miss still counts as symmetric.
-
-        Noise and miss add up in squares; each statistic may reach its own multiple of the tolerance.
-        """
+        """The smallest tolerance, a fraction of the diagonal, at which a miss still counts as symmetric."""
         if self.cloud.body == "atoms":
-            each = (deviation.mean, deviation.p95, deviation.max)
-            return max(v / limit for v, limit in zip(each, ATOM_LIMITS, strict=True))
-        own, base = deviation.limited, self.noise.limited
-        beyond = np.sqrt(np.maximum(np.square(own) - np.square(base), 0.0))
-        return max(float(np.max(beyond / np.array(LIMITS))), spread / LIMITS[0])
+            return deviation.need_of_atoms
+        return max(deviation.need(self.noise), spread / LIMITS[0])
 
     @property
     def floor(self) -> float:
-        """The smallest tolerance at which noise alone would still count as symmetric."""
-        return float(np.max(np.array(self.noise.limited) / np.array(LIMITS)))
+        """The smallest tolerance at which what noise alone shows would count as symmetric.
+
+        Of a volume the noise is the distance to the nearest point, which is known; only how it spreads is not.
+        """
+        share = NEAREST_SPREAD if self.cloud.body == "volume" else 1.0
+        return share * self.noise.need(NOTHING)

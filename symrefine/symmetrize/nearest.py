@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from symrefine.errors import DegenerateShapeError, InputError
-from symrefine.geometry import Array, read_only, tight_diagonal, unit
+from symrefine.geometry import Array, orthogonal_factor, read_only, tight_diagonal, unit
 from symrefine.groups import PointGroup
 from symrefine.shape import Index, Shape
 from symrefine.symmetrize.action import Action, act, generators
@@ -196,8 +196,7 @@ class _Place:
     def towards(self, points: Array, wanted: Array) -> tuple["_Place", float]:
         """The place to which the best rigid motion from `points` to `wanted` [N, 3] belongs, and how far it turns."""
         a, b = points.mean(axis=0), wanted.mean(axis=0)
-        u, _, vt = np.linalg.svd((wanted - b).T @ (points - a))
-        turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+        turn = orthogonal_factor((wanted - b).T @ (points - a), proper=True)
         center = a + turn.T @ (self.center - b)
         step = float(np.abs(turn - np.eye(3)).max() + np.abs(center - self.center).max())
         return _Place(group=PointGroup(name=self.group.name, frame=self.group.frame @ turn), center=center), step
