@@ -661,7 +661,7 @@ def test_what_it_may_be_instead_is_told_with_what_must_be_forgiven():
         (whole,) = [a for a in found.alternatives if a.point_group == "C4v"]
         # The atom misses by its shift at least, half of which the fit takes up.
         assert 0.2 * 0.08 / found.diagonal < whole.forgiven < 0.08 / found.diagonal
-    scaled = detect(1000 * atoms, tolerance=0.02)
+    scaled = detect(1024 * atoms, tolerance=0.02)
     for a, b in zip(found.alternatives, scaled.alternatives, strict=True):
         assert a.point_group == b.point_group
         assert b.forgiven == pytest.approx(a.forgiven, rel=1e-6, abs=1e-9)
