@@ -11,7 +11,7 @@ from symrefine.moments.moments import central_moments, shape_moments
 from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import classify
-from symrefine.propose.folds import azimuthal_spectrum, fold_candidates, fold_energy
+from symrefine.propose.folds import BINS_PER_ORDER, azimuthal_spectrum, fold_candidates
 from symrefine.shape import Shape
 
 ORDER = 8
@@ -101,13 +101,19 @@ def test_noisy_tuples_do_not_drown_precise_ones():
 def test_azimuthal_spectrum_is_its_definition():
     rng = np.random.default_rng(6)
     points, weights = rng.standard_normal((500, 3)), rng.random(500)
-    c, sigma = azimuthal_spectrum(points, weights, np.array([0.0, 0, 1]), max_fold=7)
+    c, sigma = azimuthal_spectrum(points, weights, np.array([0.0, 0, 1]))
     rho, h = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
     phase = np.arctan2(points[:, 1], points[:, 0])
     f = rho[:, None] * np.stack([0 * h + 1, h, h * h, rho], axis=1)
-    expected = np.array([(weights * np.exp(1j * k * phase)) @ f for k in range(8)])
-    # The frame about z may start anywhere, which turns c_k by k times an angle.
-    np.testing.assert_allclose(np.abs(c), np.abs(expected), atol=1e-11)
+    expected = np.array([(weights * np.exp(1j * k * phase)) @ f for k in range(len(c))])
+    # The frame about z may start anywhere, which turns c_k by k times an angle. The circle is cut into bins; what is
+    # left when their mean blur is put right is, for each point, k times its place in its bin: uniform, so a deviation
+    # of pi k / bins / sqrt(3), four times that at most, and the coefficients of one sum no more.
+    k, bins = np.arange(len(c)), BINS_PER_ORDER * (len(c) - 1)
+    blurred = 4.0 * np.pi / np.sqrt(3.0) * k / bins
+    assert np.all(np.abs(np.abs(c) - np.abs(expected)).max(axis=1) <= (blurred + 1e-12) * sigma.max())
+    assert np.abs(np.abs(c) - np.abs(expected))[:9].max() < 0.02 * sigma.max()
+    np.testing.assert_allclose(c[0], expected[0], rtol=1e-12)
     np.testing.assert_allclose(sigma, np.sqrt((weights[:, None] ** 2 * f**2).sum(axis=0)), rtol=1e-12)
 
 
@@ -143,9 +149,13 @@ def test_fold_and_phase_of_a_stool(fold, det):
 
 @pytest.mark.parametrize("noise", [0.0, 0.01])
 def test_a_bottle_has_no_fold(noise):
-    for seed in range(5):
+    found = []
+    for seed in range(8):
         points = sample(bottle(), 8000, noise, np.random.default_rng(seed))
-        assert fold_candidates(points - points.mean(axis=0), np.ones(8000), np.array([0.0, 0, 1])) == []
+        found += fold_candidates(points - points.mean(axis=0), np.ones(8000), np.array([0.0, 0, 1]))
+    # Chance may propose one, as of random azimuths; no draw has more than one, and none the same.
+    assert len(found) <= 4
+    assert len({f.fold for f in found}) == len(found)
 
 
 def drum(density, height=1.0):
@@ -165,20 +175,21 @@ def test_fold_and_phase_of_a_density(fold):
     found = fold_candidates(*drum(lambda phi, _: 1 + 0.5 * np.cos(fold * (phi - 0.1))), Z_AXIS)
     # Its divisors have no energy of their own, so no phase.
     assert [f.fold for f in found] == [fold]
-    assert found[0].leak == pytest.approx(0.0, abs=1e-9)
-    assert phase_of(found[0]) == pytest.approx(0.1 % (np.pi / fold), abs=1e-9)
+    # 360 azimuths in bins that are no multiple of them: a hundredth of the energy goes elsewhere.
+    assert found[0].leak == pytest.approx(0.0, abs=1e-2)
+    assert phase_of(found[0]) == pytest.approx(0.1 % (np.pi / fold), abs=2e-3 / fold)
 
 
 def test_the_phase_is_that_of_the_radial_function_that_sees_the_fold():
     """Of a density odd in the height the sum over all heights says nothing."""
     found = fold_candidates(*drum(lambda phi, h: 1 + 0.5 * h * np.cos(4 * (phi - 0.2))), Z_AXIS)
     assert found[0].fold == 4
-    assert phase_of(found[0]) == pytest.approx(0.2, abs=1e-9)
+    assert phase_of(found[0]) == pytest.approx(0.2, abs=1e-4)
 
 
 def test_of_folds_that_leak_alike_the_largest_comes_first():
     """A little energy at a divisor of the fold, noise, makes the divisor leak least."""
-    found = fold_candidates(*drum(lambda phi, _: 1 + 0.5 * np.cos(6 * phi) + 0.08 * np.cos(2 * phi)), Z_AXIS)
+    found = fold_candidates(*drum(lambda phi, _: 1 + 0.5 * np.cos(6 * phi) + 0.12 * np.cos(2 * phi)), Z_AXIS)
     assert [f.fold for f in found] == [6, 2]
     assert found[0].leak > found[1].leak
 
@@ -188,28 +199,56 @@ def test_folds_that_leave_much_energy_out_are_none():
     assert fold_candidates(*density, Z_AXIS) == []
 
 
-def test_what_random_azimuths_may_show_is_no_fold():
-    """Energies of all radial functions together: 9 times what random azimuths would show may be chance, 90 may not."""
-    for energy, folds in ((9.0, []), (90.0, [4])):
-        # 3240 points at the amplitude a: a^2 / 4 of them for f = rho and rho^2, five ninths of that for rho h^2.
-        amplitude = np.sqrt(4 * (energy + 3) / (23 / 9 * 3240))
+def scattered(rng, count=400):
+    """Points at random azimuths about z, of random heights and radii."""
+    phi = 2 * np.pi * rng.random(count)
+    radius = rng.uniform(0.5, 1.5, count)
+    return np.stack([radius * np.cos(phi), radius * np.sin(phi), rng.standard_normal(count)], axis=1)
+
+
+def test_what_random_azimuths_show_is_seldom_a_fold():
+    """The largest of so many exponentials is beyond its mode in 1 - 1/e of draws, and a fold in fewer: it must be one
+    of the lower half, and its multiples carry almost all."""
+    rng = np.random.default_rng(10)
+    found = [fold_candidates(scattered(rng), np.ones(400), Z_AXIS) for _ in range(100)]
+    assert sum(bool(f) for f in found) < 40
+    assert all(len(f) <= 2 for f in found)
+
+
+def test_a_fold_is_told_from_the_energy_on_at_which_chance_ends():
+    """A wave of amplitude a has the energy N a^2 / 4 over random azimuths; chance shows log of their number."""
+    for energy, folds in ((2.0, []), (90.0, [4])):
+        # 3240 points: a^2 / 4 of them for f = rho and rho^2, five ninths of that for rho h^2.
+        amplitude = np.sqrt(4 * energy / (23 / 9 * 3240))
         points, weights = drum(lambda phi, _, a=amplitude: 1 + a * np.cos(4 * phi))
-        assert fold_energy(points, weights, Z_AXIS, 4) == pytest.approx(energy, rel=0.1)
         assert [f.fold for f in fold_candidates(points, weights, Z_AXIS)] == folds
 
 
-def test_the_energy_of_a_fold_is_that_over_random_azimuths():
-    """Of noise about nothing is left on average; of a fold its square grows with the number of points."""
-    rng = np.random.default_rng(10)
-    drawn = []
-    for _ in range(200):
-        phi = 2 * np.pi * rng.random(400)
-        points = np.stack([np.cos(phi), np.sin(phi), rng.standard_normal(400)], axis=1)
-        drawn.append(fold_energy(points, np.ones(400), Z_AXIS, 5))
-    # Four radial functions, each of exponential energy less one, cut at zero: 4 / e.
-    assert np.mean(drawn) == pytest.approx(4 / np.e, rel=0.3)
-    points, weights = drum(lambda phi, _: 1 + 0.5 * np.cos(5 * phi))
-    assert fold_energy(points, weights, Z_AXIS, 5) > 50 > 1e-9 > fold_energy(points, weights, Z_AXIS, 4)
+@pytest.mark.parametrize("fold", [16, 24, 37, 48, 60, 64])
+def test_folds_up_to_half_of_the_spectrum_are_told(fold):
+    """A gear of random points: radius and number of points follow its teeth."""
+    rng = np.random.default_rng(fold)
+    phi = 2 * np.pi * rng.random(6000)
+    kept = phi[rng.random(6000) < 0.5 + 0.4 * np.cos(fold * (phi - 0.3))]
+    points = np.stack([np.cos(kept), np.sin(kept), rng.uniform(-0.3, 0.3, len(kept))], axis=1)
+    found = fold_candidates(points, np.ones(len(points)), Z_AXIS)
+    assert found[0].fold == fold
+    tooth = np.pi / fold
+    assert abs((phase_of(found[0]) - 0.3 + tooth / 2) % tooth - tooth / 2) < 0.06 * tooth
+
+
+def test_a_fold_turns_with_the_points():
+    points = sample(stool(5), 4000, 0.002, np.random.default_rng(11))
+    points -= points.mean(axis=0)
+    turn = random_orthogonal(np.random.default_rng(12))
+    once = fold_candidates(points, np.ones(4000), Z_AXIS)[0]
+    again = fold_candidates(points @ turn.T, np.ones(4000), turn @ Z_AXIS)[0]
+    assert once.fold == again.fold == 5
+    # Bins start elsewhere; the mirrors are pi / 5 apart.
+    image = once.frame[0] @ turn.T
+    x, y, _ = again.frame @ image
+    off = (np.arctan2(y, x) + np.pi / 10) % (np.pi / 5) - np.pi / 10
+    assert abs(off) < np.radians(0.1)
 
 
 # The polish

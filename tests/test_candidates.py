@@ -91,7 +91,8 @@ def test_proposals_stand_about_the_centroid_and_start_with_the_likeliest_axes(na
     rounds = list(proposals(seen(name, 0)[0]))
     assert all(rounds)
     assert [p.group.name for r in rounds for p in r].count("Cinfv") == len(rounds) - 1
-    mirrors = next(i for i, r in enumerate(rounds) if r[0].group.name == "Cs")
+    mirrors = next(i for i, r in enumerate(rounds) if any(p.group.name == "Cs" for p in r))
+    assert any(p.group.name == "Ci" for p in rounds[mirrors])
     first = [r[-1].group.frame[2] for r in rounds[:mirrors]]
     principal = np.linalg.eigh(seen(name, 0)[0].moments.covariance)[1].T
     likeliest = [seen(name, 0)[0].tuples.directions[0], *principal]

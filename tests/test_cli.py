@@ -102,6 +102,11 @@ def test_the_report_holds_what_was_agreed(record: dict[str, Any], data: Path) ->
     assert (record["point_group"], record["inversion"], record["undetermined"]) == ("D2h", True, None)
     assert len(record["center"]) == 3
     assert len(record["planes"]) == len(record["axes"]) == 3
+    assert 0.0 < record["confidence"] <= 1.0
+    assert record["confidence"] + sum(a["probability"] for a in record["alternatives"]) <= 1.0 + 1e-9
+    for alternative in record["alternatives"]:
+        assert set(alternative) == {"point_group", "probability", "forgiven"}
+        assert 0.0 <= alternative["forgiven"] < 1.0
     keys = "center diagonal tolerance planes axes near_misses staircase iterations ntuples timings"
     assert set(keys.split()) <= set(record)
     assert set(record["planes"][0]) == {"normal", "offset", "residual", "confidence", "sigma"}
@@ -109,6 +114,18 @@ def test_the_report_holds_what_was_agreed(record: dict[str, Any], data: Path) ->
     assert set(record["ntuples"]) == {"kind", "singular_values", "significance"}
     assert {step["point_group"] for step in record["staircase"]} == {"D2h"}
     assert [step["tolerance"] for step in record["staircase"]] == sorted({s["tolerance"] for s in record["staircase"]})
+
+
+def test_strict_ends_with_a_status_of_its_own_where_nothing_is_decided(run: Run, tmp_path: Path, data: Path) -> None:
+    row = tmp_path / "row.xyz"
+    row.write_text("\n".join(f"{x} {2 * x} {3 * x}" for x in range(40)))
+    status, out, _ = run("detect", row, "--json", "-", "--strict")
+    record = json.loads(out)
+    assert (status, record["point_group"], record["confidence"]) == (3, "undetermined", 0)
+    assert "line" in record["undetermined"]
+    assert {step["point_group"] for step in record["staircase"]} == {"undetermined"}
+    assert run("detect", row)[0] == 0
+    assert run("detect", data / "box.ply", "--strict")[0] == 0
 
 
 def test_stdout_holds_the_json_alone_and_equal_runs_give_equal_bytes(data: Path, record: dict[str, Any]) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from symrefine.detection.result import Detection, FoundAxis, FoundPlane
+from symrefine.detection.result import Alternative, Detection, FoundAxis, FoundPlane
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.export.bop import bop_entry, bop_limits, diameter, read_models_info, write_bop
@@ -197,6 +197,10 @@ def test_a_record_says_what_was_found(box: tuple[Shape, Detection]) -> None:
     assert record["source"] == "box"
     assert next(iter(record["timings"])) == "load"
     assert list(record)[-1] == "timings"
+    other = Alternative(point_group="D4h", probability=0.25, forgiven=0.03)
+    doubtful = detection_record(replace(detection, confidence=0.75, alternatives=(other,)), shape, options={})
+    assert doubtful["confidence"] == 0.75
+    assert doubtful["alternatives"] == [{"point_group": "D4h", "probability": 0.25, "forgiven": 0.03}]
     assert sorted(np.argmax(p["normal"]) for p in record["planes"]) == [0, 1, 2]
     assert [a["order"] for a in record["axes"]] == [2, 2, 2]
     assert record["inversion_confidence"] == record["planes"][0]["confidence"]

@@ -24,7 +24,7 @@ from symrefine.fit.placed import Placed, elements
 from symrefine.geometry import frame_with_z, line_angle_rad, random_orthogonal, rotation, tight_diagonal, unit
 from symrefine.groups import close, is_subgroup, point_group
 from symrefine.moments.moments import shape_moments
-from symrefine.surface.misses import TOLERANCE, summary
+from symrefine.surface.misses import TOLERANCE, Deviation
 from symrefine.surface.noise import noise_distances
 from symrefine.surface.skin import isolated_points, local_planes
 from symrefine.surface.surface import Surface
@@ -52,8 +52,8 @@ def scene(name, noise=0.002):
     points = ((sample(shape, 3000, noise, rng) - moments.center) / moments.scale) @ turn.T + off
     cloud = local_planes(points, 2000, rng)
     diagonal = tight_diagonal(cloud.points)
-    own = noise_distances(points, None, lambda p, c: local_planes(p, 750, rng, labels=c), rng)
-    surface = Surface(cloud=cloud, diagonal=diagonal, noise=summary(own / diagonal))
+    own = noise_distances(len(points), lambda some: local_planes(points[some], 750, rng), rng)
+    surface = Surface(cloud=cloud, diagonal=diagonal, noise=Deviation.of(own / diagonal))
     # The mirror of the mug is normal to y.
     standard = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]) if group == "Cs" else np.eye(3)
     return surface, Placed(group=point_group(group, standard @ turn.T), center=off)
@@ -96,7 +96,7 @@ def test_some_elements_of_a_group_generate_a_subgroup_of_it(name, chosen, seed):
 
 
 def _single(part):
-    zero = summary(np.zeros(4))
+    zero = Deviation.of(np.zeros(4))
     return single(Element(operations=part, center=ORIGIN, deviation=zero, need=0.0))
 
 

@@ -73,11 +73,11 @@ def test_a_quarter_of_the_tolerance_is_forgiven_and_four_times_it_is_not(lone):
     assert meant(Link(need=0.005, lone_mirror=lone), 0.02) > 0.5 > meant(Link(need=0.08, lone_mirror=lone), 0.02)
 
 
-@given(CHAIN, TOLERANCE, st.sampled_from([0.25, 3.0]))
-def test_only_needs_over_tolerances_count(links, tolerance, unit):
-    found = decide(links, tolerance)
+@given(CHAIN, TOLERANCE, NEED, st.sampled_from([0.25, 3.0]))
+def test_only_needs_over_tolerances_count(links, tolerance, noise, unit):
+    found = decide(links, tolerance, noise)
     scaled = [Link(need=unit * link.need, lone_mirror=link.lone_mirror) for link in links]
-    again = decide(scaled, unit * tolerance)
+    again = decide(scaled, unit * tolerance, unit * noise)
     assert again.probabilities == pytest.approx(found.probabilities, abs=1e-9)
 
 
@@ -100,3 +100,11 @@ def test_a_group_that_needs_too_much_changes_nothing_below_it(links, need, toler
     without, along = decide(links, tolerance), decide([*links, last], tolerance)
     assert along.probabilities[: len(links)] == without.probabilities[:-1]
     assert along.inside[:-1] == without.inside
+
+
+@given(CHAIN, st.tuples(NEED, NEED).map(sorted), TOLERANCE)
+def test_more_noise_makes_no_group_likelier(links, noise, tolerance):
+    quiet, loud = (decide(links, tolerance, n) for n in noise)
+    assert all(b <= a for a, b in zip(quiet.inside, loud.inside, strict=True))
+    assert loud.index <= quiet.index
+    assert decide(links, tolerance) == decide(links, tolerance, 0.0)

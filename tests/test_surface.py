@@ -19,7 +19,6 @@ from symrefine.surface.misses import (
     disc_distances,
     miss_distances,
     spread_distance,
-    summary,
 )
 from symrefine.surface.noise import noise_distances
 from symrefine.surface.skin import isolated_points, local_planes
@@ -35,8 +34,8 @@ def surface_of(shape, noise=0.0, *, count=4000, seed=0):
     points = (sample(shape, count, noise, rng) - moments.center) / moments.scale
     cloud = local_planes(points, count // 2, rng)
     diagonal = tight_diagonal(cloud.points)
-    own = noise_distances(points, None, lambda p, c: local_planes(p, count // 4, rng, labels=c), rng)
-    return Surface(cloud=cloud, diagonal=diagonal, noise=summary(own / diagonal))
+    own = noise_distances(count, lambda some: local_planes(points[some], count // 4, rng), rng)
+    return Surface(cloud=cloud, diagonal=diagonal, noise=Deviation.of(own / diagonal))
 
 
 def sheet(count=900, seed=1):
@@ -338,7 +337,7 @@ def test_noise_is_measured_by_both_halves_and_grows_with_the_noise():
         rng = np.random.default_rng(14)
         points = rng.standard_normal((2001, 3))
         points = points / np.linalg.norm(points, axis=1, keepdims=True) + noise * rng.standard_normal((2001, 3))
-        distances = noise_distances(points, None, lambda p, _, r=rng: local_planes(p, len(p), r), rng)
+        distances = noise_distances(2001, lambda some, p=points, r=rng: local_planes(p[some], len(some), r), rng)
         assert distances.shape == (2001,)
         assert distances.min() >= 0.0
         shown.append(np.quantile(distances, 0.95))
@@ -353,7 +352,7 @@ def test_noise_is_what_another_sample_would_miss_by(noise):
     points, another = (p / np.linalg.norm(p, axis=1, keepdims=True) for p in rng.standard_normal((2, 1600, 3)))
     points, another = (p + noise * rng.standard_normal(p.shape) for p in (points, another))
     whole, other = (local_planes(p, len(p), rng) for p in (points, another))
-    promised = noise_distances(points, None, lambda p, _: local_planes(p, len(p), rng), rng)
+    promised = noise_distances(1600, lambda some: local_planes(points[some], len(some), rng), rng)
     found = disc_distances(whole, other.points)
     # Both are estimates: neighbouring planes of one sample share their points, those of two samples do not.
     assert 0.6 < promised.mean() / found.mean() < 1.6
@@ -368,15 +367,14 @@ def test_noise_is_measured_class_by_class():
     points[labels == 1, 0] += 4.0
     made = []
 
-    def planes(p, c):
-        made.append((p, c))
-        return local_planes(p, len(p), rng, labels=c)
+    def planes(some):
+        made.append(some)
+        return local_planes(points[some], len(some), rng, labels=labels[some])
 
     # Random edges overlap by less than a disc.
-    assert np.quantile(noise_distances(points, labels, planes, rng), 0.9) < 1e-9
-    for p, c in made:
-        np.testing.assert_array_equal(c == 1, p[:, 0] > 2)
-    assert sorted(len(p) for p, _ in made) == [1000, 1000]
+    assert np.quantile(noise_distances(2000, planes, rng), 0.9) < 1e-9
+    np.testing.assert_array_equal(np.sort(np.concatenate(made)), np.arange(2000))
+    assert [len(some) for some in made] == [1000, 1000]
 
 
 # True and false elements
