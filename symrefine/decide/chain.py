@@ -29,8 +29,9 @@ from symrefine.surface.surface import Surface
 HOPELESS = 0.5 * START_ERROR / LIMITS[0]
 # A coarse fit on few points may need so many times what a fine one does.
 COARSE = 3.5
-# Needs within this factor, or below this share of the limit, are the same: the elements of a true group miss alike.
-ALIKE, EXACT = 1.5, 0.05
+# Needs within this factor are the same, as the elements of a true group miss alike; so are those below what rounding
+# of coordinates to five digits leaves.
+ALIKE, EXACT = 1.5, 1e-5
 # Candidates turned down after a look that are fitted all the same where nothing else was: the nearest misses.
 TOLD = 2
 # Elements that are joined one by one, where all of a level together make no group.
@@ -68,11 +69,10 @@ def _settled(surface: Surface, pool: Pool, before: Hypothesis, limit: float) -> 
     return pool
 
 
-def _promising(surface: Surface, largest: Hypothesis, starts: Iterable[Placed]) -> list[Placed]:
-    """The starts that are new and that a glance does not rule out, those of large groups that look best first."""
-    glances = [(need(surface, s, GLANCE), s) for s in starts if not largest.holds(s)]
-    kept = [(g, s) for g, s in glances if g <= HOPELESS]
-    return [s for _, s in sorted(kept, key=lambda k: k[0] / math.log2(1.0 + _size(k[1])))]
+def _glanced(surface: Surface, largest: Hypothesis, starts: Iterable[Placed]) -> list[tuple[Placed, float]]:
+    """The starts that are new with what they seem to need at a glance, large groups that look good first."""
+    glances = [(s, need(surface, s, GLANCE)) for s in starts if not largest.holds(s)]
+    return sorted(glances, key=lambda k: k[1] / math.log2(1.0 + _size(k[0])))
 
 
 def _size(placed: Placed) -> float:
@@ -82,11 +82,11 @@ def _size(placed: Placed) -> float:
 def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float) -> Pool:
     """The pool with candidates fitted, but for those that the group so far has anyway."""
     small, largest, turned_down, failed = list(pool.small), pool.largest, list(pool.turned_down), list(pool.failed)
-    for start in _promising(surface, largest, starts):
+    for start, glance in _glanced(surface, largest, starts):
         if largest.holds(start):
             continue
-        moved, needs = looked_at(surface, start)
-        if needs > COARSE * limit:
+        moved, needs = (start, glance) if glance > HOPELESS else looked_at(surface, start)
+        if glance > HOPELESS or needs > COARSE * limit:
             turned_down.append((moved, needs))
             continue
         if largest.holds(moved) or any(_same(moved, h.placed) for h in small):
@@ -132,7 +132,7 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
         here = links[-1]
         if rest[0].need > limit:
             break
-        level = max(ALIKE * rest[0].need, here.need, EXACT * limit, 0.5 * surface.floor)
+        level = max(ALIKE * rest[0].need, here.need, EXACT, 0.5 * surface.floor)
         batch = [h for h in rest if h.need <= level]
         found = _join(surface, [here, *batch], known)
         if found is None or found.need > ALIKE * level:

@@ -142,7 +142,7 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
     reason = found.doubt(tolerance)
     index = 0 if reason else decision.index
     chosen = links[index]
-    told = alternatives([h.group.name for h in links], [h.need for h in links], decision, -1 if reason else index)
+    told = alternatives([h.group.name for h in links], [h.need for h in links], decision, index)
     history = chosen.history
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
     planes = [e for e in chosen.elements if e.operations.kind == "plane"]
@@ -151,7 +151,7 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
     return Detection(
         point_group="undetermined" if reason else chosen.group.name,
         confidence=0.0 if reason else decision.probabilities[index],
-        alternatives=tuple(told),
+        alternatives=() if reason else tuple(told),
         group=chosen.group,
         center=origin + scale * chosen.placed.center,
         planes=tuple(

@@ -114,7 +114,9 @@ def ntuples(moments: Moments, orders: Sequence[Sequence[int]] = PAPER_ORDERS) ->
     entries = stacked @ program.traces
     products = program.factors * entries[:, program.left] * entries[:, program.right]
     vectors = np.add.reduceat(products, program.starts, axis=1).reshape(len(stacked), -1, moments.dim)
-    vectors /= (program.bounds(entries)[:, program.degrees]).prod(axis=2)[:, :, None]
+    bounds = program.bounds(entries)[:, program.degrees].prod(axis=2)[:, :, None]
+    # A part that does not spread has no vectors: all its points coincide.
+    vectors = np.divide(vectors, bounds, out=np.zeros_like(vectors), where=bounds > 0.0)
     return NTuples(vectors=vectors[0], replicates=vectors[1:], labels=program.labels)
 
 

@@ -10,6 +10,8 @@ from symrefine.geometry import Array, frame_with_z, read_only, rotation
 MAX_FOLD = 128
 # Bins of the circle for each order: what a bin blurs is then below a thousandth, and is put right.
 BINS_PER_ORDER = 16
+# Share of surfaces of revolution that may show a fold by chance: the squares are exponential, so their largest is told.
+CHANCE = 0.01
 
 
 def azimuthal_spectrum(points: Array, weights: Array, axis: Array, max_fold: int = MAX_FOLD) -> tuple[Array, Array]:
@@ -68,6 +70,6 @@ def fold_candidates(points: Array, weights: Array, axis: Array, *, leak_max: flo
 
 
 def _energy_over_noise(c: Array, sigma: Array) -> Array:
-    """Energy by order beyond what the largest of so many coefficients of random azimuths would show (extreme value)."""
+    """Energy by order beyond what the largest of so many coefficients of random azimuths shows in 99 % of draws."""
     sigma = np.where(sigma > 0, sigma, np.inf)  # a flat object has no height to weigh azimuths with
-    return np.clip(np.abs(c) ** 2 / sigma**2 - np.log(c.size), 0.0, None).sum(axis=1)
+    return np.clip(np.abs(c) ** 2 / sigma**2 - np.log(c.size / CHANCE), 0.0, None).sum(axis=1)

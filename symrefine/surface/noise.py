@@ -10,8 +10,8 @@ from symrefine.surface.misses import disc_distances
 from symrefine.surface.skin import LocalPlanes
 
 # Of halves over the whole: noise of local planes is the same in both, but halves stand sqrt(2) times as far apart, and
-# what is made of spacing grows with it; the geometric mean of the two.
-HALVES = 2.0**0.25
+# what is made of spacing grows with it; the geometric mean of the two. In a volume all is spacing.
+HALVES, HALVES_OF_VOLUME = 2.0**0.25, 2.0 ** (1.0 / 3.0)
 # Points of each half that are asked.
 ASKED = 4000
 
@@ -31,4 +31,4 @@ def noise_distances(count: int, planes: Callable[[Index], LocalPlanes], rng: np.
     for here, there in ((one, other), (other, one)):
         some = slice(None, None, max(1, len(there.points) // ASKED))
         across.append(disc_distances(here, there.points[some], there.classes(some)))
-    return np.concatenate(across) / HALVES
+    return np.concatenate(across) / (HALVES_OF_VOLUME if one.body == "volume" else HALVES)
