@@ -114,9 +114,6 @@ def test_what_is_exact_comes_first_and_stays(sub):
     assert links[-1].need > 0.003
 
 
-@pytest.mark.xfail(
-    strict=True, reason="EXACT * limit joins what is exact with what is not, the more the larger the limit"
-)
 @pytest.mark.parametrize("sub", ["C3v", "Ci"])
 def test_how_far_the_chain_reaches_changes_nothing_below(sub):
     """The exact group is told whether larger tolerances are asked for besides, or not."""

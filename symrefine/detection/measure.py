@@ -110,7 +110,7 @@ def _hidden(surface: Surface, tolerance: float) -> str:
         return ""
     return (
         f"the cloud does not even agree with itself: what its halves miss one another by needs a tolerance of "
-        f"{hidden:.1%} of the diagonal, and {tolerance:.1%} is asked; give more points, less noise, or a larger tolerance"
+        f"{hidden:.1%} of the diagonal, and {tolerance:.1%} is asked; give more points or less noise, or ask for more"
     )
 
 
