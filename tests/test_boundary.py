@@ -16,9 +16,8 @@ from experiments.objects.parts import marked_group
 from experiments.objects.poses import Pose, posed
 from experiments.objects.shapes import sample
 from experiments.studies import boundary
-from experiments.studies.answers import answer_confidence, ladder_faults, ladder_outcome, outcome, within
+from experiments.studies.answers import answer_confidence, fitted, ladder_faults, ladder_outcome, outcome, within
 from experiments.studies.boundary import VIEWS, Case, plan, run
-from experiments.studies.reliability import fitted
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.geometry import householder, random_orthogonal, rotation

@@ -8,8 +8,8 @@ import pytest
 from experiments.objects.drawings import DRAWINGS
 from experiments.objects.pictures import fit
 from experiments.studies import planar_reliability as study
+from experiments.studies.answers import fitted
 from experiments.studies.planar_reliability import Case, Element
-from experiments.studies.reliability import fitted
 from symrefine.plane.judge import EVEN, STEEPNESS, confidence
 
 
@@ -84,7 +84,7 @@ def test_elements_of_a_drawing_are_right_and_those_lost_are_not() -> None:
     star = study.elements(Case(drawing="star", side=128))
     assert sum(r.claimed and r.right for r in star) == 6
     row = star[0].judged()
-    assert (row.family, row.object, row.right) == ("whole", "star", True)
+    assert (row.look, row.right) == (star[0].case, True)
     assert row.confidence == pytest.approx(confidence(star[0].excess))
 
 
