@@ -137,7 +137,7 @@ def run(case: Case) -> dict[str, int | float | str | bool | None]:
         "answer": found.group,
         "confidence": found.confidence if found.decided else None,
         "undetermined": not found.decided,
-        "right": found.right,
+        "right": found.right if found.decided else None,
         "sure": sure,
         "sure_right": found.right if sure else None,
     }
