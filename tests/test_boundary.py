@@ -16,9 +16,8 @@ from experiments.objects.parts import marked_group
 from experiments.objects.poses import Pose, posed
 from experiments.objects.shapes import sample
 from experiments.studies import boundary
-from experiments.studies.answers import answer_confidence, ladder_faults, ladder_outcome, outcome, within
+from experiments.studies.answers import answer_confidence, fitted, ladder_faults, ladder_outcome, outcome, within
 from experiments.studies.boundary import VIEWS, Case, plan, run
-from experiments.studies.reliability import fitted
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.geometry import householder, random_orthogonal, rotation
@@ -233,8 +232,7 @@ def crate():
 
 def surely(found, confidence):
     """The same detection as sure as is said."""
-    planes = tuple(replace(p, confidence=confidence) for p in found.planes)
-    return replace(found, planes=planes, axes=tuple(replace(a, confidence=confidence) for a in found.axes))
+    return replace(found, confidence=confidence)
 
 
 def test_an_answer_is_right_with_its_group_in_its_place(crate):

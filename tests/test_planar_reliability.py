@@ -8,7 +8,14 @@ import pytest
 from experiments.objects.drawings import DRAWINGS
 from experiments.objects.pictures import fit
 from experiments.studies import planar_reliability as study
+from experiments.studies.answers import fitted
 from experiments.studies.planar_reliability import Case
+
+
+def test_both_halves_have_drawings_of_all_kinds() -> None:
+    for half in (True, False):
+        groups = {d.group for name, d in DRAWINGS.items() if fitted(name) is half}
+        assert {"D1", "C2", "C4" if half else "C3"} <= groups
 
 
 @pytest.mark.parametrize("name", ["heart", "letter Z", "octagon", "letter A", "pinwheel of 3"])
@@ -46,7 +53,7 @@ def test_elements_of_a_drawing_are_right_and_those_lost_are_not() -> None:
     star = study.elements(Case(drawing="star", side=128))
     assert sum(r.right for r in star) == 6
     row = star[0].judged()
-    assert (row.family, row.object, row.right) == ("whole", "star", True)
+    assert (row.look, row.right) == (star[0].case, True)
     assert row.confidence == star[0].confidence > 0.9
 
 

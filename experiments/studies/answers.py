@@ -1,25 +1,53 @@
 """How a whole answer is judged: its group and all its elements against the truth, and how sure it was."""
 
 import math
+import zlib
 from collections.abc import Sequence
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from experiments.objects.built_symmetry import Truth, holds
+from experiments.objects.built_symmetry import Claim, Truth, holds
 from experiments.objects.instances import Instance
 from experiments.objects.poses import Pose
-from experiments.studies.reliability import SURE, claims
 from symrefine.detection.result import Detection
 from symrefine.groups import PointGroup, is_subgroup
 from symrefine.shape import Shape
 
+# What is called sure.
+SURE = 0.95
 # A subgroup of the truth is an honest answer up to this confidence.
 HONEST = 0.9
 # Of ladders: how far the axes of two groups may differ, as displaced atoms tilt them, and how far an operation may
 # move an atom from one of its kind, in tolerances.
 TILT_RAD, FIT = math.radians(4.0), 3.0
 OUTCOMES = ("right", "undetermined", "at least", "unsure and wrong", "sure and wrong", "broke")
+
+
+def fitted(name: str) -> bool:
+    """Whether an object is of the half that constants may be fitted to; the other half is for reporting."""
+    return zlib.crc32(name.encode()) % 2 == 0
+
+
+def claims(found: Detection) -> list[tuple[Claim, float]]:
+    """All elements of a detection but the inversion, and how sure it is of each."""
+    planes = [
+        (Claim(kind="plane", order=1.0, direction=p.plane.normal, point=p.plane.offset * p.plane.normal), p.confidence)
+        for p in found.planes
+    ]
+    axes = [
+        (
+            Claim(
+                kind="improper" if a.improper else "axis",
+                order=a.order,
+                direction=a.axis.direction,
+                point=found.center if a.improper else a.axis.point,
+            ),
+            a.confidence,
+        )
+        for a in found.axes
+    ]
+    return [*planes, *axes]
 
 
 def answer_confidence(found: Detection) -> float:
@@ -45,7 +73,7 @@ def all_there(found: Detection, truth: Truth, diagonal: float) -> bool:
     """Whether the object has all elements that a detection claims."""
     if found.inversion and not truth.group.has_inversion:
         return False
-    return all(holds(truth, claim, diagonal) for claim, _, claimed in claims(found) if claimed)
+    return all(holds(truth, claim, diagonal) for claim, _ in claims(found))
 
 
 def ladder_faults(found: Sequence[Detection], shape: Shape, truth: Truth) -> list[tuple[float, str]]:
@@ -63,11 +91,11 @@ def ladder_faults(found: Sequence[Detection], shape: Shape, truth: Truth) -> lis
     return faults
 
 
-def within(part: PointGroup, whole: PointGroup) -> bool:
+def within(part: PointGroup, whole: PointGroup, tilt_rad: float = TILT_RAD) -> bool:
     """Whether one group is, but for a small tilt, a subgroup of another; its order divides the other's (Lagrange)."""
     if part.is_finite and whole.is_finite and whole.order % part.order:
         return False
-    return is_subgroup(part, whole, TILT_RAD)
+    return is_subgroup(part, whole, tilt_rad)
 
 
 def displacement(found: Detection, shape: Shape) -> float:

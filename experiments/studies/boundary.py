@@ -7,13 +7,13 @@ answer is right if its group is one that is accepted and all its elements are th
 its elements are there and it is less than 90 % sure; sure and wrong if it is 95 % sure of anything else. Molecules are
 asked at a ladder of tolerances, where what is found may only grow, holds what is exact and fits the atoms.
 
-Half of the objects, those of `reliability.fitted`, are for calibration, the other half for reporting.
+Half of the objects, those of `answers.fitted`, are for calibration, the other half for reporting.
 """
 
 import argparse
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -23,9 +23,16 @@ from experiments.objects.boundary import FAMILIES, base, instance
 from experiments.objects.instances import Instance
 from experiments.objects.ladders import TOLERANCES
 from experiments.objects.poses import Pose, observed, posed
-from experiments.studies.answers import OUTCOMES, answer_confidence, ladder_faults, ladder_outcome, outcome
+from experiments.studies.answers import (
+    OUTCOMES,
+    SURE,
+    answer_confidence,
+    fitted,
+    ladder_faults,
+    ladder_outcome,
+    outcome,
+)
 from experiments.studies.jobs import add_jobs, in_order
-from experiments.studies.reliability import SURE, fitted
 from symrefine.detection.story import detect
 from symrefine.errors import InputError, SymrefineError
 from symrefine.shape import Shape
@@ -127,13 +134,22 @@ def check(case: Case) -> None:
     Raises:
         InputError: it cannot.
     """
-    if case.family not in FAMILIES:
-        raise InputError(f"family: value is {case.family!r}, expected one of {', '.join(FAMILIES)}")
-    if case.name not in FAMILIES[case.family]:
-        known = ", ".join(FAMILIES[case.family])
+    check_known(case, FAMILIES, VIEWS)
+
+
+def check_known(case: Case, families: Mapping[str, Collection[str]], views: Mapping[str, Sequence[View]]) -> None:
+    """Whether there is such an object, and such a view of it.
+
+    Raises:
+        InputError: there is not.
+    """
+    if case.family not in families:
+        raise InputError(f"family: value is {case.family!r}, expected one of {', '.join(families)}")
+    if case.name not in families[case.family]:
+        known = ", ".join(families[case.family]) or "none: its meshes are not there"
         raise InputError(f"name: value is {case.name!r}, expected one of the family {case.family!r}: {known}")
-    if not 0 <= case.view < len(VIEWS[case.family]):
-        raise InputError(f"view: value is {case.view}, expected 0 to {len(VIEWS[case.family]) - 1}")
+    if not 0 <= case.view < len(views[case.family]):
+        raise InputError(f"view: value is {case.view}, expected 0 to {len(views[case.family]) - 1}")
     if case.seed < 0:
         raise InputError(f"seed: value is {case.seed}, expected 0 or more")
 
@@ -178,11 +194,14 @@ def _answer(
 
 def look(case: Case, made: Instance) -> tuple[Shape, Pose]:
     """The object as it is shown, in a random pose and unit."""
-    view = VIEWS[case.family][case.view]
     number = [list(FAMILIES).index(case.family), list(FAMILIES[case.family]).index(case.name), case.view]
-    rng = np.random.default_rng([case.seed, *number])
+    return shown(made.shape, VIEWS[case.family][case.view], np.random.default_rng([case.seed, *number]))
+
+
+def shown(shape: Shape, view: View, rng: np.random.Generator) -> tuple[Shape, Pose]:
+    """What a view shows of an object, in a random pose and unit."""
     pose = Pose.random(rng)
-    seen = made.shape if view.form == "given" else observed(made.shape, view.form, view.points, view.noise_rel, rng)
+    seen = shape if view.form == "given" else observed(shape, view.form, view.points, view.noise_rel, rng)
     return posed(seen, pose), pose
 
 

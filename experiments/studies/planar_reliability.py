@@ -10,7 +10,6 @@ probability is that of space (`decide.posterior`), fitted to none of these pictu
 
 import argparse
 import sys
-import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,9 +18,9 @@ import numpy as np
 
 from experiments.objects.drawings import DRAWINGS, Drawing, Layer
 from experiments.objects.pictures import Pose, coverage, fit, picture, random_pose
+from experiments.studies.calibration import Judged, bins, plausible, plot, summary
 from experiments.studies.jobs import add_jobs, in_order
 from experiments.studies.planar_images import Trial, examine
-from experiments.studies.reliability import Judged, bins, plausible, plot, summary
 from symrefine.errors import InputError
 from symrefine.files import check_target
 from symrefine.geometry import Array
@@ -62,17 +61,8 @@ class Element:
     right: bool
 
     def judged(self) -> Judged:
-        """The same for the tables of `experiments.studies.reliability`; a look is one of an object."""
-        look = zlib.crc32(repr(self.case).encode())
-        return Judged(
-            object=self.case.drawing,
-            family="broken" if self.case.moved_rel else "whole",
-            view=look,
-            kind=self.kind,
-            claimed=True,
-            confidence=self.confidence,
-            right=self.right,
-        )
+        """The same for the tables of `experiments.studies.calibration`."""
+        return Judged(look=self.case, confidence=self.confidence, right=self.right)
 
 
 def plan(*, quick: bool, seed: int) -> Iterator[Case]:

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 # Of the logistic curve: the need over the tolerance at which half of the groups are meant, and how fast they become
 # fewer. Calibrated on intact, broken and noisy objects by `python -m experiments.studies.reliability --fit`.
-EVEN, STEEPNESS = 0.68, 6.0
+EVEN, STEEPNESS = 0.68, 8.0
 # The same of a lone mirror: bodies and devices that are meant to have just one are made less exactly than others.
 EVEN_MIRROR = 1.02
 # How much of what noise alone needs is left to doubt, once it was subtracted in squares.
@@ -51,7 +51,11 @@ def decide(links: Sequence[Link], tolerance: float, noise: float = 0.0) -> Decis
 
 
 def meant(link: Link, tolerance: float, noise: float = 0.0) -> float:
-    """Probability that a group is meant, from what it needs; noise and need add up in squares."""
+    """Probability that a group is meant, from what it needs.
+
+    Noise and need add up in squares. Noise also blurs what was measured, in both directions: the curve gets less steep.
+    """
     even = EVEN_MIRROR if link.lone_mirror else EVEN
-    squares = (link.need / even) ** 2 + (UNKNOWN * noise) ** 2
-    return float(1.0 / (1.0 + (squares / tolerance**2) ** (STEEPNESS / 2.0)))
+    squares = ((link.need / even) ** 2 + (UNKNOWN * noise) ** 2) / tolerance**2
+    steepness = STEEPNESS / (1.0 + (noise / tolerance) ** 2)
+    return float(1.0 / (1.0 + squares ** (steepness / 2.0)))

@@ -105,12 +105,12 @@ def _few_decide(measured: Measured) -> str:
 
 def _hidden(surface: Surface, tolerance: float) -> str:
     """Noise that hides what the tolerance tells apart."""
-    hidden = surface.floor
+    hidden = surface.noise.p95
     if hidden <= tolerance:
         return ""
     return (
-        f"the cloud does not even agree with itself: what its halves miss one another by needs a tolerance of "
-        f"{hidden:.1%} of the diagonal, and {tolerance:.1%} is asked; give more points or less noise, or ask for more"
+        f"the cloud does not even agree with itself: 5 % of one half of it misses the other by {hidden:.1%} of the "
+        f"diagonal or more, and a tolerance of {tolerance:.1%} is asked; give more points, or less noise"
     )
 
 

@@ -60,10 +60,7 @@ def detect(
     found = examined(
         _given(shape, weights, normals, labels), tolerance=tolerance, ladder=ladder, seed=seed, clock=(clock := Clock())
     )
-    with clock("decide"):
-        decision = found.decided(tolerance)
-        steps = tuple(_step(found, t) for t in sorted(ladder))
-    return _report(found, decision, tolerance, steps, clock)
+    return told(found, tolerance=tolerance, ladder=ladder, clock=clock)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -102,6 +99,14 @@ def examined(
         pool = Pool() if doubt(measured, surface, tolerance) else explore(surface, evidence, tolerance)
         links = chain(surface, pool, BEYOND * max((tolerance, *ladder)))
     return Examined(measured=measured, surface=surface, pool=pool, links=links)
+
+
+def told(found: Examined, *, tolerance: float = TOLERANCE, ladder: Sequence[float] = (), clock: Clock) -> Detection:
+    """What is decided of an object that was examined, at tolerances not beyond those it was examined for."""
+    with clock("decide"):
+        decision = found.decided(tolerance)
+        steps = tuple(_step(found, t) for t in sorted(ladder))
+    return _report(found, decision, tolerance, steps, clock)
 
 
 def _given(
