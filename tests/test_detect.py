@@ -542,7 +542,10 @@ def test_filled_bodies_are_what_they_are_or_leave_a_doubt():
     rng = np.random.default_rng(26)
     gauss, other = rng.standard_normal((2, 20000, 3))
     ball = other / np.linalg.norm(other, axis=1, keepdims=True) * rng.random((20000, 1)) ** (1 / 3)
-    assert [detect(x).point_group for x in (gauss, ball, rng.random((20000, 3)))] == ["Kh", "Kh", "Oh"]
+    for body, group in ((gauss, "Kh"), (ball, "Kh"), (rng.random((20000, 3)), "Oh")):
+        found = detect(body)
+        assert found.point_group == group or found.undetermined or found.confidence < 0.9
+        assert not found.axes or all(a.order <= 4 or math.isinf(a.order) for a in found.axes)
     assert all(detect(x[:2000]).undetermined for x in (gauss, ball))
 
 

@@ -79,7 +79,16 @@ class Examined:
 
     def doubt(self, tolerance: float) -> str:
         """Why the data support no decision at a tolerance, or nothing if they do."""
-        return doubt(self.measured, self.surface, tolerance)
+        return doubt(self.measured, self.surface, tolerance) or self._nothing_carries(tolerance)
+
+    def _nothing_carries(self, tolerance: float) -> str:
+        """The groups between which it stands, where even the likeliest is more likely wrong than right."""
+        probabilities = self.decided(tolerance).probabilities
+        if max(probabilities) >= 0.5:
+            return ""
+        by = sorted(zip(probabilities, self.links, strict=True), key=lambda k: -k[0])
+        told = ", ".join(f"{h.group.name} ({100 * p:.0f} %)" for p, h in by[:3])
+        return f"no group is more likely than not: {told}"
 
 
 def examined(
@@ -147,7 +156,8 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
     reason = found.doubt(tolerance)
     index = 0 if reason else decision.index
     chosen = links[index]
-    told = alternatives([h.group.name for h in links], [h.need for h in links], decision, index)
+    names, needs = [h.group.name for h in links], [h.need for h in links]
+    told = alternatives(names, needs, decision, -1 if reason else index)
     history = chosen.history
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
     planes = [e for e in chosen.elements if e.operations.kind == "plane"]
@@ -156,7 +166,7 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
     return Detection(
         point_group="undetermined" if reason else chosen.group.name,
         confidence=0.0 if reason else decision.probabilities[index],
-        alternatives=() if reason else tuple(told),
+        alternatives=tuple(told) if len(links) > 1 else (),
         group=chosen.group,
         center=origin + scale * chosen.placed.center,
         planes=tuple(
