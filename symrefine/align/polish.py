@@ -90,7 +90,7 @@ def polish(
         before, settled = x, False
         for _ in range(MAX_OUTER):
             scale_now = robust_scale(met.errors(start.moved(x)), target.spacing, reach)
-            step, inverse, sigmas = _step(_model(met, start, x, prior, scale_now), x)
+            step, inverse, sigmas = _step(_model(met, start, x, prior, scale_now), x, scale_now)
             x, covariance, length = x + step, inverse[:6, :6], float(np.linalg.norm(step))
             settled = scale_now > reach and (length < SETTLED or sigmas < WITHIN_NOISE)
             reach = min(reach, 4.0 * length)
@@ -162,8 +162,11 @@ def _jacobian(motion: Similarity, size: int) -> Array:
     return jacobian[:, :size]
 
 
-def _step(linearise: Callable[[Array], Linearisation], at: Array) -> tuple[Array, Array, float]:
-    """Gauss-Newton over what is observable: the way from x, the covariance, zero elsewhere, and the way over that."""
+def _step(linearise: Callable[[Array], Linearisation], at: Array, scale: float) -> tuple[Array, Array, float]:
+    """Gauss-Newton over what is observable: the way from x, the covariance, zero elsewhere, and the way over that.
+
+    It ends with a step below the robust scale: a smaller scale is due then.
+    """
     values, vectors = np.linalg.eigh(linearise(at).hessian)
     basis = vectors[:, values > max(1e-9 * values[-1], UNOBSERVABLE**-2)]
 
@@ -171,6 +174,6 @@ def _step(linearise: Callable[[Array], Linearisation], at: Array) -> tuple[Array
         full = linearise(at + basis @ y)
         return replace(full, gradient=basis.T @ full.gradient, hessian=basis.T @ full.hessian @ basis)
 
-    found = minimise(within, np.zeros(basis.shape[1]), tolerance=SETTLED)
+    found = minimise(within, np.zeros(basis.shape[1]), tolerance=scale)
     sigmas = float(np.sqrt(found.x @ found.hessian @ found.x / max(1, len(found.x))))
     return basis @ found.x, basis @ np.linalg.inv(found.hessian) @ basis.T, sigmas

@@ -25,11 +25,13 @@ HILLS = 8
 # A rival that misses by less than this share of the limits is good, no other of its determinant is tried: clean samples
 # of true maps show 0.16 at most, a wheel off by four degrees 0.27.
 GOOD = 0.2
+# Surfaces that miss by less than this share of the limits agree, whatever their densities: noise of 2 % shows as much.
+AGREED = 0.35
 # The proper map is as good if its miss is below this many times that of the improper one: 1.2 at most for exact mirror
 # symmetry; 2.5 and more for a propeller, a camera, a posed ant.
 AS_GOOD = 2.0
 # Rivals judged for each determinant, and turns about the axis that the moments leave open.
-JUDGED = 4
+JUDGED = 3
 # Standard deviation that the moments' rotation is never trusted beyond, radians.
 TRUST = 1e-3
 # Turns about an axis that azimuths are compared at: half a degree apart.
@@ -58,8 +60,8 @@ class Choice:
 
     @property
     def merit(self) -> tuple[float, float]:
-        """The less the better: first that the surfaces agree well, then that the moments do."""
-        return max(self.excess, GOOD), self.misfit
+        """The less the better: first that the surfaces agree, then that the moments do."""
+        return max(self.excess, AGREED), self.misfit
 
 
 def choose(evidence: Evidence, *, reflections: bool = True) -> Choice:
@@ -69,7 +71,7 @@ def choose(evidence: Evidence, *, reflections: bool = True) -> Choice:
     the area.
     """
     first = _choose(evidence, reflections)
-    if first.merit <= (GOOD, RIVAL) or few(evidence.source.shape, evidence.target.shape):
+    if first.merit <= (AGREED, RIVAL) or few(evidence.source.shape, evidence.target.shape):
         return first
     evened = replace(evidence, source=evidence.source.evened(), target=evidence.target.evened())
     return min(first, _choose(evened, reflections), key=lambda c: c.merit)
