@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from symrefine.align.moment_fit import MomentPair
+from symrefine.align.moment_fit import LONGEST, MomentPair
 from symrefine.geometry import Array, read_only
 from symrefine.moments.action import FLOOR, Harmonics, flattened, row_variance
 from symrefine.moments.harmonics import harmonic_moments
@@ -18,10 +18,6 @@ from symrefine.propose.spectrum import whitened
 
 # Rotations of the grid: 11 degrees to the nearest one at worst, against hills 30 degrees wide at degree 6.
 GRID, GRID_DEGREE = 6000, 6
-# Maxima nearer than this (radians) are the same hill.
-APART = 0.35
-# Added to the strength of a row of coefficients before it is divided by it: weak rows are noise.
-WEAK = 1e-3
 
 
 def harmonic_pair(source: Moments, target: Moments) -> MomentPair:
@@ -75,7 +71,7 @@ def landscape(source: Moments, target: Moments) -> tuple[Array, Array]:
             a[0], b[0] = (p[l][0, 0] for p in plain)
         noise = sum(_noise(p[l][1:, :count], l) for p in plain)
         strength = np.sqrt((a**2).sum(axis=1) * (b**2).sum(axis=1))
-        kernel = (a / (strength + noise + WEAK)[:, None]).T @ b
+        kernel = (a / (strength + noise + np.sqrt(FLOOR))[:, None]).T @ b
         (odd if l % 2 else even)[:] += _grid_table(l) @ kernel.ravel().astype(np.float32)
     return even + odd, even - odd
 
@@ -86,11 +82,14 @@ def _noise(replicates: Array, l: int) -> Array:
 
 
 def hills(scores: Array, det: int, *, count: int) -> Array:
-    """The `count` highest hills of one of the two landscapes, as matrices [count, 3, 3] of determinant `det`."""
+    """The `count` highest hills of one of the two landscapes, as matrices [count, 3, 3] of determinant `det`.
+
+    Maxima within one step of the fit are the same hill.
+    """
     rest = scores.copy()
     flat = grid_rotations().reshape(GRID, 9)
     chosen: list[int] = []
     for _ in range(count):
         chosen.append(int(np.argmax(rest)))
-        rest[flat @ flat[chosen[-1]] > 1.0 + 2.0 * np.cos(APART)] = -np.inf
+        rest[flat @ flat[chosen[-1]] > 1.0 + 2.0 * np.cos(LONGEST)] = -np.inf
     return np.asarray(det * grid_rotations()[chosen])

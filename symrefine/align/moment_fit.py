@@ -17,18 +17,17 @@ from symrefine.fit.gauss_newton import Linearisations, minimise_all
 from symrefine.geometry import Array, orthogonal_factor
 from symrefine.moments.action import FLOOR, Action, turned_by
 
-# Steps for every start, and for those whose cost per number is then within this factor of the best: every start that
-# ends at the best map is there after 3 steps, and quadratic convergence leaves rounding after 4 more.
-FIRST_STEPS, LAST_STEPS, IN_SIGHT = 4, 8, 30.0
+# Steps at most.
+STEPS = 12
 # Longest step (radians): half of a period of degree 6.
 LONGEST = 0.3
 # A step of this (radians) leaves 1e-14 where the moments agree to rounding; else the costs come to a standstill first.
 SETTLED, STANDSTILL = 1e-7, 1e-5
 # Matrices nearer than this (Frobenius norm; 0.8 degrees) are one.
 SAME = 0.02
-# A map is as good as the best if its cost is below this many times the best, or within so much per number of it: on 52
-# objects, costs of true maps scatter between 0.02 and 2.5 per number, as the errors of moments are correlated.
-RIVAL, PER_NUMBER = 5.0, 2.0
+# A map is as good as the best if its cost is below this many times the best, or what sampling explains: on 52 objects,
+# costs of true maps scatter between 0.02 and 2.5 per number, as the errors of moments are correlated.
+RIVAL = 5.0
 # Moments that agree to this are those of the same points: some hundred roundings.
 ROUNDING = 1e-7
 
@@ -76,7 +75,7 @@ class Fits:
         return np.sign(np.linalg.det(self.matrices))
 
 
-def fit(pair: MomentPair, starts: Array, *, steps: int = FIRST_STEPS + LAST_STEPS) -> Fits:
+def fit(pair: MomentPair, starts: Array) -> Fits:
     """Gauss-Newton from each start [K, n, n]; the determinants stay."""
     root = np.sqrt(pair.weights)
 
@@ -88,20 +87,15 @@ def fit(pair: MomentPair, starts: Array, *, steps: int = FIRST_STEPS + LAST_STEP
         )
 
     found = minimise_all(
-        linearise, starts, move=turned_by, max_steps=steps, tolerance=SETTLED, longest=LONGEST, standstill=STANDSTILL
+        linearise, starts, move=turned_by, max_steps=STEPS, tolerance=SETTLED, longest=LONGEST, standstill=STANDSTILL
     )
     order = np.argsort(found.costs, kind="stable")
     return Fits(matrices=orthogonal_factor(found.x), costs=found.costs, hessians=found.hessians)[order]
 
 
 def best_fits(pair: MomentPair, starts: Array) -> Fits:
-    """Distinct maps by rising cost: a few steps from all starts [K, n, n], the rest from those in sight of the best."""
-    coarse = _distinct(fit(pair, starts, steps=FIRST_STEPS))
-    near = coarse[coarse.costs <= IN_SIGHT * (coarse.costs[0] + pair.size)]
-    return _distinct(fit(pair, near.matrices, steps=LAST_STEPS))
-
-
-def _distinct(fits: Fits) -> Fits:
+    """Distinct maps by rising cost, from starts [K, n, n]."""
+    fits = fit(pair, starts)
     kept: list[int] = []
     for i, m in enumerate(fits.matrices):
         if all(np.linalg.norm(m - fits.matrices[k]) > SAME for k in kept):
@@ -111,7 +105,7 @@ def _distinct(fits: Fits) -> Fits:
 
 def as_good(pair: MomentPair, fits: Fits) -> Fits:
     """The fits that sampling noise cannot tell from the best."""
-    return fits[fits.costs <= RIVAL * fits.costs[0] + PER_NUMBER * pair.size]
+    return fits[fits.costs <= RIVAL * max(float(fits.costs[0]), float(pair.size))]
 
 
 def exact(pair: MomentPair, fits: Fits) -> Fits:

@@ -15,7 +15,7 @@ from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import ntuples
 from symrefine.propose.folds import azimuthal_spectrum
 from symrefine.shape import Shape
-from symrefine.surface.skin import LocalPlanes, Skin, isolated_points, make_skin
+from symrefine.surface.skin import FEW, NEIGHBOURS, LocalPlanes, Skin, isolated_points, make_skin
 
 # Local planes of the source and of the target, and points below which local planes say nothing.
 SOURCE_PLANES, TARGET_PLANES, FEWEST = 800, 2000, 60
@@ -23,10 +23,6 @@ SOURCE_PLANES, TARGET_PLANES, FEWEST = 800, 2000, 60
 THIN = 0.15
 # Points of a cloud that planes are fitted to at most, and points that a mesh is sampled at.
 DENSE = 20000
-# Where neither side has more points than this they stand for themselves (atoms), not for a surface.
-FEW = 250
-# Neighbours whose distance tells the density at a point, and the bound of what is made of it, over the median.
-DENSITY_NEIGHBOURS, DENSITY_BOUND = 8, 30.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,10 +44,8 @@ class Side:
 
         if self.is_mesh or self.shape.weights is not None:
             return self
-        points, reach = self.shape.points, min(DENSITY_NEIGHBOURS, len(self.shape.points) - 1)
-        area = cKDTree(points).query(points, k=[reach + 1])[0][:, 0] ** 2
-        middle = max(float(np.median(area)), 1e-300)
-        weights = np.clip(area, middle / DENSITY_BOUND, middle * DENSITY_BOUND)
+        points, reach = self.shape.points, min(NEIGHBOURS[0], len(self.shape.points))
+        weights = cKDTree(points).query(points, k=[reach])[0][:, 0] ** 2
         parts = len(self.moments.replicates)
         moments = central_moments(points, weights, self.moments.order, parts=parts)
         return Side(shape=self.shape, moments=moments, weights=weights / weights.sum())

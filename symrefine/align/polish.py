@@ -12,17 +12,13 @@ import numpy as np
 
 from symrefine.fit.gauss_newton import Linearisation, minimise
 from symrefine.fit.matching import each_coordinate, geman_mcclure, meet, robust_scale, worth
-from symrefine.fit.refine import SETTLED, WITHIN_NOISE
+from symrefine.fit.refine import MAX_OUTER, SETTLED, WITHIN_NOISE
 from symrefine.fit.residual import SIZE, design_rows, gram
 from symrefine.geometry import Array, Isometry, cross_matrix, rotation
 from symrefine.surface.skin import LocalPlanes, Skin
 
-# Matchings at most, and new robust scales on the pairs of each.
-MAX_OUTER, RESCALED = 12, 3
 # Motions uncertain by more than this (radians, RMS radii) are left alone: gliding along a cylinder is an example.
 UNOBSERVABLE = 0.1
-# Pairs below which there is nothing to polish: twice the unknowns.
-FEWEST_PAIRS = 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -68,7 +64,6 @@ def polish(
     error: float,
     known: Array,
     scale: bool = False,
-    outer: int = MAX_OUTER,
 ) -> Polished:
     """Alternate matching and Gauss-Newton on the matched planes until the step is negligible.
 
@@ -82,21 +77,20 @@ def polish(
         known: [6, 6] information (inverse covariance) that the start carries; zeros if none. Under noise the moments
             know some motions better than the points do; without noise the points know all of them better.
         scale: whether the scale is an unknown too.
-        outer: matchings at most.
     """
     prior: Array = np.zeros((7, 7))
     prior[:6, :6] = known
     prior = prior if scale else prior[:6, :6]
     x, reach = np.zeros(len(prior)), error
     covariance: Array = np.linalg.pinv(known, rcond=1e-12, hermitian=True)
-    for index in range(1, outer + 1):
+    for index in range(1, MAX_OUTER + 1):
         met = _met(source, target, start.moved(x), reach)
-        if len(met.worth) < FEWEST_PAIRS:
+        if len(met.worth) == 0:
             return Polished(motion=start.moved(x), covariance=covariance, steps=index - 1, converged=False)
         before, settled = x, False
-        for _ in range(RESCALED):
+        for _ in range(MAX_OUTER):
             scale_now = robust_scale(met.errors(start.moved(x)), target.spacing, reach)
-            step, inverse, sigmas = _step(_model(met, start, x, prior, scale_now), x)
+            step, inverse, sigmas = _step(_model(met, start, x, prior, scale_now), x, scale_now)
             x, covariance, length = x + step, inverse[:6, :6], float(np.linalg.norm(step))
             settled = scale_now > reach and (length < SETTLED or sigmas < WITHIN_NOISE)
             reach = min(reach, 4.0 * length)
@@ -104,7 +98,7 @@ def polish(
                 break
         if settled and float(np.linalg.norm(x - before)) < target.spacing:
             return Polished(motion=start.moved(x), covariance=covariance, steps=index, converged=True)
-    return Polished(motion=start.moved(x), covariance=covariance, steps=outer, converged=False)
+    return Polished(motion=start.moved(x), covariance=covariance, steps=MAX_OUTER, converged=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -168,8 +162,11 @@ def _jacobian(motion: Similarity, size: int) -> Array:
     return jacobian[:, :size]
 
 
-def _step(linearise: Callable[[Array], Linearisation], at: Array) -> tuple[Array, Array, float]:
-    """Gauss-Newton over what is observable: the way from x, the covariance, zero elsewhere, and the way over that."""
+def _step(linearise: Callable[[Array], Linearisation], at: Array, scale: float) -> tuple[Array, Array, float]:
+    """Gauss-Newton over what is observable: the way from x, the covariance, zero elsewhere, and the way over that.
+
+    It ends with a step below the robust scale: a smaller scale is due then.
+    """
     values, vectors = np.linalg.eigh(linearise(at).hessian)
     basis = vectors[:, values > max(1e-9 * values[-1], UNOBSERVABLE**-2)]
 
@@ -177,6 +174,6 @@ def _step(linearise: Callable[[Array], Linearisation], at: Array) -> tuple[Array
         full = linearise(at + basis @ y)
         return replace(full, gradient=basis.T @ full.gradient, hessian=basis.T @ full.hessian @ basis)
 
-    found = minimise(within, np.zeros(basis.shape[1]), tolerance=SETTLED)
+    found = minimise(within, np.zeros(basis.shape[1]), tolerance=scale)
     sigmas = float(np.sqrt(found.x @ found.hessian @ found.x / max(1, len(found.x))))
     return basis @ found.x, basis @ np.linalg.inv(found.hessian) @ basis.T, sigmas

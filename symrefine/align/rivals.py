@@ -6,40 +6,36 @@ tell apart: the two determinants of a thin propeller, or the teeth of a gear tha
 polished and judged on the points.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
 from symrefine.align.landscape import hills, landscape
-from symrefine.align.moment_fit import Fits, as_good, best_fits, covariance, exact, fit, misfit, preference
+from symrefine.align.moment_fit import LONGEST, RIVAL, Fits, as_good, best_fits, covariance, exact, misfit, preference
 from symrefine.align.pair import Evidence, few
-from symrefine.align.polish import MAX_OUTER, Polished, Similarity, polish
+from symrefine.align.polish import Polished, Similarity, polish
+from symrefine.align.procrustes import SIGNIFICANT
 from symrefine.geometry import Array, frame_with_z, rotation
 from symrefine.surface.skin import LocalPlanes, Skin
 
 # Hills of the landscape that are climbed, for each determinant.
 HILLS = 8
-# Above this cost per coefficient the moments hardly fit, and the densities may differ; above the second not at all.
-UNEVEN, MISFIT = 4.0, 20.0
-# Singular values of the n-tuples this many times beyond significance make the landscape unnecessary.
-CLEAR = 2.5
-# Standard deviations by which the moments must prefer one determinant to decide it alone.
-DECIDED = 5.0
-# A rival that misses by less than this share of the limits is good; no other of its determinant is tried.
-GOOD = 0.35
+# A rival that misses by less than this share of the limits is good, no other of its determinant is tried: clean samples
+# of true maps show 0.16 at most, a wheel off by four degrees 0.27.
+GOOD = 0.2
+# Surfaces that miss by less than this share of the limits agree, whatever their densities: noise of 2 % shows as much.
+AGREED = 0.35
 # The proper map is as good if its miss is below this many times that of the improper one: 1.2 at most for exact mirror
 # symmetry; 2.5 and more for a propeller, a camera, a posed ant.
 AS_GOOD = 2.0
-# Rivals judged for each determinant, and matchings spent on each; fewer where the other determinant has a good
-# one already, and no search for phases where they are hopeless.
-JUDGED, LOOK_OUTER = 4, 4
-LAST_CHANCE, HOPELESS = 2, 2.0
-# Bounds of what the start of a polish may be off, radians; the moments' own estimate lies between.
-START_ERROR = (0.01, 0.3)
+# Rivals judged for each determinant, and turns about the axis that the moments leave open.
+JUDGED = 3
 # Standard deviation that the moments' rotation is never trusted beyond, radians.
 TRUST = 1e-3
-PHASES, PHASE_GRID = 3, 720
+# Turns about an axis that azimuths are compared at: half a degree apart.
+PHASES = 720
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,8 +60,8 @@ class Choice:
 
     @property
     def merit(self) -> tuple[float, float]:
-        """The less the better: first that the surfaces agree well, then that the moments do."""
-        return max(self.excess, GOOD), self.misfit
+        """The less the better: first that the surfaces agree, then that the moments do."""
+        return max(self.excess, AGREED), self.misfit
 
 
 def choose(evidence: Evidence, *, reflections: bool = True) -> Choice:
@@ -75,7 +71,7 @@ def choose(evidence: Evidence, *, reflections: bool = True) -> Choice:
     the area.
     """
     first = _choose(evidence, reflections)
-    if first.merit <= (GOOD, UNEVEN) or few(evidence.source.shape, evidence.target.shape):
+    if first.merit <= (AGREED, RIVAL) or few(evidence.source.shape, evidence.target.shape):
         return first
     evened = replace(evidence, source=evidence.source.evened(), target=evidence.target.evened())
     return min(first, _choose(evened, reflections), key=lambda c: c.merit)
@@ -90,7 +86,7 @@ def _choose(evidence: Evidence, reflections: bool) -> Choice:
         return Choice(evidence=evidence, motion=best, covariance=np.zeros((3, 3)), exact=True, misfit=0.0, excess=0.0)
     rivals, unlike, spread = _rivals(evidence, fitted), misfit(pair, fitted), covariance(pair, fitted)
     motion, excess = Similarity(matrix=rivals.matrices[0], shift=np.zeros(3)), 0.0
-    if (len(rivals.costs) > 1 or unlike > MISFIT) and evidence.has_points:
+    if (len(rivals.costs) > 1 or unlike > RIVAL) and evidence.has_points:
         judged = _judged(evidence, rivals, spread)
         motion, excess = judged.motion, judged.excess
     return Choice(evidence=evidence, motion=motion, covariance=spread, exact=False, misfit=unlike, excess=excess)
@@ -102,7 +98,7 @@ def _rivals(evidence: Evidence, fitted: Fits) -> Fits:
     signs = near.signs
     mirrored = np.flatnonzero(signs != signs[0])
     noise = np.sqrt(max(1.0, misfit(pair, fitted)))
-    if len(mirrored) and preference(pair, near.matrices[0], near.matrices[mirrored[0]]) > DECIDED * noise:
+    if len(mirrored) and preference(pair, near.matrices[0], near.matrices[mirrored[0]]) > SIGNIFICANT * noise:
         return near[np.flatnonzero(signs == signs[0])]
     return near
 
@@ -111,18 +107,13 @@ def candidates(evidence: Evidence, determinants: tuple[int, ...]) -> Fits:
     """Maps that explain the moments, by rising cost."""
     closed, pair = evidence.closed, evidence.harmonics
     starts = [m for m in (closed.matrix, closed.flipped) if int(np.sign(np.linalg.det(m))) in determinants]
-    if closed.singular_values[1] > CLEAR * closed.significance:
-        fitted = fit(pair, np.array(starts))
-        if fitted.costs[0] < UNEVEN * pair.size:
+    if closed.rank > 1:
+        fitted = best_fits(pair, np.array(starts))
+        if misfit(pair, fitted) < RIVAL:
             return fitted
     scores = dict(zip((1, -1), landscape(evidence.source.moments, evidence.target.moments), strict=True))
     climbed = [hills(scores[d], d, count=HILLS) for d in determinants]
     return best_fits(pair, np.concatenate([starts, *climbed]))
-
-
-def _start_error(covariance: Array) -> float:
-    """Three standard deviations of the rotation, within bounds: how far a start may be off."""
-    return float(np.clip(3.0 * np.sqrt(np.trace(covariance)), *START_ERROR))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -136,12 +127,8 @@ def _judged(evidence: Evidence, rivals: Fits, covariance: Array) -> _Judged:
     best: dict[int, _Judged] = {}
     for det in dict.fromkeys(int(sign) for sign in rivals.signs):  # by cost
         of_det = rivals.matrices[rivals.signs == det]
-        beaten = any(b.excess <= GOOD for b in best.values())
-        found = _first_good(evidence, iter(of_det[: LAST_CHANCE if beaten else JUDGED]), covariance)
-        nearest = min(f.excess for f in found)
-        if nearest > GOOD and not (beaten and nearest > HOPELESS):
-            found += _first_good(evidence, _phases(evidence, of_det[0], rivals), covariance)
-        best[det] = min(found, key=lambda f: f.excess)
+        among = chain(of_det[:JUDGED], _phases(evidence, of_det[0], rivals))
+        best[det] = _first_good(evidence, among, covariance)
     if len(best) < 2:
         return next(iter(best.values()))
     proper, improper = best[1], best[-1]
@@ -149,16 +136,16 @@ def _judged(evidence: Evidence, rivals: Fits, covariance: Array) -> _Judged:
     return proper if as_good else improper
 
 
-def _first_good(evidence: Evidence, matrices: Iterator[Array], covariance: Array) -> list[_Judged]:
-    """Polish and judge one after the other until one is good."""
+def _first_good(evidence: Evidence, matrices: Iterable[Array], covariance: Array) -> _Judged:
+    """Polish and judge one after the other until one is good, or the best of all."""
     found: list[_Judged] = []
     for m in matrices:
         start = Similarity(matrix=m, shift=np.zeros(3))
-        motion = _polish(evidence, evidence.surfaces.target, start, covariance, LOOK_OUTER).motion
+        motion = _polish(evidence, evidence.surfaces.target, start, covariance).motion
         found.append(_Judged(motion=motion, excess=evidence.surfaces.excess(motion)))
         if found[-1].excess <= GOOD:
             break
-    return found
+    return min(found, key=lambda f: f.excess)
 
 
 def _phases(evidence: Evidence, matrix: Array, rivals: Fits) -> Iterator[Array]:
@@ -169,26 +156,25 @@ def _phases(evidence: Evidence, matrix: Array, rivals: Fits) -> Iterator[Array]:
     axis = np.linalg.eigh(rivals.hessians[0])[1][:, 0]
     frame = frame_with_z(axis)
     source, target = evidence.source.azimuths(frame @ matrix), evidence.target.azimuths(frame)
-    spectrum = np.zeros(PHASE_GRID, complex)
+    spectrum = np.zeros(PHASES, complex)
     spectrum[1 : len(source)] = (np.conj(target) * source).sum(axis=1)[1:]
     score = np.fft.ifft(spectrum).real
-    for _ in range(PHASES):
+    for _ in range(JUDGED):
         i = int(np.argmax(score))
-        yield rotation(axis, 2.0 * np.pi * i / PHASE_GRID) @ matrix
-        window = (np.arange(-6, 7) + i) % PHASE_GRID
+        yield rotation(axis, 2.0 * np.pi * i / PHASES) @ matrix
+        window = (np.arange(-6, 7) + i) % PHASES
         score[window] = -np.inf
 
 
 def polished(evidence: Evidence, start: Similarity, covariance: Array) -> Polished:
     """Polish on the points of the evidence from a start whose rotation the moments know with this covariance [3, 3]."""
-    return _polish(evidence, evidence.met, start, covariance, MAX_OUTER)
+    return _polish(evidence, evidence.met, start, covariance)
 
 
-def _polish(
-    evidence: Evidence, target: Skin | LocalPlanes, start: Similarity, covariance: Array, outer: int
-) -> Polished:
-    error, known = _start_error(covariance), _information(evidence, covariance)
-    return polish(evidence.moving, target, start, error=error, known=known, scale=evidence.scale, outer=outer)
+def _polish(evidence: Evidence, target: Skin | LocalPlanes, start: Similarity, covariance: Array) -> Polished:
+    error = min(3.0 * float(np.sqrt(np.trace(covariance))), LONGEST)
+    known = _information(evidence, covariance)
+    return polish(evidence.moving, target, start, error=error, known=known, scale=evidence.scale)
 
 
 def _information(evidence: Evidence, covariance: Array) -> Array:

@@ -12,20 +12,22 @@ from math import factorial, prod
 
 import numpy as np
 
-from symrefine.align.moment_fit import SAME, Fits, MomentPair, as_good, best_fits, covariance, exact, misfit
+from symrefine.align.moment_fit import LONGEST, SAME, Fits, MomentPair, as_good, best_fits, covariance, exact, misfit
 from symrefine.align.procrustes import Procrustes, procrustes
 from symrefine.geometry import Array
 from symrefine.moments.action import FLOOR, Monomials, skew
 from symrefine.moments.moments import Moments, exponents
 from symrefine.ntuples.contract import NTuples
 
+# Variance across, as a fraction of the whole, below which points count as lying in a subspace: rounding of float32.
+FLAT = 1e-12
+# Cost per moment above which the objects differ: correlated errors of 300 numbers make 17 of it.
+MISFIT = 20.0
 # Angles tried in the plane, for each determinant; up to this dimension all signs of the principal axes are.
 ANGLES, ALL_SIGNS = 24, 5
-# Variance of a width that rounding leaves, RMS radii squared.
-THIN = 1e-6
-# A turn known to no better than this (radians) is not determined, nor one whose information is mostly noise: where the
-# moments of the two, with their independent errors, share less than this part of it.
-UNKNOWN_RAD, SHARED = 0.3, 0.75
+# A turn is not determined if its information is mostly noise: where the moments of the two, with their independent
+# errors, share less than this part of it.
+SHARED = 0.75
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -81,7 +83,7 @@ def monomial_pair(source: Moments, target: Moments) -> MomentPair:
     a, b = (np.concatenate([m.values[None], m.replicates]) for m in (source, target))
     b = action.turned(axes.T[None], b)[0]
     widths = [np.linalg.eigvalsh(m.covariance) for m in (source, target)]
-    size = np.prod(np.maximum(0.5 * (widths[0] + widths[1]), THIN) ** table, axis=1)
+    size = np.prod(np.maximum(0.5 * (widths[0] + widths[1]), FLAT) ** table, axis=1)
     own = action.turned(np.linalg.eigh(source.covariance)[1].T[None], a)[0]
     noise = _relative_variance(own[1:], size, dim, order) + _relative_variance(b[1:], size, dim, order)
     told = table.sum(axis=1) > 1
@@ -130,7 +132,7 @@ def _free(pair: MomentPair, fits: Fits, *, exact: bool) -> Array:
     tangents = pair.action.tangents(np.concatenate([pair.moved(fits.matrices[:1]), pair.target[:1]]))
     here, there = np.sqrt(pair.weights) * tangents
     shared = np.einsum("aq,ak,bk,bq->q", vectors, here, there, vectors, optimize=True) / np.maximum(values, 1e-300)
-    lost = values < 1e-12 * values[-1] if exact else (sigma > UNKNOWN_RAD) | (shared < SHARED)
+    lost = values < 1e-12 * values[-1] if exact else (sigma > LONGEST) | (shared < SHARED)
     if not lost.any():
         return np.zeros((0, dim))
     u, s, _ = np.linalg.svd(np.concatenate(list(skew(vectors[:, lost].T, dim)), axis=1))

@@ -13,8 +13,8 @@ from symrefine.align.coset import Coset, coset_of_group, coset_of_list, lifted
 from symrefine.align.moment_fit import ROUNDING
 from symrefine.align.pair import Evidence, Side, few
 from symrefine.align.polish import Similarity
-from symrefine.align.rivals import MISFIT, choose, polished
-from symrefine.align.span import span_fit
+from symrefine.align.rivals import choose, polished
+from symrefine.align.span import FLAT, MISFIT, span_fit
 from symrefine.clock import Clock
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
@@ -29,12 +29,10 @@ from symrefine.surface.misses import TOLERANCE
 
 __all__ = ["Alignment", "align"]
 
-ORDER, PARTS = 8, 16
-# Orders in other dimensions: n^order components each.
-ORDER_ND, ORDER_HIGH = 5, 3
-HIGH_DIMENSION, HIGHEST_DIMENSION = 7, 10
-# Variance across, as a fraction of the whole, below which points count as lying in a subspace: rounding of float32.
-FLAT = 1e-12
+# Highest order of the moments in so many dimensions: some 100 to 500 moments, of n^order components.
+ORDERS = {1: 8, 2: 8, 3: 8, 4: 5, 5: 5, 6: 5, 7: 3, 8: 3, 9: 3, 10: 3}
+# Parts of the jackknife, as in `detect`.
+PARTS = 16
 # Radii that differ by more than this factor are no matter of sampling.
 RADII = 1.2
 
@@ -93,8 +91,8 @@ def _check(source: Shape, target: Shape, tolerance: float) -> None:
         raise InputError(
             f"{source.source} has {source.dim} coordinates, {target.source} has {target.dim}; both need the same number"
         )
-    if source.dim > HIGHEST_DIMENSION:
-        raise InputError(f"points have {source.dim} coordinates; align takes {HIGHEST_DIMENSION} at most")
+    if source.dim > max(ORDERS):
+        raise InputError(f"points have {source.dim} coordinates; align takes {max(ORDERS)} at most")
     if {source.measure, target.measure} == {"surface", "solid"}:
         raise InputError(
             f"{source.source} is taken as a {source.measure}, {target.source} as a {target.measure}; "
@@ -104,12 +102,8 @@ def _check(source: Shape, target: Shape, tolerance: float) -> None:
         raise InputError(f"tolerance is {tolerance}; expected a fraction of the diagonal in (0, 0.2]")
 
 
-def _order(dim: int) -> int:
-    return ORDER if dim <= 3 else ORDER_ND if dim < HIGH_DIMENSION else ORDER_HIGH
-
-
 def _side(shape: Shape, parts: int) -> Side:
-    order = _order(shape.dim)
+    order = ORDERS[shape.dim]
     if shape.faces is not None:
         return Side(shape=shape, moments=shape_moments(shape, order), weights=np.zeros(0))
     weights = np.ones(len(shape.points)) if shape.weights is None else shape.weights

@@ -29,11 +29,9 @@ class Surfaces:
 
         Local planes merge the two faces of a thin sheet, or follow each, as the density of the points has it.
         """
-        own = [np.sort(disc_distances(s, s.points, skip_self=True)) for s in (self.source, self.target)]
-        quantiles = np.linspace(0.0, 1.0, len(own[0]))
-        both = own[0] + np.quantile(own[1], quantiles)
+        own = [disc_distances(s, s.points, skip_self=True) for s in (self.source, self.target)]
         blurred = abs(float(self.source.thickness.mean() - self.target.thickness.mean()))
-        return Deviation.of((both + blurred) / self.diagonal)
+        return Deviation.of((np.concatenate(own) + blurred) / self.diagonal)
 
     def misses(self, motion: Isometry) -> Array:
         """Distances from the moved source to the target, fractions of the diagonal."""

@@ -26,14 +26,6 @@ class Linearisations:
     gradients: Array
     hessians: Array
 
-    def where(self, chosen: NDArray[np.bool_], other: "Linearisations") -> "Linearisations":
-        """These at the chosen points [K], the other's elsewhere."""
-        return Linearisations(
-            costs=np.where(chosen, self.costs, other.costs),
-            gradients=np.where(chosen[:, None], self.gradients, other.gradients),
-            hessians=np.where(chosen[:, None, None], self.hessians, other.hessians),
-        )
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Solution:
@@ -123,31 +115,32 @@ def minimise_all(
         longest: steps are cut to this length.
         standstill: share of its cost that a step must gain; with less a start has converged too.
     """
-    x, here = np.array(starts, dtype=np.float64), linearise(starts)
+    x, first = np.array(starts, dtype=np.float64), linearise(starts)
+    costs, gradients, hessians = first.costs.copy(), first.gradients.copy(), first.hessians.copy()
     damping, steps = np.zeros(len(x)), np.zeros(len(x), dtype=np.intp)
-    converged = np.zeros(len(x), dtype=np.bool_)
+    converged = np.diagonal(hessians, axis1=1, axis2=2).max(axis=1, initial=0.0) <= 0.0
     for _ in range(max_steps):
-        scale = np.diagonal(here.hessians, axis1=1, axis2=2).max(axis=1, initial=0.0)
-        converged = converged | (scale <= 0.0)
-        if converged.all():
+        active = np.flatnonzero(~converged)
+        if not active.size:
             break
-        step = _steps(here, scale, damping)
+        step = _steps(gradients[active], hessians[active], damping[active])
         length = np.linalg.norm(step, axis=1)
         step *= np.minimum(1.0, longest / np.maximum(length, 1e-300))[:, None]
-        trial = move(x, step)
+        trial = move(x[active], step)
         there = linearise(trial)
-        better = (there.costs <= here.costs) & ~converged
-        still = (length < tolerance) | (better & (here.costs - there.costs < standstill * there.costs))
-        x = np.where(better.reshape(-1, *[1] * (x.ndim - 1)), trial, x)
-        here = there.where(better, here)
-        steps += better
-        damping = np.where(better, damping / 10, np.maximum(10 * damping, 1e-4))
-        converged = converged | still
-    return Solutions(x=x, costs=here.costs, hessians=here.hessians, steps=steps, converged=converged)
+        better = there.costs <= costs[active]
+        still = (length < tolerance) | (better & (costs[active] - there.costs < standstill * there.costs))
+        taken = active[better]
+        x[taken], costs[taken] = trial[better], there.costs[better]
+        gradients[taken], hessians[taken] = there.gradients[better], there.hessians[better]
+        steps[taken] += 1
+        damping[active] = np.where(better, damping[active] / 10, np.maximum(10 * damping[active], 1e-4))
+        converged[active] = still | (np.diagonal(hessians[active], axis1=1, axis2=2).max(axis=1) <= 0.0)
+    return Solutions(x=x, costs=costs, hessians=hessians, steps=steps, converged=converged)
 
 
-def _steps(here: Linearisations, scale: Array, damping: Array) -> Array:
-    """Damped Gauss-Newton steps [K, n]; zero where nothing changes the residual."""
-    ridge = np.where(scale > 0.0, scale * np.maximum(damping, 1e-12), 1.0)
-    damped = here.hessians + ridge[:, None, None] * np.eye(here.gradients.shape[1])
-    return -np.linalg.solve(damped, here.gradients[:, :, None])[:, :, 0]
+def _steps(gradients: Array, hessians: Array, damping: Array) -> Array:
+    """Damped Gauss-Newton steps [K, n]."""
+    scale = np.diagonal(hessians, axis1=1, axis2=2).max(axis=1)
+    damped = hessians + (scale * np.maximum(damping, 1e-12))[:, None, None] * np.eye(gradients.shape[1])
+    return np.asarray(-np.linalg.solve(damped, gradients[:, :, None])[:, :, 0])

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from symrefine.geometry import Array, read_only
 from symrefine.shape import Index
 
+# Up to so many points of a cloud stand for themselves (atoms), not for a surface.
+FEW = 250
 # Neighbourhood sizes tried, smallest first: large enough that noise does not decide the normal, no larger.
 NEIGHBOURS = (12, 24, 48, 96, 192)
 # Neighbourhoods wider than this (RMS radii) blur the shape itself, whatever the noise.

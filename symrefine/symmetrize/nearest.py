@@ -16,13 +16,12 @@ from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, orthogonal_factor, read_only, tight_diagonal, unit
 from symrefine.groups import PointGroup
 from symrefine.shape import Index, Shape
+from symrefine.surface.skin import FEW
 from symrefine.symmetrize.action import Action, act, generators
 from symrefine.symmetrize.finite import finite_group
 from symrefine.symmetrize.leftover import with_leftovers
 from symrefine.symmetrize.surface import Closest, closest_on
 
-# Up to so many points stand for themselves (atoms), as in `detect.FEW`.
-FEW = 250
 # Counterparts are looked for up to so many tolerances away. Where points are many they must miss by no more than so
 # much of the usual distance between points (RMS, and the worst), and in a mesh some of whose vertices have none each by
 # no more than so much of the distance to the next vertex: chance finds a nearest vertex for everything.
