@@ -7,8 +7,8 @@ import numpy as np
 
 from symrefine.geometry import Array, read_only
 from symrefine.moments.moments import Moments
-from symrefine.ndim import FLOOR, SIGNIFICANT, fixed_subspace
 from symrefine.ntuples.contract import NTuples, ntuples
+from symrefine.ntuples.rank import FLOOR, SIGNIFICANT, fixed_subspace
 from symrefine.surface.misses import TOLERANCE
 
 # The ten vectors of moments of the paper, 56 doublets in all.

@@ -14,7 +14,7 @@ from symrefine.geometry import Array, frame_with_z
 from symrefine.groups import PointGroup
 from symrefine.moments.harmonics import harmonic_moments
 from symrefine.moments.moments import Moments
-from symrefine.ntuples.rank import TupleClass
+from symrefine.ntuples.rank import FixedSubspace
 from symrefine.propose.folds import MAX_FOLD, fold_candidates
 from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candidates, whitened
 
@@ -33,7 +33,7 @@ class Evidence:
     """What is known before any point is matched: moments, the class of the n-tuples, and points to take azimuths of."""
 
     moments: Moments
-    tuples: TupleClass
+    tuples: FixedSubspace
     points: Array
     weights: Array
 
