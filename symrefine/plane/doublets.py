@@ -13,7 +13,7 @@ from symrefine.surface.misses import TOLERANCE
 
 # The ten vectors of moments of the paper, 56 doublets in all.
 PLANAR_ORDERS = ((2, 3), (2, 5), (4, 3), (4, 5), (6, 3), (6, 5), (6, 7), (6, 9), (8, 7), (8, 9))
-ORDER = 9
+ORDER = max(map(max, PLANAR_ORDERS))
 DoubletKind = Literal["centre", "line", "none"]
 _KINDS: tuple[DoubletKind, ...] = ("centre", "line", "none")
 
