@@ -10,7 +10,7 @@ from symrefine.moments.harmonics import harmonic_moments
 from symrefine.moments.moments import central_moments, shape_moments
 from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import NTuples, ntuples
-from symrefine.ntuples.rank import classify
+from symrefine.ntuples.rank import fixed_subspace
 from symrefine.propose.folds import BINS_PER_ORDER, azimuthal_spectrum, fold_candidates
 from symrefine.shape import Shape
 
@@ -39,7 +39,7 @@ def independent(shape, count, rng):
 
 
 def class_of(points, order=ORDER):
-    return classify(ntuples(central_moments(points, np.ones(len(points)), order, parts=16)))
+    return fixed_subspace(ntuples(central_moments(points, np.ones(len(points)), order, parts=16)))
 
 
 # The class of the n-tuples
@@ -49,7 +49,7 @@ def class_of(points, order=ORDER):
 @pytest.mark.parametrize(("shape", "rank"), SHAPES.values(), ids=SHAPES)
 def test_exact_moments_never_claim_more_than_the_group_leaves(shape, rank, det):
     matrix = random_orthogonal(np.random.default_rng(1), 3, det)
-    found = classify(ntuples(shape_moments(moved(shape, matrix), ORDER)))
+    found = fixed_subspace(ntuples(shape_moments(moved(shape, matrix), ORDER)))
     # Two thousandths of the bound and less are a matter of the tolerance: the mug's handle is, the table's legs not.
     assert RANKS[found.kind] == (1 if shape is SHAPES["mug"][0] else rank)
     np.testing.assert_allclose(found.singular_values[rank:], 0.0, atol=1e-9)
@@ -90,7 +90,7 @@ def test_noisy_tuples_do_not_drown_precise_ones():
     rng = np.random.default_rng(5)
     vectors = np.array([[0, 0, 0.1], [0.1, 0, 0]])
     replicates = np.stack([vectors + [[1e-6], [0.1]] * rng.standard_normal((2, 3)) for _ in range(16)])
-    found = classify(NTuples(vectors=vectors, replicates=replicates, labels=("a", "b")))
+    found = fixed_subspace(NTuples(vectors=vectors, replicates=replicates, labels=("a", "b")))
     assert found.kind == "axis"
     assert line_angle_rad(found.directions[0], [0, 0, 1]) < 0.05
 

@@ -17,7 +17,7 @@ from symrefine.geometry import line_angle_rad, random_orthogonal, unit
 from symrefine.groups import is_subgroup, point_group
 from symrefine.moments.moments import central_moments
 from symrefine.ntuples.contract import ntuples
-from symrefine.ntuples.rank import classify
+from symrefine.ntuples.rank import fixed_subspace
 from symrefine.propose.candidates import APART_RAD, Evidence, about, apart, beside, placed, proposals
 
 # Half of what order 8 resolves: a start may be off by so much.
@@ -37,7 +37,7 @@ def evidence_of(points, *, atoms=False):
     moments = central_moments(points, np.ones(len(points)), 8, parts=0 if atoms else 16)
     return Evidence(
         moments=moments,
-        tuples=classify(ntuples(moments)),
+        tuples=fixed_subspace(ntuples(moments)),
         points=(points - moments.center) / moments.scale,
         weights=np.full(len(points), 1.0 / len(points)),
         atoms=atoms,

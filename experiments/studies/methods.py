@@ -26,7 +26,7 @@ from symrefine.geometry import Array, Isometry, Plane
 from symrefine.groups import from_elements
 from symrefine.moments.moments import shape_moments
 from symrefine.ntuples.contract import ntuples
-from symrefine.ntuples.rank import classify
+from symrefine.ntuples.rank import fixed_subspace
 from symrefine.propose.folds import fold_candidates
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
@@ -132,7 +132,7 @@ def from_axis(scan: Scan) -> Answer:
     takes as known, comes from the azimuthal spectrum; correspondences and weights are ours.
     """
     moments = shape_moments(Shape(points=scan.points), ORDER, parts=PARTS)
-    tuples = classify(ntuples(moments))
+    tuples = fixed_subspace(ntuples(moments))
     if tuples.kind == "plane":
         plane = Plane(normal=tuples.directions[2], offset=float(tuples.directions[2] @ moments.center))
         return Answer(planes=[plane], group="Cs", starts=1, iterations=0, iterations_all=0, passes=0, evaluations=0)

@@ -8,7 +8,7 @@ from symrefine.geometry import Array, tight_diagonal
 from symrefine.moments.moments import Moments, shape_moments
 from symrefine.moments.quadrature import mesh_nodes, sample_surface
 from symrefine.ntuples.contract import NTuples, ntuples
-from symrefine.ntuples.rank import TupleClass, classify
+from symrefine.ntuples.rank import FixedSubspace, fixed_subspace
 from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
 from symrefine.surface.misses import Deviation
@@ -41,9 +41,9 @@ class Measured:
     vectors: NTuples
 
     @property
-    def tuples(self) -> TupleClass:
+    def tuples(self) -> FixedSubspace:
         """What the singular values of the n-tuples say."""
-        return classify(self.vectors)
+        return fixed_subspace(self.vectors)
 
 
 def measure(shape: Shape) -> Measured:

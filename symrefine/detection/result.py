@@ -7,7 +7,7 @@ from symrefine.fit.refine import Iterate
 from symrefine.geometry import Array, Axis, Plane, read_only
 from symrefine.groups import PointGroup
 from symrefine.ntuples.contract import NTuples
-from symrefine.ntuples.rank import TupleClass
+from symrefine.ntuples.rank import FixedSubspace
 from symrefine.surface.misses import Deviation
 
 
@@ -109,7 +109,7 @@ class Detection:
     diagonal: float
     undetermined: str
     staircase: tuple[Step, ...]
-    tuples: TupleClass
+    tuples: FixedSubspace
     vectors: NTuples
     history: tuple[Iterate, ...]
     points: Array

@@ -1,7 +1,7 @@
 """Points of any dimension: the subspace that their symmetries fix, and their hyperplanes of symmetry."""
 
 from symrefine.ndim.detection import Hyperplane, SubspaceDetection, detect_nd
-from symrefine.ndim.rank import FLOOR, SIGNIFICANT, FixedSubspace, fixed_subspace
+from symrefine.ntuples.rank import FLOOR, SIGNIFICANT, FixedSubspace, fixed_subspace
 
 __all__ = [
     "FLOOR",

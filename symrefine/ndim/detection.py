@@ -7,14 +7,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.errors import InputError
-from symrefine.geometry import Array, Plane, read_only
+from symrefine.geometry import Array, Plane, check_tolerance, read_only
 from symrefine.moments.moments import shape_moments
 from symrefine.ndim import sampled as samples
 from symrefine.ndim.matched import Points
-from symrefine.ndim.rank import FLOOR, FixedSubspace, fixed_subspace
 from symrefine.ndim.search import among_points, among_samples
 from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
+from symrefine.ntuples.rank import FLOOR, FixedSubspace, fixed_subspace
 from symrefine.shape import Shape
+from symrefine.surface.misses import TOLERANCE
 
 PARTS = 16
 # Up to so many points stand for themselves, without sampling noise.
@@ -72,7 +73,7 @@ class SubspaceDetection:
 
 
 def detect_nd(
-    shape: Shape | ArrayLike, *, tolerance: float = 10.0 * FLOOR, sampled: bool | None = None, seed: int = 0
+    shape: Shape | ArrayLike, *, tolerance: float = TOLERANCE, sampled: bool | None = None, seed: int = 0
 ) -> SubspaceDetection:
     """Hyperplanes of symmetry of points in n-space, 2 <= n <= 8, the group they generate, and the rank of the n-tuples.
 
@@ -94,14 +95,13 @@ def detect_nd(
         DegenerateShapeError: the points do not spread.
     """
     shape = shape if isinstance(shape, Shape) else Shape.of(shape)
-    if not 0.0 < tolerance <= 0.2:
-        raise InputError(f"tolerance is {tolerance}; expected a number in (0, 0.2]")
+    check_tolerance(tolerance)
     if not 2 <= shape.dim <= LARGEST_DIM or shape.faces is not None:
         what = "a mesh" if shape.faces is not None else f"{shape.dim} coordinates"
         raise InputError(f"{shape.source}: {what}; detect_nd takes points of 2 to {LARGEST_DIM} coordinates")
     sampled = len(shape.points) > FEW if sampled is None else sampled
     moments = shape_moments(shape, 5, parts=PARTS if sampled else 0)
-    fixed = fixed_subspace(ntuples(moments, PAPER_ORDERS), floor=0.1 * tolerance)
+    fixed = fixed_subspace(ntuples(moments, PAPER_ORDERS), floor=FLOOR * tolerance / TOLERANCE)
     points = (shape.points - moments.center) / moments.scale
     masses = np.ones(len(points)) if shape.weights is None else shape.weights
     kept = masses > 0

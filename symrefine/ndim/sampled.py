@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from symrefine.geometry import Array
-from symrefine.ndim.rank import SIGNIFICANT
+from symrefine.ntuples.rank import SIGNIFICANT
 
 LOW, HIGH = (2, 3, 4), (5, 6)
 # What the asymmetry of a mirror may reach, in standard deviations of its sampling noise: of one turned until it fits

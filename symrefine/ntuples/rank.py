@@ -1,5 +1,11 @@
-"""Rank of the n-tuples against their sampling noise: the dimension of the subspace that the symmetry group fixes."""
+"""The subspace that the symmetries of an object fix, in any dimension: the rank of its n-tuples.
 
+Every n-tuple turns with the object, so each lies in the subspace that all its symmetries leave in place, and
+generically they span it (paper, section "Reflection transformation and symmetry"). Rank n: no symmetry at all;
+rank n - 1: a reflection at most, whose hyperplane holds all n-tuples; rank 0: too much symmetry for n-tuples to tell.
+"""
+
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,24 +16,27 @@ from symrefine.ntuples.contract import NTuples
 
 TupleKind = Literal["none", "plane", "axis", "vanish"]
 
-# A singular value speaks when it exceeds what sampling noise alone gives by this factor.
+# A singular value speaks when it exceeds what sampling noise alone gives by this factor. The n-tuples share few
+# moments, so that noise alone exceeds 2 in one cloud of twenty.
 SIGNIFICANT = 3.0
-# ... and, for exact moments, twice this fraction of the bound |v| <= 1: below it the miss is a matter of the tolerance.
-FLOOR = 2e-3
+# ... and, for exact moments, 0.004 of the bound |v| <= 1, a fifth of the tolerance of 2 %: below it a miss is a matter
+# of the tolerance. It counts like noise, so that a singular value must exceed it as many times.
+FLOOR = 0.004 / SIGNIFICANT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class TupleClass:
-    """What the singular values of the n-tuples say: the dimension of the subspace the symmetry group fixes.
+class FixedSubspace:
+    """What the singular values of the n-tuples say.
 
     Attributes:
-        kind: "none" (rank 3, C1), "plane" (rank 2, Cs), "axis" (rank 1, Cn or Cnv), "vanish" (rank 0, all else).
-        singular_values: [3] of the scaled tuples.
-        significance: [3] each divided by its standard deviation under sampling noise (inf where moments are exact).
-        directions: [3, 3] right singular vectors as rows: the first spans the axis, the last is the plane's normal.
+        rank: dimension of the subspace that the symmetries fix, as far as the n-tuples tell.
+        singular_values: [n] of the scaled n-tuples.
+        significance: [n] singular values, each n-tuple weighted by its noise, over what noise and tolerance alone give.
+        directions: [n, n] right singular vectors as rows: the first `rank` span the subspace; in space the first spans
+            the axis, the last is the plane's normal.
     """
 
-    kind: TupleKind
+    rank: int
     singular_values: Array
     significance: Array
     directions: Array
@@ -36,24 +45,35 @@ class TupleClass:
         for name in ("singular_values", "significance", "directions"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
+    @property
+    def kind(self) -> TupleKind:
+        """In space: "none" (rank 3, C1), "plane" (rank 2, Cs), "axis" (rank 1, Cn or Cnv), "vanish" (all else)."""
+        kinds: tuple[TupleKind, ...] = ("vanish", "axis", "plane", "none")
+        return kinds[self.rank]
 
-def classify(tuples: NTuples) -> TupleClass:
+
+def fixed_subspace(tuples: NTuples, *, floor: float = FLOOR) -> FixedSubspace:
     """Rank of the n-tuples against the sampling noise of their singular values (method.md, section 3).
 
     Tuples are weighted by their own noise first, so that no noisy high order drowns a precise low one.
+
+    Args:
+        tuples: with jackknife replicates, or without where the moments are exact.
+        floor: what an n-tuple of bound 1 may differ by even then.
     """
-    noise = tuples.noise
-    weights = 1.0 / np.sqrt(noise**2 + FLOOR**2)
-    weighted = tuples.vectors * weights[:, None]
-    _, values, directions = np.linalg.svd(weighted, full_matrices=True)
-    values = np.pad(values, (0, 3 - len(values)))
-    sigma = tuples.noise_along(directions, weights)
-    significance = values / np.hypot(sigma, np.sqrt(len(weighted)) * FLOOR * weights.min() / 1.5)
-    rank = int((significance > SIGNIFICANT).sum())
-    kinds: tuple[TupleKind, ...] = ("vanish", "axis", "plane", "none")
-    return TupleClass(
-        kind=kinds[rank],
-        singular_values=np.linalg.svd(tuples.vectors, compute_uv=False)[:3],
+    dim = tuples.vectors.shape[1]
+    weights = 1.0 / np.hypot(tuples.noise, floor)
+    _, values, directions = np.linalg.svd(tuples.vectors * weights[:, None], full_matrices=True)
+    allowed = np.hypot(tuples.noise_along(directions, weights), math.sqrt(len(weights)) * floor * weights.min())
+    significance = _padded(values, dim) / allowed
+    below = np.flatnonzero(significance <= SIGNIFICANT)
+    return FixedSubspace(
+        rank=int(below[0]) if below.size else dim,
+        singular_values=_padded(np.linalg.svd(tuples.vectors, compute_uv=False), dim),
         significance=significance,
         directions=directions,
     )
+
+
+def _padded(values: Array, dim: int) -> Array:
+    return np.pad(values, (0, dim - len(values)))

@@ -12,9 +12,9 @@ from symrefine.plane.outline import NOISES, Outlines
 from symrefine.plane.placed import SAME_RAD, START_ERROR, Placed, fitted
 from symrefine.surface.misses import LIMITS, Deviation
 
-# The largest fold that is looked for; lines and folds that are fitted, those that look best; directions of lines that
-# are looked at, and points of each outline that a look takes.
-MAX_FOLD, LINES, FOLDS, ANGLES, LOOK = 36, 10, 8, 180, 300
+# The largest fold that is looked for; directions of lines that are looked at, points of each outline that a look takes,
+# and how many lines, and how many folds, those that look best, are fitted.
+MAX_FOLD, ANGLES, LOOK, BEST = 36, 180, 300, 10
 # What being off by START_ERROR adds to what a start needs: half a diagonal is the longest lever.
 MISPLACED = 0.5 * START_ERROR / LIMITS[0]
 
@@ -86,19 +86,19 @@ def _angles(outlines: Outlines) -> Iterator[float]:
     matrices = np.eye(2) - 2.0 * normals[:, :, None] * normals[:, None, :]
     looks = outlines.glances([Isometry.about(np.zeros(2), m) for m in matrices], LOOK)
     lowest = np.flatnonzero((looks < np.roll(looks, 1)) & (looks <= np.roll(looks, -1)))
-    yield from (float(angles[k]) for k in lowest[np.argsort(looks[lowest], kind="stable")][:LINES])
+    yield from (float(angles[k]) for k in lowest[np.argsort(looks[lowest], kind="stable")][:BEST])
 
 
 def _folds(outlines: Outlines) -> Iterator[Placed]:
     """The turns about the centroid that look best."""
     starts = [Placed(fold=n, mirrored=False, center=np.zeros(2)) for n in range(2, MAX_FOLD + 1)]
     looks = outlines.glances([p.wide_turn() for p in starts], LOOK)
-    yield from (starts[k] for k in np.argsort(looks, kind="stable")[:FOLDS])
+    yield from (starts[k] for k in np.argsort(looks, kind="stable")[:BEST])
 
 
 def _implied(lines: Sequence[Hypothesis]) -> Iterator[Placed]:
     """The turns that the line that needs least makes with each other one: by twice their angle, where they cross."""
-    first, *others = sorted(lines, key=lambda h: h.need)[:LINES] or [NOTHING]
+    first, *others = sorted(lines, key=lambda h: h.need)[:BEST] or [NOTHING]
     for other in others:
         (a,), (b,) = first.placed.lines(), other.placed.lines()
         angle = (other.placed.angle_rad - first.placed.angle_rad) / math.pi

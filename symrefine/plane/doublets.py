@@ -7,13 +7,13 @@ import numpy as np
 
 from symrefine.geometry import Array, read_only
 from symrefine.moments.moments import Moments
-from symrefine.ndim import FLOOR, SIGNIFICANT, fixed_subspace
 from symrefine.ntuples.contract import NTuples, ntuples
+from symrefine.ntuples.rank import FLOOR, SIGNIFICANT, fixed_subspace
 from symrefine.surface.misses import TOLERANCE
 
 # The ten vectors of moments of the paper, 56 doublets in all.
 PLANAR_ORDERS = ((2, 3), (2, 5), (4, 3), (4, 5), (6, 3), (6, 5), (6, 7), (6, 9), (8, 7), (8, 9))
-ORDER = 9
+ORDER = max(map(max, PLANAR_ORDERS))
 DoubletKind = Literal["centre", "line", "none"]
 _KINDS: tuple[DoubletKind, ...] = ("centre", "line", "none")
 

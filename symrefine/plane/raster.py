@@ -13,8 +13,8 @@ FEWEST, JOINED = 64, 0.9
 SPARSE = 50
 # Deviation from the grid, in steps.
 _OFF = 0.02
-# Points whose neighbours show step and direction of a turned grid; larger clouds are looked at only if upright.
-_PROBES, _LARGEST_TURNED = 2000, 400_000
+# Points whose neighbours show step and direction of a turned grid.
+_PROBES = 2000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,7 +52,7 @@ def raster_of(points: Array, weights: Array | None) -> Raster | None:
         return None
     step = _upright_step(points)
     found = None if step is None else _on_grid(points, step)
-    if found is None and len(points) <= _LARGEST_TURNED:
+    if found is None:
         step = _turned_step(points)
         found = None if step is None else _on_grid(points, step)
     if found is None:

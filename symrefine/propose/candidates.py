@@ -16,7 +16,7 @@ from symrefine.groups import MAX_FOLD as MAX_ORDER
 from symrefine.groups import PointGroup
 from symrefine.moments.harmonics import harmonic_moments
 from symrefine.moments.moments import Moments
-from symrefine.ntuples.rank import TupleClass
+from symrefine.ntuples.rank import FixedSubspace
 from symrefine.propose.folds import MAX_FOLD, fold_candidates
 from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candidates, whitened
 
@@ -42,7 +42,7 @@ class Evidence:
     """
 
     moments: Moments
-    tuples: TupleClass
+    tuples: FixedSubspace
     points: Array
     weights: Array
     atoms: bool = False
