@@ -189,7 +189,7 @@ def test_the_phase_is_that_of_the_radial_function_that_sees_the_fold():
 
 def test_of_folds_that_leak_alike_the_largest_comes_first():
     """A little energy at a divisor of the fold, noise, makes the divisor leak least."""
-    found = fold_candidates(*drum(lambda phi, _: 1 + 0.5 * np.cos(6 * phi) + 0.12 * np.cos(2 * phi)), Z_AXIS)
+    found = fold_candidates(*drum(lambda phi, _: 1 + 0.5 * np.cos(6 * phi) + 0.16 * np.cos(2 * phi)), Z_AXIS)
     assert [f.fold for f in found] == [6, 2]
     assert found[0].leak > found[1].leak
 

@@ -152,7 +152,7 @@ def test_the_table_says_it_in_words_and_without_colour(run: Run, data: Path) -> 
 def test_no_symmetry_is_an_answer(run: Run, data: Path) -> None:
     status, out, _ = run("detect", data / "scalene.ply")
     assert status == 0
-    assert "C1, no symmetry at tolerance 2 %" in out
+    assert "C1, no symmetry; tolerance 2 %, confidence " in out
 
 
 def test_files_are_written_together(run: Run, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -370,11 +370,11 @@ except AttributeError as error:
         ({"point_group": "Kh"}, "Kh, sphere"),
         ({"point_group": "Cinfv"}, "Cinfv, surface of revolution"),
         ({"point_group": "Cs", "planes": [{"confidence": 0.5}], "axes": []}, "Cs, one mirror plane"),
-        ({"point_group": "Ci", "planes": [], "axes": [], "inversion_confidence": 0.75},
+        ({"point_group": "Ci", "planes": [], "axes": [], "confidence": 0.75},
          "Ci, an inversion centre; tolerance 2 %, confidence 0.75"),
-        ({"point_group": "C1", "tolerance": 0.005}, "C1, no symmetry at tolerance 0.5 %"),
+        ({"point_group": "C1", "tolerance": 0.005}, "C1, no symmetry; tolerance 0.5 %, confidence "),
         ({"point_group": "C1", "undetermined": "40 points are too few"}, "undetermined: 40 points are too few"),
-        ({"point_group": "S4", "planes": [], "inversion": False,
+        ({"point_group": "S4", "planes": [], "inversion": False, "confidence": 0.25,
           "axes": [{"improper": False, "confidence": 0.25}, {"improper": True, "confidence": 0.25}]},
          "S4, 1 rotation axis, 1 rotoreflection axis; tolerance 2 %, confidence 0.25"),
     ],

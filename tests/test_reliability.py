@@ -298,7 +298,8 @@ def drawn(count, constants, rng):
         group, noise = ("Cs", "C2")[i % 2], float(rng.choice([0.0, 0.01]))
         need = TOLERANCE * float(np.exp(rng.uniform(-2.0, 1.0)))
         squares = (need / (even_mirror if group == "Cs" else even)) ** 2 + (unknown * noise) ** 2
-        true = rng.random() < 1.0 / (1.0 + (squares / TOLERANCE**2) ** (steepness / 2.0))
+        less_steep = steepness / (1.0 + (noise / TOLERANCE) ** 2)
+        true = rng.random() < 1.0 / (1.0 + (squares / TOLERANCE**2) ** (less_steep / 2.0))
         yield Known(
             half=HALVES[i % 3 % 2],
             family="shape",

@@ -245,8 +245,10 @@ def misfit(constants: Sequence[float], links: Sequence[Known]) -> float:
     """Negative log likelihood of what is true of each link, a link, under constants in the order of `SHIPPED`."""
     even, even_mirror, steepness, unknown = constants
     evens = np.array([even_mirror if k.group == "Cs" else even for k in links])
-    squares = (np.array([k.need for k in links]) / evens) ** 2 + (unknown * np.array([k.noise for k in links])) ** 2
-    wrong_odds = steepness / 2.0 * np.log(np.maximum(squares, np.finfo(float).tiny) / TOLERANCE**2)
+    noise = np.array([k.noise for k in links])
+    squares = (np.array([k.need for k in links]) / evens) ** 2 + (unknown * noise) ** 2
+    less_steep = steepness / (1.0 + (noise / TOLERANCE) ** 2)
+    wrong_odds = less_steep / 2.0 * np.log(np.maximum(squares, np.finfo(float).tiny) / TOLERANCE**2)
     return float(np.logaddexp(0.0, np.where([k.true for k in links], wrong_odds, -wrong_odds)).mean())
 
 
