@@ -13,7 +13,7 @@ from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
 from symrefine.surface.misses import Deviation
 from symrefine.surface.noise import noise_distances
-from symrefine.surface.skin import LocalPlanes, fills_volume, isolated_points, local_planes
+from symrefine.surface.skin import LocalPlanes, Skin, fills_volume, isolated_points, make_skin
 from symrefine.surface.surface import Surface
 
 # Order of the moments, and parts of their jackknife.
@@ -167,18 +167,20 @@ def _surface(
     tree = None if exact else cKDTree(local, balanced_tree=False, compact_nodes=False)
     if tree is not None and normals is None and fills_volume(local, tree, np.random.default_rng(0)):
         return _volume(local, labels, rng)
-    chance = None if exact or np.ptp(weights) == 0.0 else weights
-    count = EXACT_PLANES if exact else PLANES
-    cloud = local_planes(local, count, rng, normals=normals, labels=labels, weights=chance, exact=exact, tree=tree)
+    chance = None if exact or np.ptp(weights) == 0.0 else weights / weights.sum()
+    whole = make_skin(local, rng, normals=normals, exact=exact, tree=tree)
+
+    def drawn(skin: Skin, count: int, classes: Index | None, p: Array | None = None) -> LocalPlanes:
+        pick = rng.choice(len(skin.points), min(count, len(skin.points)), replace=False, p=p)
+        return skin.local_planes(np.sort(pick), classes)
 
     def half(some: Index) -> LocalPlanes:
-        # Exact normals need no neighbours, so that halves can be as dense as the whole.
+        # As many neighbours as in the whole, so that noise is the same; exact normals need none.
         own = normals[some] if exact and normals is not None else None
-        classes = None if labels is None else labels[some]
-        return local_planes(
-            local[some], PLANES if exact else PLANES // 4, rng, normals=own, labels=classes, exact=exact
-        )
+        skin = Skin(points=local[some], normals=own, neighbours=whole.neighbours, given=None)
+        return drawn(skin, EXACT_PLANES if exact else PLANES // 4, None if labels is None else labels[some])
 
+    cloud = drawn(whole, EXACT_PLANES if exact else PLANES, labels, chance)
     diagonal = tight_diagonal(cloud.points)
     noise = noise_distances(len(local), half, rng)
     return Surface(cloud=cloud, diagonal=diagonal, noise=Deviation.of(noise / diagonal))
