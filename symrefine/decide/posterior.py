@@ -12,10 +12,26 @@ from itertools import pairwise
 # Of the logistic curve: the need over the tolerance at which half of the groups are meant, and how fast they become
 # fewer. Calibrated on intact, broken and noisy objects by `python -m experiments.studies.reliability --fit`.
 EVEN, STEEPNESS = 0.68, 8.0
+# The same of pictures, where parts moved by half a tolerance are told as well, so that the curve is less steep: close
+# to that of the first version, which was fitted to half of its drawings; see `experiments.studies.planar_reliability`.
+EVEN_PICTURE, EVEN_PICTURE_MIRROR, STEEPNESS_PICTURE = 0.6, 0.75, 3.6
 # The same of a lone mirror: bodies and devices that are meant to have just one are made less exactly than others.
 EVEN_MIRROR = 1.02
 # How much of what noise alone needs is left to doubt, once it was subtracted in squares.
 UNKNOWN = 0.7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curve:
+    """Of the logistic curve: the need over the tolerance at its middle, the same of a lone mirror, the steepness."""
+
+    even: float
+    even_mirror: float
+    steepness: float
+
+
+SPACE = Curve(even=EVEN, even_mirror=EVEN_MIRROR, steepness=STEEPNESS)
+PICTURE = Curve(even=EVEN_PICTURE, even_mirror=EVEN_PICTURE_MIRROR, steepness=STEEPNESS_PICTURE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,27 +51,28 @@ class Decision:
     inside: tuple[float, ...]
 
 
-def decide(links: Sequence[Link], tolerance: float, noise: float = 0.0) -> Decision:
+def decide(links: Sequence[Link], tolerance: float, noise: float = 0.0, curve: Curve = SPACE) -> Decision:
     """The likeliest group of a chain.
 
     Args:
         links: the groups beyond C1, each inside the next, needs as fractions of the diagonal.
         tolerance: largest miss that counts as symmetric.
         noise: what noise alone would need.
+        curve: what was calibrated on objects of this kind.
     """
     inside = [1.0]
     for link in links:
-        inside.append(min(inside[-1], meant(link, tolerance, noise)))
+        inside.append(min(inside[-1], meant(link, tolerance, noise, curve)))
     own = [here - beyond for here, beyond in pairwise([*inside, 0.0])]
     return Decision(index=max(range(len(own)), key=own.__getitem__), probabilities=tuple(own), inside=tuple(inside))
 
 
-def meant(link: Link, tolerance: float, noise: float = 0.0) -> float:
+def meant(link: Link, tolerance: float, noise: float = 0.0, curve: Curve = SPACE) -> float:
     """Probability that a group is meant, from what it needs.
 
     Noise and need add up in squares. Noise also blurs what was measured, in both directions: the curve gets less steep.
     """
-    even = EVEN_MIRROR if link.lone_mirror else EVEN
+    even = curve.even_mirror if link.lone_mirror else curve.even
     squares = ((link.need / even) ** 2 + (UNKNOWN * noise) ** 2) / tolerance**2
-    steepness = STEEPNESS / (1.0 + (noise / tolerance) ** 2)
+    steepness = curve.steepness / (1.0 + (noise / tolerance) ** 2)
     return float(1.0 / (1.0 + squares ** (steepness / 2.0)))

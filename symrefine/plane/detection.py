@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
 from symrefine.decide.alternatives import NEAR, Alternative, alternatives
-from symrefine.decide.posterior import Decision, Link, decide
+from symrefine.decide.posterior import PICTURE, Decision, Link, decide
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, check_tolerance, read_only
 from symrefine.groups import PointGroup2D
@@ -145,7 +145,11 @@ def _decided(links: Sequence[Hypothesis], tolerance: float) -> tuple[Decision, b
     """The group, as likely as it is on average over what noise may be, and whether it is C1 whatever that is."""
     lone = [h.placed.mirrored and h.placed.fold == 1 for h in links[1:]]
     each = [
-        decide([Link(need=h.needs[k], lone_mirror=m) for h, m in zip(links[1:], lone, strict=True)], tolerance)
+        decide(
+            [Link(need=h.needs[k], lone_mirror=m) for h, m in zip(links[1:], lone, strict=True)],
+            tolerance,
+            curve=PICTURE,
+        )
         for k in range(len(NOISES))
     ]
     inside = tuple(np.mean([d.inside for d in each], axis=0).tolist())
