@@ -390,7 +390,7 @@ def test_every_kind_of_element_has_its_line(record: dict[str, Any]) -> None:
     miss = {k: axis[k] for k in ("direction", "point", "residual")} | {"excess": 1.25}
     changes = {
         "axes": [axis | {"order": "inf"}, axis | {"order": 8, "improper": True}],
-        "near_misses": [miss | {"kind": k, "order": 3} for k in ("plane", "axis", "improper")],
+        "near_misses": [miss | {"kind": k, "order": 3} for k in ("plane", "axis", "improper", "inversion")],
     }
     out = console()
     with out.capture() as capture:
@@ -398,7 +398,7 @@ def test_every_kind_of_element_has_its_line(record: dict[str, Any]) -> None:
             out.print(line)
         out.print(batch_table([record | {"file": "[b].ply", "error": None}, {"file": "c.ply", "error": "no [/b]"}]))
     text = capture.get()
-    for part in ("revolution", "rotoreflection 8", " mirror ", "rotation 3", "1.25", "[b].ply", "failed: no [/b]"):
+    for part in ("revolution", "rotoreflection 8", " mirror ", "rotation 3", "about the centre", "1.25", "[b].ply", "failed: no [/b]"):
         assert part in text
 
 

@@ -327,8 +327,15 @@ def _near_misses(record: Record) -> Table:
         mirror = m["kind"] == "plane"
         offset = sum(n * x for n, x in zip(m["direction"], m["point"], strict=True))
         where = _length(offset, record) if mirror else ""
-        kind = "mirror" if mirror else _turn(m["kind"], m["order"])
-        table.add_row(_direction(m["direction"]), where, kind, *_misses(m), f"{m['excess']:.2f}")
+        inverted = m["kind"] == "inversion"
+        kind = "mirror" if mirror else "inversion" if inverted else _turn(m["kind"], m["order"])
+        table.add_row(
+            "about the centre" if inverted else _direction(m["direction"]),
+            where,
+            kind,
+            *_misses(m),
+            f"{m['excess']:.2f}",
+        )
     return table
 
 

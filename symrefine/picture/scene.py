@@ -243,7 +243,7 @@ def _missed(detection: Detection, stage: Stage) -> tuple[tuple[Quad, ...], tuple
         if miss.kind == "plane":
             plane = Plane(normal=miss.direction, offset=float(miss.direction @ miss.point))
             quads.append(stage.quad(plane, f"near miss {number}", MISS))
-        else:
+        elif miss.kind != "inversion":
             name = f"near miss {number}, {order_name(miss.order, miss.kind == 'improper')}"
             lines.append(stage.line(miss.point, miss.direction, name, MISS, miss.order))
     return tuple(quads), tuple(lines)
