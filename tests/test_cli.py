@@ -398,7 +398,16 @@ def test_every_kind_of_element_has_its_line(record: dict[str, Any]) -> None:
             out.print(line)
         out.print(batch_table([record | {"file": "[b].ply", "error": None}, {"file": "c.ply", "error": "no [/b]"}]))
     text = capture.get()
-    for part in ("revolution", "rotoreflection 8", " mirror ", "rotation 3", "about the centre", "1.25", "[b].ply", "failed: no [/b]"):
+    for part in (
+        "revolution",
+        "rotoreflection 8",
+        " mirror ",
+        "rotation 3",
+        "about the centre",
+        "1.25",
+        "[b].ply",
+        "failed: no [/b]",
+    ):
         assert part in text
 
 
