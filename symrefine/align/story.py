@@ -18,7 +18,7 @@ from symrefine.align.span import FLAT, MISFIT, span_fit
 from symrefine.clock import Clock
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
-from symrefine.geometry import Array
+from symrefine.geometry import Array, check_tolerance
 from symrefine.groups import PointGroup
 from symrefine.moments.moments import Moments, central_moments, shape_moments
 from symrefine.moments.quadrature import mesh_nodes
@@ -98,8 +98,7 @@ def _check(source: Shape, target: Shape, tolerance: float) -> None:
             f"{source.source} is taken as a {source.measure}, {target.source} as a {target.measure}; "
             "their moments differ, give both the same measure"
         )
-    if not 0.0 < tolerance <= 0.2:
-        raise InputError(f"tolerance is {tolerance}; expected a fraction of the diagonal in (0, 0.2]")
+    check_tolerance(tolerance)
 
 
 def _side(shape: Shape, parts: int) -> Side:

@@ -7,6 +7,8 @@ from symrefine.decide.posterior import Decision
 
 # Alternatives that are told of, and the least probability that is worth telling.
 NEAR, LEAST = 8, 0.01
+# Groups that need up to so many tolerances are asked for.
+BEYOND = 1.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -100,7 +100,7 @@ def fitted(surface: Surface, start: Placed, *, error: float = START_ERROR, befor
 def _judged(surface: Surface, part: Operations, center: Array, sources: int) -> Element:
     motions = part.motions(center)
     deviation = surface.deviation(motions, sources=sources)
-    needed = surface.need(motions, sources=sources) if surface.cloud.body == "volume" else surface.needed(deviation)
+    needed = surface.needed(deviation, surface.spread(motions))
     return Element(operations=part, center=center, deviation=deviation, need=needed)
 
 

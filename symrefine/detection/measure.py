@@ -1,6 +1,7 @@
 """What is known of a shape before any symmetry is looked for: moments, n-tuples, and a surface to judge by."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
 from symrefine.surface.misses import Deviation
 from symrefine.surface.noise import noise_distances
-from symrefine.surface.skin import LocalPlanes, Skin, fills_volume, isolated_points, make_skin
+from symrefine.surface.skin import FEW, LocalPlanes, Skin, drawn, fills_volume, isolated_points, make_skin
 from symrefine.surface.surface import Surface
 
 # Order of the moments, and parts of their jackknife.
@@ -27,11 +28,9 @@ SAME_MASS = 0.01
 FLAT = 1e-12
 # Points so many times as far out as 99 % of all set the scale: 2 % of their diagonal is 10 % of the object.
 STRAY = 5.0
-# Up to so many distinct points stand for themselves (atoms); more are samples of a surface.
-FEW = 250
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Measured:
     """A shape with the classes of its points or faces, its moments and its n-tuples."""
 
@@ -40,7 +39,12 @@ class Measured:
     moments: Moments
     vectors: NTuples
 
-    @property
+    @cached_property
+    def flaw(self) -> str:
+        """Why the shape supports no decision at any tolerance, or nothing if it does."""
+        return _on_a_line(self) or _few_decide(self)
+
+    @cached_property
     def tuples(self) -> FixedSubspace:
         """What the singular values of the n-tuples say."""
         return fixed_subspace(self.vectors)
@@ -71,7 +75,7 @@ def part(shape: Shape, some: Index) -> Shape:
 
 def doubt(measured: Measured, surface: Surface, tolerance: float) -> str:
     """Why a shape supports no decision at this tolerance, or nothing if it does."""
-    return _on_a_line(measured) or _few_decide(measured) or _hidden(surface, tolerance)
+    return measured.flaw or _hidden(surface, tolerance)
 
 
 def _on_a_line(measured: Measured) -> str:
@@ -170,24 +174,21 @@ def _surface(
     chance = None if exact or np.ptp(weights) == 0.0 else weights / weights.sum()
     whole = make_skin(local, rng, normals=normals, exact=exact, tree=tree)
 
-    def drawn(skin: Skin, count: int, classes: Index | None, p: Array | None = None) -> LocalPlanes:
-        pick = rng.choice(len(skin.points), min(count, len(skin.points)), replace=False, p=p)
-        return skin.local_planes(np.sort(pick), classes)
-
     def half(some: Index) -> LocalPlanes:
         # As many neighbours as in the whole, so that noise is the same; exact normals need none.
         own = normals[some] if exact and normals is not None else None
         skin = Skin(points=local[some], normals=own, neighbours=whole.neighbours, given=None)
-        return drawn(skin, EXACT_PLANES if exact else PLANES // 4, None if labels is None else labels[some])
+        pick = drawn(len(some), EXACT_PLANES if exact else PLANES // 4, rng)
+        return skin.local_planes(pick, None if labels is None else labels[some])
 
-    cloud = drawn(whole, EXACT_PLANES if exact else PLANES, labels, chance)
+    cloud = whole.local_planes(drawn(len(local), EXACT_PLANES if exact else PLANES, rng, chance), labels)
     diagonal = tight_diagonal(cloud.points)
     noise = noise_distances(len(local), half, rng)
     return Surface(cloud=cloud, diagonal=diagonal, noise=Deviation.of(noise / diagonal))
 
 
 def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Surface:
-    pick = np.sort(rng.choice(len(points), min(SAMPLES, len(points)), replace=False))
+    pick = drawn(len(points), SAMPLES, rng)
     points, labels = points[pick], None if labels is None else labels[pick]
 
     def some_of(some: Index) -> LocalPlanes:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
-from symrefine.decide.alternatives import alternatives
+from symrefine.decide.alternatives import BEYOND, NEAR, alternatives
 from symrefine.decide.chain import Pool, chain, explore
 from symrefine.decide.hypotheses import Element, Hypothesis
 from symrefine.decide.posterior import Decision, Link, decide
@@ -23,10 +23,6 @@ from symrefine.surface.surface import Surface
 
 # Tolerances of the staircase that the command line tells.
 LADDER = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08)
-# Groups that need up to so many tolerances are asked for as alternatives.
-BEYOND = 1.5
-# Candidates turned down that are told of.
-NEAR = 8
 
 
 def detect(

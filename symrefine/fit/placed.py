@@ -1,7 +1,9 @@
 """A point group placed in space, and the operations that are fitted and judged in its stead."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -9,8 +11,11 @@ from symrefine.fit.refine import Framed, mirror_bundle
 from symrefine.geometry import Array, Isometry, frame_with_z, householder, read_only, rotation, rotoreflection
 from symrefine.groups import PointGroup
 
+T = TypeVar("T")
 # Turns that no finite fold below 36 shares; a surface of revolution survives them all.
 FREE_TURNS = 2.0 * np.pi * np.array([0.0823, 0.1381966, 0.2360680, 0.4270510])
+# The smaller part of a golden section: no turn by few steps comes near it.
+GOLDEN = 0.5 * (3.0 - math.sqrt(5.0))
 # Operations of one kind that are fitted together: more add points, but no knowledge.
 FITTED = 8
 
@@ -64,7 +69,7 @@ def elements(group: PointGroup) -> list[Operations]:
         turns = tuple(rotation(direction, float(a)) for a in _angles(order))
         found.append(Operations(kind="axis", direction=direction, order=order, matrices=turns))
     for direction, order in group.improper_axes() if group.is_finite else []:
-        turn = rotoreflection(direction, _wide(int(order)))
+        turn = rotoreflection(direction, wide_angle_rad(int(order)))
         found.append(Operations(kind="improper", direction=direction, order=order, matrices=(turn,)))
     if group.has_inversion:
         z = np.array([0.0, 0.0, 1.0])
@@ -83,13 +88,13 @@ def _angles(order: float) -> tuple[float, ...]:
     if math.isinf(order):
         return tuple(FREE_TURNS)
     smallest = 2.0 * math.pi / order
-    return tuple(dict.fromkeys((_wide(int(order)), smallest)))
+    return tuple(dict.fromkeys((wide_angle_rad(int(order)), smallest)))
 
 
-def _wide(order: int) -> float:
+def wide_angle_rad(order: int) -> float:
     """Angle of the generator of C_n nearest to the golden section of a full turn, which moves every part far."""
     powers = [k for k in range(1, order) if math.gcd(k, order) == 1]
-    return 2.0 * math.pi * min(powers, key=lambda k: abs(k / order - 0.381966)) / order
+    return 2.0 * math.pi * min(powers, key=lambda k: abs(k / order - GOLDEN)) / order
 
 
 def fitted_matrices(group: PointGroup) -> list[Array]:
@@ -100,7 +105,7 @@ def fitted_matrices(group: PointGroup) -> list[Array]:
     found: list[Array] = []
     for kind in ("plane", "axis", "improper", "inversion"):
         matrices = [p.matrices[0] for p in parts if p.kind == kind]
-        found += _some(matrices, FITTED if kind == "plane" else FITTED // 2)
+        found += evenly(matrices, FITTED if kind == "plane" else FITTED // 2)
         if kind == "plane" and found and group.symbol.family not in ("Dh", "Dd", "Ch"):
             break
     return found
@@ -118,9 +123,9 @@ def _round_matrices(group: PointGroup) -> list[Array]:
     return matrices
 
 
-def _some(items: list[Array], most: int) -> list[Array]:
+def evenly(items: Sequence[T], most: int) -> list[T]:
     """At most so many of them, spread evenly, the first one in any case."""
-    return [items[k * len(items) // most] for k in range(most)] if len(items) > most else items
+    return [items[k * len(items) // most] for k in range(most)] if len(items) > most else list(items)
 
 
 def common_center(placed: "list[Placed]") -> Array:

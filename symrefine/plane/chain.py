@@ -122,8 +122,7 @@ def _distinct(outlines: Outlines, starts: Iterable[Placed], limit: float) -> Ite
 
     def known(placed: Placed) -> bool:
         """Whether a group fitted before is the same, or has it and holds exactly."""
-        exact = EXACT * limit
-        return any(h.placed.holds(placed) and (h.need <= exact or h.placed.order == placed.order) for h in seen)
+        return any(h.placed.holds(placed) and (h.need <= EXACT or h.placed.order == placed.order) for h in seen)
 
     for start in starts:
         if known(start):
@@ -166,7 +165,7 @@ def chain(outlines: Outlines, pool: Sequence[Hypothesis], limit: float) -> tuple
     links = [NOTHING]
     while beyond := [h for h in pool if h.placed.order > links[-1].placed.order and h.placed.holds(links[-1].placed)]:
         here, least = links[-1], min(h.need for h in beyond)
-        level = max(ALIKE * least, here.need, EXACT * limit, 0.5 * outlines.floor)
+        level = max(ALIKE * least, here.need, EXACT, 0.5 * outlines.floor)
         found = max((h for h in beyond if h.need <= level), key=lambda h: (h.placed.order, -h.need))
         links.append(replace(found, needs=_largest((found.needs, here.needs))))
         if found.need > limit:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
-from symrefine.decide.alternatives import NEAR, Alternative, alternatives
+from symrefine.decide.alternatives import BEYOND, NEAR, Alternative, alternatives
 from symrefine.decide.posterior import PICTURE, Decision, Link, decide
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, check_tolerance, read_only
@@ -21,8 +21,8 @@ from symrefine.plane.outline import NOISES, Outlines, make_outlines
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE, Deviation
 
-# Parts of the jackknife; groups that need up to so many tolerances are asked for as alternatives.
-PARTS, BEYOND = 32, 1.5
+# Parts of the jackknife.
+PARTS = 32
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

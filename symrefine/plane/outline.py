@@ -12,11 +12,9 @@ from symrefine.plane.raster import Raster, between, coarser, outlines, raster_of
 from symrefine.shape import Index
 from symrefine.surface.misses import Deviation, disc_distances
 from symrefine.surface.noise import noise_distances
-from symrefine.surface.skin import LocalPlanes, isolated_points, local_planes
+from symrefine.surface.skin import FEW, LocalPlanes, isolated_points, local_planes
 from symrefine.surface.surface import Surface
 
-# Up to so many points stand for themselves; more are samples, or the pixels of a picture.
-FEW = 250
 # Levels, as fractions of the weight that only one cell in twenty exceeds.
 LEVELS = (0.5, 0.25, 0.75)
 # Local lines of an outline, and the side of a picture in cells.

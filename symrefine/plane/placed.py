@@ -3,19 +3,16 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 
 from symrefine.fit.gauss_newton import Linearisation, minimise
 from symrefine.fit.matching import match, pair_equations
+from symrefine.fit.placed import FREE_TURNS, evenly, wide_angle_rad
 from symrefine.geometry import Array, Isometry, Plane, read_only
 from symrefine.groups import PointGroup2D
 from symrefine.plane.outline import Outlines
 
-T = TypeVar("T")
-# Turns that no finite fold below 36 shares.
-IRRATIONAL_TURNS = tuple(2.0 * math.pi * share for share in (0.0823, 0.1381966, 0.2360680, 0.4270510))
 # Operations of one kind that are judged together, those that are fitted, and the points that they are fitted to.
 MOST, FITTED, SOURCES = 8, 4, 1000
 # Matches at most; one that moves nothing by more than the second (radians, RMS radii) is the last.
@@ -70,9 +67,9 @@ class Placed:
     def turns(self) -> tuple[Isometry, ...]:
         """Rotations that stand for all of them; their inverses need no second look."""
         if math.isinf(self.fold):
-            angles = list(IRRATIONAL_TURNS)
+            angles = [float(a) for a in FREE_TURNS]
         else:
-            angles = [2.0 * np.pi * k / self.fold for k in _some(range(1, int(self.fold) // 2 + 1), MOST)]
+            angles = [2.0 * np.pi * k / self.fold for k in evenly(range(1, int(self.fold) // 2 + 1), MOST)]
         return tuple(self.turn(a) for a in angles)
 
     def turn(self, angle_rad: float) -> Isometry:
@@ -82,25 +79,17 @@ class Placed:
 
     def wide_turn(self) -> Isometry:
         """A generator of the turns far from the identity, which every object nearly bears."""
-        n = int(self.fold)
-        golden = 0.5 * (3.0 - math.sqrt(5.0))
-        power = min((k for k in range(1, n) if math.gcd(k, n) == 1), key=lambda k: abs(k / n - golden))
-        return self.turn(2.0 * math.pi * power / n)
+        return self.turn(wide_angle_rad(int(self.fold)))
 
     def generators(self) -> tuple[Isometry, ...]:
         """Mirrors that generate the group, or turns where it has none; no more than are fitted."""
         if not self.mirrored or math.isinf(self.fold):
-            return _some(self.turns(), FITTED)
-        return tuple(Isometry.reflection(line) for line in _some(self.lines(), FITTED))
+            return tuple(evenly(self.turns(), FITTED))
+        return tuple(Isometry.reflection(line) for line in evenly(self.lines(), FITTED))
 
     def moved(self, x: Array) -> "Placed":
         """Moved by a shift and turned by an angle, x [3]."""
         return replace(self, center=self.center + x[:2], angle_rad=self.angle_rad + float(x[2]))
-
-
-def _some(items: Sequence[T], most: int) -> tuple[T, ...]:
-    """At most `most` of them, spread evenly, the first one in any case."""
-    return tuple(items[k * len(items) // most] for k in range(most)) if len(items) > most else tuple(items)
 
 
 def fitted(outlines: Outlines, start: Placed) -> Placed:

@@ -6,6 +6,7 @@ azimuthal spectrum the folds about an axis with their phases. Everything is in n
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -34,7 +35,7 @@ PRIMES = (2, 3, 5, 7)
 ON_AXIS = (0.03, 0.15)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Evidence:
     """What is known before any point is matched: moments, the class of the n-tuples, and points to take azimuths of.
 
@@ -46,6 +47,11 @@ class Evidence:
     points: Array
     weights: Array
     atoms: bool = False
+
+    @cached_property
+    def harmonics(self) -> dict[int, Array]:
+        """Solid-harmonic moments with jackknife replicates."""
+        return harmonic_moments(self.moments)
 
 
 def proposals(evidence: Evidence) -> Iterator[list[Placed]]:
@@ -64,14 +70,13 @@ def proposals(evidence: Evidence) -> Iterator[list[Placed]]:
 
 def about(evidence: Evidence, direction: Array) -> list[Placed]:
     """What may stand about a direction: revolution; mirrors at the phases of a fold, or turns alone; C2 and C3."""
-    harmonics = harmonic_moments(evidence.moments)
-    round_frame = polish_frame(harmonics, frame_with_z(direction), ROUND_FOLD)
+    round_frame = polish_frame(evidence.harmonics, frame_with_z(direction), ROUND_FOLD)
     found = [placed("Cinfv", round_frame)]
     folds = {2, 3, *(_counted(evidence.points, direction) if evidence.atoms else ())}
     for axis in apart(np.stack([round_frame[2], direction]), 0.2 * APART_RAD):
         for candidate in fold_candidates(evidence.points, evidence.weights, axis)[:FOLDS]:
             folds.add(candidate.fold)
-            frame = polish_frame(harmonics, candidate.frame, candidate.fold)
+            frame = polish_frame(evidence.harmonics, candidate.frame, candidate.fold)
             found.append(placed(f"C{candidate.fold}v", frame))
     return [*found, *(placed(f"C{k}", frame_with_z(direction)) for k in sorted(folds, reverse=True))]
 

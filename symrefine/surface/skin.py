@@ -294,8 +294,13 @@ def local_planes(
         tree: kd-tree over `points`, if there is one already.
     """
     chance = None if weights is None else weights / weights.sum()
-    pick = np.sort(rng.choice(len(points), min(count, len(points)), replace=False, p=chance))
+    pick = drawn(len(points), count, rng, chance)
     return make_skin(points, rng, normals=normals, exact=exact, tree=tree).local_planes(pick, labels)
+
+
+def drawn(size: int, count: int, rng: np.random.Generator, chance: Array | None = None) -> Index:
+    """Indices, ascending, of `count` points of `size`, or of all; each is drawn with its chance [size]."""
+    return np.sort(rng.choice(size, min(count, size), replace=False, p=chance))
 
 
 def make_skin(

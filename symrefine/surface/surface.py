@@ -38,12 +38,13 @@ class Surface:
 
     def need(self, motions: Sequence[Isometry], *, sources: int = 10**9) -> float:
         """The smallest tolerance at which operations hold (see `needed`)."""
-        deviation = self.deviation(motions, sources=sources)
-        spread = 0.0
-        if self.cloud.body == "volume":
-            # Of a volume the nearest points tell the outline only; how the mass spreads tells the rest.
-            spread = max(spread_distance(self.cloud.points, m) for m in motions) / self.diagonal
-        return self.needed(deviation, spread)
+        return self.needed(self.deviation(motions, sources=sources), self.spread(motions))
+
+    def spread(self, motions: Sequence[Isometry]) -> float:
+        """By how much the mass of a volume spreads otherwise, of which the nearest points tell the outline only."""
+        if self.cloud.body != "volume":
+            return 0.0
+        return max(spread_distance(self.cloud.points, m) for m in motions) / self.diagonal
 
     def needed(self, deviation: Deviation, spread: float = 0.0) -> float:
         """The smallest tolerance, a fraction of the diagonal, at which a miss still counts as symmetric."""
