@@ -411,6 +411,15 @@ def test_every_kind_of_element_has_its_line(record: dict[str, Any]) -> None:
         assert part in text
 
 
+def test_what_it_may_be_instead_has_a_line(record: dict[str, Any]) -> None:
+    others = [("C1", 0.07, 0.0), ("D4h", 0.051, 0.03)]
+    told = [{"point_group": g, "probability": p, "forgiven": f} for g, p, f in others]
+    lines = [line for line in detection_lines(record | {"alternatives": told}) if isinstance(line, str)]
+    assert "It may be meant otherwise: C1 (7 %); D4h (5 %), forgiving 3 %." in lines
+    alone = [line for line in detection_lines(record | {"alternatives": []}) if isinstance(line, str)]
+    assert not any("otherwise" in line for line in alone)
+
+
 def test_no_color_means_no_escape_codes(monkeypatch: pytest.MonkeyPatch) -> None:
     from symrefine.cli.outputs import console
 

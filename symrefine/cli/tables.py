@@ -58,7 +58,7 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
     if record["near_misses"]:
         yield (
             "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows, or, "
-            "below 1, by far more than what holds beside them."
+            "below 1, by more than what was meant so mostly does."
         )
     if record["alternatives"]:
         yield f"It may be meant otherwise: {otherwise(record)}."
@@ -87,9 +87,10 @@ def headline(record: Record) -> str:
 
 
 def otherwise(record: Record) -> str:
-    """The groups it may be instead: `or Cs (12 %), if 1.9 % of the diagonal is forgiven`."""
+    """The groups it may be instead, and what of the diagonal they forgive: `C1 (7 %); D4h (5 %), forgiving 3 %`."""
     return "; ".join(
-        f"or {a['point_group']} ({100 * a['probability']:.0f} %), if {100 * a['forgiven']:.2g} % is forgiven"
+        f"{a['point_group']} ({100 * a['probability']:.0f} %)"
+        + (f", forgiving {100 * a['forgiven']:.2g} %" if a["forgiven"] else "")
         for a in record["alternatives"]
     )
 

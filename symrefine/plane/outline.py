@@ -22,7 +22,7 @@ LOCAL_LINES, OUTLINED = 4000, 1500
 # Points of an outline at one level, below which it is a detail that says nothing by itself.
 FEWEST = 16
 # What noise may be, over what was measured: as it was, twice as large, or none. True operations of exact drawings miss
-# by less than 1.8 of it in 9 of 10 pictures, whatever their size (`experiments.studies.small_pictures`).
+# by about as much as was measured in the median, and by less than 2.8 times that in 9 of 10 small pictures.
 NOISES = (1.0, 2.0, 0.0)
 # Standard deviation of the covered part of a pixel that the outline cuts: it is uniform, sqrt(1/12).
 CUT = 0.29
