@@ -16,10 +16,9 @@ from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
 from symrefine.ntuples.rank import FLOOR, FixedSubspace, fixed_subspace
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
+from symrefine.surface.skin import FEW
 
 PARTS = 16
-# Up to so many points stand for themselves, without sampling noise.
-FEW = 250
 LARGEST_DIM = 8
 # Candidates turned down that are told of.
 NEAR = 8
