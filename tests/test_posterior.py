@@ -1,6 +1,7 @@
 """How sure the groups of a chain are: laws of probability, of order, and of what a tolerance forgives."""
 
 import math
+from itertools import pairwise
 
 import pytest
 from hypothesis import given
@@ -108,3 +109,11 @@ def test_more_noise_makes_no_group_that_holds_surer(links, noise, tolerance):
     quiet, loud = (decide(links, tolerance, n) for n in noise)
     assert all(b <= max(a, 0.5) + 1e-12 for a, b in zip(quiet.inside[1:], loud.inside[1:], strict=True))
     assert decide(links, tolerance) == decide(links, tolerance, 0.0)
+
+
+@given(st.lists(st.builds(Link, need=NEED, lone_mirror=st.booleans()), max_size=6), TOLERANCE)
+def test_what_is_inside_a_group_is_at_least_as_sure_in_whatever_order_needs_come(links, tolerance):
+    """A fit of the larger group may have come out better than that of the smaller."""
+    found = decide(links, tolerance)
+    assert all(b <= a for a, b in pairwise(found.inside))
+    assert min(found.probabilities) >= 0.0
