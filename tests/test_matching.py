@@ -12,7 +12,8 @@ from symrefine.fit.matching import ROBUST, match, pair_equations
 from symrefine.fit.residual import design_rows, gram
 from symrefine.geometry import Isometry, Plane, random_orthogonal, rotation, unit
 from symrefine.moments.quadrature import sample_surface
-from symrefine.surface.skin import choose_neighbours, fills_volume, isolated_points, local_planes, smallest_eigenvectors
+from symrefine.surface.neighbourhoods import choose_neighbours, fills_volume, smallest_eigenvectors
+from symrefine.surface.skin import isolated_points, local_planes
 
 BOX = join([box((0, 0, 0), (1, 0.7, 0.4))])
 

@@ -7,7 +7,7 @@ import numpy as np
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.shape import Index, Shape
-from symrefine.surface.skin import smallest_eigenvectors
+from symrefine.surface.neighbourhoods import smallest_eigenvectors
 
 # Keeps edges between parallel normals in the sparse graph, where a weight of 0 is no edge.
 LEAST_WEIGHT = 1e-6

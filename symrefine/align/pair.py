@@ -15,7 +15,8 @@ from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import ntuples
 from symrefine.propose.folds import azimuthal_spectrum
 from symrefine.shape import Shape
-from symrefine.surface.skin import FEW, NEIGHBOURS, LocalPlanes, Skin, isolated_points, make_skin
+from symrefine.surface.neighbourhoods import NEIGHBOURS
+from symrefine.surface.skin import FEW, LocalPlanes, Skin, isolated_points, make_skin
 
 # Local planes of the source and of the target, and points below which local planes say nothing.
 SOURCE_PLANES, TARGET_PLANES, FEWEST = 800, 2000, 60

@@ -13,8 +13,9 @@ from symrefine.ntuples.rank import FixedSubspace, fixed_subspace
 from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
 from symrefine.surface.misses import Deviation
+from symrefine.surface.neighbourhoods import fills_volume, kd_tree
 from symrefine.surface.noise import noise_distances
-from symrefine.surface.skin import FEW, LocalPlanes, Skin, drawn, fills_volume, isolated_points, make_skin
+from symrefine.surface.skin import FEW, LocalPlanes, Skin, drawn, isolated_points, make_skin
 from symrefine.surface.surface import Surface
 
 # Order of the moments, and parts of their jackknife.
@@ -166,9 +167,7 @@ def _surface(
     local: Array, normals: Array | None, weights: Array, labels: Index | None, exact: bool, rng: np.random.Generator
 ) -> Surface:
     """Local planes (points, where they fill a volume) with what noise alone shows."""
-    from scipy.spatial import cKDTree
-
-    tree = None if exact else cKDTree(local, balanced_tree=False, compact_nodes=False)
+    tree = None if exact else kd_tree(local)
     if tree is not None and normals is None and fills_volume(local, tree, np.random.default_rng(0)):
         return _volume(local, labels, rng)
     chance = None if exact or np.ptp(weights) == 0.0 else weights / weights.sum()

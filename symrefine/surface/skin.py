@@ -1,7 +1,7 @@
 """Local planes of a cloud, and which of them a mirrored point meets."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -9,21 +9,17 @@ from numpy.typing import NDArray
 
 from symrefine.geometry import Array, read_only
 from symrefine.shape import Index
+from symrefine.surface.neighbourhoods import (
+    PROBES,
+    Neighbourhoods,
+    choose_neighbours,
+    fit_planes,
+    flatness_of,
+    kd_tree,
+)
 
 # Up to so many points of a cloud stand for themselves (atoms), not for a surface.
 FEW = 250
-# Neighbourhood sizes tried, smallest first: large enough that noise does not decide the normal, no larger.
-NEIGHBOURS = (12, 24, 48, 96, 192)
-# Neighbourhoods wider than this (RMS radii) blur the shape itself, whatever the noise.
-WIDEST = 0.2
-# Thickness over width below which a neighbourhood counts as a plane.
-FLAT = 0.3
-# Median flatness of neighbourhoods up to WIDEST_BLOB wide, over that of a blob, from which on points fill a volume.
-VOLUME = 0.8
-# Probes at first, and the doubt that they leave.
-PROBES = 60
-UNCERTAIN = 0.08
-WIDEST_BLOB = 0.5
 # Classes stand so far apart along a fourth coordinate (RMS radii) that no query finds a point of another class first.
 APART = 1e3
 
@@ -132,7 +128,7 @@ class Skin:
     @cached_property
     def tree(self) -> Any:
         """kd-tree over `points`."""
-        return _tree(self.points) if self.given is None else self.given
+        return kd_tree(self.points) if self.given is None else self.given
 
     @cached_property
     def spacing(self) -> float:
@@ -140,10 +136,14 @@ class Skin:
         some = self.points[:: max(1, len(self.points) // PROBES)]
         return float(np.median(self.tree.query(some, k=[2])[0]))
 
+    @cached_property
+    def _neighbourhoods(self) -> Neighbourhoods:
+        return Neighbourhoods.of(self.points, self.tree, self.neighbours)
+
     def met_by(self, queries: Array) -> tuple[Array, Planes]:
         """Distance [Q] from each query [Q, 3] to the nearest point, and the planes of the points around the queries."""
-        distance, near = self.tree.query(queries, k=[*range(1, self.neighbours + 1)])
-        return distance[:, 0], self._planes(near)
+        distance, near = self.tree.query(queries)
+        return distance, self._planes(queries, near)
 
     def shared_by(self, count: int) -> float:
         """How many of the planes at `count` of the points each point takes part in; at least 1."""
@@ -151,29 +151,29 @@ class Skin:
 
     def denoised(self, pick: Index) -> Planes:
         """Some of the points, each moved onto the plane of its neighbours, and these planes."""
-        if self.neighbours == 1:
-            return self._planes(pick[:, None])
         points = self.points[pick]
-        _, near = self.tree.query(points, k=self.neighbours, workers=-1)
-        fitted = self._planes(near)
+        fitted = self._planes(points, pick)
+        if self.neighbours == 1:
+            return fitted
         across = np.einsum("ij,ij->i", fitted.normals, points - fitted.points)
         return replace(fitted, points=points - fitted.normals * across[:, None])
 
-    def _planes(self, near: Index) -> Planes:
-        normals = None if self.normals is None else self.normals[near[:, 0]]
+    def _planes(self, queries: Array, nearest: Index) -> Planes:
+        normals = None if self.normals is None else self.normals[nearest]
         if self.neighbours == 1 and normals is not None:
-            none = np.zeros(len(near))
-            return Planes(points=self.points[near[:, 0]], normals=normals, thickness=none, flatness=none)
-        mean, normals, values = _fit(self.points, near, normals)
-        return Planes(points=mean, normals=normals, thickness=np.sqrt(values[:, 0]), flatness=_flatness(values))
+            none = np.zeros(len(nearest))
+            return Planes(points=self.points[nearest], normals=normals, thickness=none, flatness=none)
+        mean, normals, values = fit_planes(self._neighbourhoods.around(queries), normals)
+        return Planes(points=mean, normals=normals, thickness=np.sqrt(values[:, 0]), flatness=flatness_of(values))
 
     def local_planes(self, pick: Index, labels: Index | None = None) -> LocalPlanes:
         """The planes of some of the points as a surface of their own; `labels` [N] are the classes of all points."""
         from scipy.spatial import cKDTree
 
         planes = self.denoised(pick)
-        distance, _ = cKDTree(planes.points).query(planes.points, k=min(6, len(pick)))
         classes = None if labels is None else labels[pick]
+        tree = cKDTree(planes.points)
+        distance, _ = tree.query(planes.points, k=min(6, len(pick)))
         return LocalPlanes(
             points=planes.points,
             normals=planes.normals,
@@ -182,95 +182,13 @@ class Skin:
             reach=distance[:, -1],
             spacing=float(np.median(distance[:, 1])),
             redundancy=self.shared_by(len(pick)),
-            tree=cKDTree(_with_class(planes.points, classes)),
+            tree=tree if classes is None else cKDTree(_with_class(planes.points, classes)),
             labels=classes,
         )
 
 
 def _with_class(points: Array, classes: Index | None) -> Array:
     return points if classes is None else np.column_stack([points, APART * classes])
-
-
-def smallest_eigenvectors(covariance: Array) -> tuple[Array, Array]:
-    """Eigenvalues [N, 3] ascending, and the eigenvector [N, 3] of the smallest, of symmetric matrices [N, 3, 3]."""
-    values, vectors = np.linalg.eigh(covariance)
-    return np.clip(values, 0.0, None), vectors[:, :, 0]
-
-
-def _fit(points: Array, neighbours: Index, normals: Array | None = None) -> tuple[Array, Array, Array]:
-    """Means [M, 3], normals [M, 3] and variances [M, 3] (across first) of neighbourhoods [M, k]."""
-    near = points[neighbours]
-    mean = near.mean(axis=1)
-    spread = near - mean[:, None]
-    covariance = spread.transpose(0, 2, 1) @ spread / near.shape[1]
-    values, fitted = smallest_eigenvectors(covariance)
-    if normals is None:
-        return mean, fitted, values
-    across = np.clip(np.einsum("ni,nij,nj->n", normals, covariance, normals), 0.0, None)
-    return mean, normals, np.column_stack([across, values[:, 1:]])
-
-
-def choose_neighbours(
-    points: Array, tree: Any, rng: np.random.Generator, *, probes: int = 120, thin: float = 0.0
-) -> int:
-    """Smallest neighbourhood that looks like a plane, or the one that looks most like it: noise decides, no parameter.
-
-    Flatness is compared with what a blob without any structure shows in a sample of the same size. Noise makes all
-    neighbourhoods thick, thin sheets and edges only some: with `thin`, the smallest will do as soon as a quarter of
-    them is flatter than that.
-    """
-    pick = rng.choice(len(points), min(probes, len(points)), replace=False)
-    most = min(NEIGHBOURS[-1], len(points) // 8 + 4, len(points))
-    ratios: dict[int, float] = {}
-    for k in NEIGHBOURS:
-        if k > most:
-            break
-        distance, near = tree.query(points[pick], k=k)
-        if float(np.median(distance[:, -1])) >= WIDEST:
-            break
-        _, _, values = _fit(points, near)
-        flatness = _flatness(values)
-        ratios[k] = float(np.median(flatness)) / _blob_flatness(k)
-        if ratios[k] < FLAT or (len(ratios) == 1 and float(np.quantile(flatness, 0.25)) < thin):
-            return k
-    least = min(ratios.values(), default=0.0)
-    return next((k for k, ratio in ratios.items() if ratio <= 1.02 * least), min(NEIGHBOURS[0], most))
-
-
-def _flatness(values: Array) -> Array:
-    return np.sqrt(values[:, 0] / np.maximum(values[:, 1], 1e-300))
-
-
-@lru_cache(maxsize=32)
-def _blob_flatness(k: int) -> float:
-    """Median flatness of k points of an isotropic Gaussian."""
-    blob = np.random.default_rng(0).standard_normal((200, k, 3))
-    values, _ = smallest_eigenvectors(blob.transpose(0, 2, 1) @ blob / k)
-    return max(float(np.median(_flatness(values))), 1e-12)
-
-
-def fills_volume(points: Array, tree: Any, rng: np.random.Generator) -> bool:
-    """Whether points [N, 3] (RMS radius 1) fill a volume: at no width do neighbourhoods look flatter than a blob."""
-    order = rng.permutation(len(points))
-    first = _flattest(points, tree, order[:PROBES])
-    if abs(first - VOLUME) > UNCERTAIN:
-        return first > VOLUME
-    return _flattest(points, tree, order[: 5 * PROBES]) > VOLUME
-
-
-def _flattest(points: Array, tree: Any, pick: Index) -> float:
-    """Smallest median flatness of neighbourhoods of some points, over that of a blob, at any size and width."""
-    size, flattest = NEIGHBOURS[0], np.inf
-    while size <= max(len(points) // 8, NEIGHBOURS[0]):
-        distance, near = tree.query(points[pick], k=size)
-        if float(np.median(distance[:, -1])) > WIDEST_BLOB:
-            break
-        _, _, values = _fit(points, near)
-        flattest = min(flattest, float(np.median(_flatness(values))) / _blob_flatness(size))
-        if flattest < VOLUME - UNCERTAIN:
-            break
-        size *= 2
-    return flattest
 
 
 def local_planes(
@@ -318,15 +236,9 @@ def make_skin(
     """
     if exact and normals is not None:
         return Skin(points=points, normals=normals, neighbours=1, given=tree)
-    tree = _tree(points) if tree is None else tree
+    tree = kd_tree(points) if tree is None else tree
     size = choose_neighbours(points, tree, rng, thin=thin)
     return Skin(points=points, normals=normals, neighbours=size, given=tree)
-
-
-def _tree(points: Array) -> Any:
-    from scipy.spatial import cKDTree
-
-    return cKDTree(points, balanced_tree=False, compact_nodes=False)
 
 
 def isolated_points(points: Array, labels: Index | None = None, *, body: Body = "atoms") -> LocalPlanes:

@@ -1,0 +1,173 @@
+"""How large the neighbourhoods of a cloud are, and the planes that fit them."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from symrefine.geometry import Array
+from symrefine.shape import Index
+
+# Neighbourhood sizes tried, smallest first: large enough that noise does not decide the normal, no larger.
+NEIGHBOURS = (12, 24, 48, 96, 192)
+# Neighbourhoods wider than this (RMS radii) blur the shape itself, whatever the noise.
+WIDEST = 0.2
+# Thickness over width below which a neighbourhood counts as a plane.
+FLAT = 0.3
+# Median flatness of neighbourhoods up to WIDEST_BLOB wide, over that of a blob, from which on points fill a volume.
+VOLUME = 0.8
+# Probes at first, and the doubt that they leave.
+PROBES = 60
+UNCERTAIN = 0.08
+WIDEST_BLOB = 0.5
+# Cells that larger neighbourhoods are put together from: with half as many, the rims alone add a tenth to the noise.
+CELLS = 48
+# Where the products of the coordinates stand among the averages, as a matrix.
+PRODUCTS = [3, 4, 5, 4, 6, 7, 5, 7, 8]
+
+
+def kd_tree(points: Array) -> Any:
+    """kd-tree over points [N, 3], quick to build."""
+    from scipy.spatial import cKDTree
+
+    return cKDTree(points, balanced_tree=False, compact_nodes=False)
+
+
+def smallest_eigenvectors(covariance: Array) -> tuple[Array, Array]:
+    """Eigenvalues [N, 3] ascending, and the eigenvector [N, 3] of the smallest, of symmetric matrices [N, 3, 3]."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.clip(values, 0.0, None), vectors[:, :, 0]
+
+
+def _sums(points: Array) -> Array:
+    """What plane fits need of points [N, 3]: 1, x, and the six products of x, [N, 10]."""
+    x, y, z = points.T
+    return np.stack([np.ones_like(x), x, y, z, x * x, x * y, x * z, y * y, y * z, z * z], axis=1)
+
+
+def _added(sums: Array, near: Index) -> Array:
+    """Rows [M, 10] of sums [N, 10] added up over neighbourhoods [M, k]."""
+    from scipy.sparse import csr_array
+
+    starts = np.arange(0, near.size + 1, near.shape[1])
+    return np.asarray(csr_array((np.ones(near.size), near.ravel(), starts), shape=(len(near), len(sums))) @ sums)
+
+
+def fit_planes(sums: Array, normals: Array | None = None) -> tuple[Array, Array, Array]:
+    """Means [M, 3], normals [M, 3] and variances [M, 3] (across first) of neighbourhoods, from their sums [M, 10].
+
+    With `normals` [M, 3] these are taken, and the first variance is that along them.
+    """
+    averages = sums[:, 1:] / sums[:, :1]
+    mean = averages[:, :3]
+    covariance = averages[:, PRODUCTS].reshape(-1, 3, 3) - mean[:, :, None] * mean[:, None, :]
+    values, fitted = smallest_eigenvectors(covariance)
+    if normals is None:
+        return mean, fitted, values
+    across = np.clip(np.einsum("ni,nij,nj->n", normals, covariance, normals), 0.0, None)
+    return mean, normals, np.column_stack([across, values[:, 1:]])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Neighbourhoods:
+    """Neighbourhoods of `size` points each, put together from `count` cells: the points themselves, or groups of them.
+
+    The sums of a large neighbourhood are those of a few cells, so that it costs no more than a small one.
+
+    Attributes:
+        tree: kd-tree over the middles of the cells.
+        sums: [C, 10] of each cell (see `fit_planes`).
+        count: cells to a neighbourhood.
+    """
+
+    tree: Any
+    sums: Array
+    count: int
+
+    @classmethod
+    def of(cls, points: Array, tree: Any, size: int) -> "Neighbourhoods":
+        """Neighbourhoods of about `size` of the points [N, 3], of which `tree` is the kd-tree."""
+        if size <= CELLS:
+            return cls(tree=tree, sums=_sums(points), count=size)
+        count = max(CELLS, len(points) * CELLS // size)
+        middles = points[np.random.default_rng(0).permutation(len(points))[:count]]
+        cells = kd_tree(middles)
+        own = cells.query(points)[1]
+        sums = np.empty((count, 10))
+        for column, s in zip(sums.T, _sums(points).T, strict=True):
+            column[:] = np.bincount(own, weights=s, minlength=count)
+        return cls(tree=cells, sums=sums, count=CELLS)
+
+    def around(self, points: Array) -> Array:
+        """Sums [M, 10] of the neighbourhoods of points [M, 3]."""
+        return _added(self.sums, self.tree.query(points, k=[*range(1, self.count + 1)])[1])
+
+
+def choose_neighbours(
+    points: Array, tree: Any, rng: np.random.Generator, *, probes: int = 120, thin: float = 0.0
+) -> int:
+    """Smallest neighbourhood that looks like a plane, or the one that looks most like it: noise decides, no parameter.
+
+    Flatness is compared with what a blob without any structure shows in a sample of the same size. Noise makes all
+    neighbourhoods thick, thin sheets and edges only some: with `thin`, the smallest will do as soon as a quarter of
+    them is flatter than that.
+    """
+    pick = rng.choice(len(points), min(probes, len(points)), replace=False)
+    most = min(NEIGHBOURS[-1], len(points) // 8 + 4, len(points))
+    ratios: dict[int, float] = {}
+    for k in NEIGHBOURS:
+        if k > most:
+            break
+        distance, near = tree.query(points[pick], k=k)
+        if float(np.median(distance[:, -1])) >= WIDEST:
+            break
+        values = _variances(points, near)
+        flatness = flatness_of(values)
+        ratios[k] = float(np.median(flatness)) / _blob_flatness(k)
+        if ratios[k] < FLAT or (len(ratios) == 1 and float(np.quantile(flatness, 0.25)) < thin):
+            return k
+    least = min(ratios.values(), default=0.0)
+    return next((k for k, ratio in ratios.items() if ratio <= 1.02 * least), min(NEIGHBOURS[0], most))
+
+
+def _variances(points: Array, near: Index) -> Array:
+    """Variances [M, 3] of a few neighbourhoods [M, k]."""
+    return fit_planes(_sums(points[near.ravel()]).reshape(*near.shape, -1).sum(axis=1))[2]
+
+
+def flatness_of(values: Array) -> Array:
+    """Thickness over the smaller width [M] from variances [M, 3] in ascending order: 0 for a plane, 1 for a blob."""
+    return np.sqrt(values[:, 0] / np.maximum(values[:, 1], 1e-300))
+
+
+@lru_cache(maxsize=32)
+def _blob_flatness(k: int) -> float:
+    """Median flatness of k points of an isotropic Gaussian."""
+    blob = np.random.default_rng(0).standard_normal((200, k, 3))
+    values, _ = smallest_eigenvectors(blob.transpose(0, 2, 1) @ blob / k)
+    return max(float(np.median(flatness_of(values))), 1e-12)
+
+
+def fills_volume(points: Array, tree: Any, rng: np.random.Generator) -> bool:
+    """Whether points [N, 3] (RMS radius 1) fill a volume: at no width do neighbourhoods look flatter than a blob."""
+    order = rng.permutation(len(points))
+    first = _flattest(points, tree, order[:PROBES])
+    if abs(first - VOLUME) > UNCERTAIN:
+        return first > VOLUME
+    return _flattest(points, tree, order[: 5 * PROBES]) > VOLUME
+
+
+def _flattest(points: Array, tree: Any, pick: Index) -> float:
+    """Smallest median flatness of neighbourhoods of some points, over that of a blob, at any size and width."""
+    size, flattest = NEIGHBOURS[0], np.inf
+    while size <= max(len(points) // 8, NEIGHBOURS[0]):
+        distance, near = tree.query(points[pick], k=size)
+        if float(np.median(distance[:, -1])) > WIDEST_BLOB:
+            break
+        values = _variances(points, near)
+        flattest = min(flattest, float(np.median(flatness_of(values))) / _blob_flatness(size))
+        if flattest < VOLUME - UNCERTAIN:
+            break
+        size *= 2
+    return flattest
