@@ -18,7 +18,7 @@ from symrefine.groups import is_subgroup, point_group
 from symrefine.moments.moments import central_moments
 from symrefine.ntuples.contract import ntuples
 from symrefine.ntuples.rank import fixed_subspace
-from symrefine.propose.candidates import APART_RAD, Evidence, about, apart, beside, placed, proposals
+from symrefine.propose.candidates import APART_RAD, Evidence, about, apart, beside, placed, prime_axes, proposals
 
 # Half of what order 8 resolves: a start may be off by so much.
 NEAR_RAD = np.radians(5.5)
@@ -56,7 +56,9 @@ def seen(name, seed):
 
 @cache
 def proposed(name, seed):
-    return [p for found in proposals(seen(name, seed)[0]) for p in found]
+    evidence = seen(name, seed)[0]
+    elsewhere = [about(evidence, axis.group.frame[2]) for axis in prime_axes(evidence)]
+    return [p for found in (*proposals(evidence), *elsewhere) for p in found]
 
 
 def distinct(directions):

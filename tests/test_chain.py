@@ -203,7 +203,7 @@ def test_exploring_ends_with_a_group_whose_neighbours_fail():
     assert pool.largest.need < 1e-6
     for h in pool.small:
         assert h.need > TOLERANCE or pool.largest.holds(h.placed)
-    for placed, needs in pool.turned_down:
+    for placed, needs in (*pool.looked, *pool.hopeless):
         assert needs > TOLERANCE
         assert not is_subgroup(placed.group, point_group("C6v"), 0.5 * SAME_RAD)
 

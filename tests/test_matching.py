@@ -12,7 +12,14 @@ from symrefine.fit.matching import ROBUST, match, pair_equations
 from symrefine.fit.residual import design_rows, gram
 from symrefine.geometry import Isometry, Plane, random_orthogonal, rotation, unit
 from symrefine.moments.quadrature import sample_surface
-from symrefine.surface.neighbourhoods import choose_neighbours, fills_volume, smallest_eigenvectors
+from symrefine.surface.neighbourhoods import (
+    CELLS,
+    Neighbourhoods,
+    choose_neighbours,
+    fills_volume,
+    fit_planes,
+    smallest_eigenvectors,
+)
 from symrefine.surface.skin import isolated_points, local_planes
 
 BOX = join([box((0, 0, 0), (1, 0.7, 0.4))])
@@ -39,6 +46,30 @@ def mirror(normal, offset=0.0):
 
 
 # Local planes
+
+
+@pytest.mark.parametrize("size", [CELLS, 4 * CELLS])
+def test_planes_of_neighbourhoods_are_those_of_their_points(size):
+    """Of points themselves exactly; of cells, about as many points about as near."""
+    rng = np.random.default_rng(2)
+    flat = rng.uniform(-1, 1, (8000, 3)) * [1.0, 1.0, 0.0]
+    points = flat + 0.02 * rng.standard_normal(flat.shape)
+    queries = points[np.abs(points[:, :2]).max(axis=1) < 0.7][:200]
+    tree = cKDTree(points)
+    sums = Neighbourhoods.of(points, tree, size).around(queries)
+    mean, normals, values = fit_planes(sums)
+    near = points[tree.query(queries, k=size)[1]]
+    own = near.mean(axis=1)
+    if size == CELLS:
+        np.testing.assert_allclose(mean, own, atol=1e-12)
+        expected = np.linalg.eigvalsh(np.stack([np.cov(p.T, bias=True) for p in near]))
+        np.testing.assert_allclose(values, expected, atol=1e-12)
+    assert sums[:, 0].mean() == pytest.approx(size, rel=0.05)
+    assert np.abs(mean[:, 2]).max() < 5 * 0.02 / np.sqrt(size) + 0.02 / 4
+    assert np.degrees(np.arccos(np.abs(normals[:, 2]).min())) < 15.0
+    assert np.sqrt(values[:, 0]).mean() == pytest.approx(0.02, rel=0.1)
+    given = fit_planes(sums, np.tile([1.0, 0.0, 0.0], (len(sums), 1)))
+    np.testing.assert_allclose(given[2][:, 0], sums[:, 4] / sums[:, 0] - mean[:, 0] ** 2, atol=1e-12)
 
 
 def test_smallest_eigenvectors():

@@ -39,10 +39,10 @@ def test_truth_maps_the_object_onto_itself(name: str) -> None:
     scan, truth = make(case(shape=name, points=6000, seed=3))
     cloud = local_planes(scan.points, 3000, np.random.default_rng(0), normals=scan.normals, exact=True)
     for plane in truth.planes:
-        misses = miss_distances(cloud, Isometry.reflection(plane)) / truth.diagonal
+        misses = miss_distances(cloud, [Isometry.reflection(plane)]) / truth.diagonal
         assert np.quantile(misses, 0.99) < 0.02
         tilted = Plane(normal=rotation([0.3, -0.5, 0.8], 0.15) @ plane.normal, offset=plane.offset)
-        assert np.quantile(miss_distances(cloud, Isometry.reflection(tilted)) / truth.diagonal, 0.99) > 0.02
+        assert np.quantile(miss_distances(cloud, [Isometry.reflection(tilted)]) / truth.diagonal, 0.99) > 0.02
     assert len(truth.planes) == MIRRORS[SHAPES[name][1]]
 
 

@@ -9,19 +9,22 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from symrefine.decide.hypotheses import (
-    GLANCE,
     NOTHING,
+    SAME_RAD,
     START_ERROR,
     Hypothesis,
     fitted,
+    glances,
     joined,
     looked_at,
-    need,
     single,
 )
 from symrefine.fit.placed import Placed
-from symrefine.propose.candidates import Evidence, beside, proposals
+from symrefine.groups import PointGroup
+from symrefine.propose.candidates import Evidence, about, beside, prime_axes, proposals
 from symrefine.surface.misses import LIMITS
 from symrefine.surface.surface import Surface
 
@@ -40,12 +43,30 @@ SINGLY = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pool:
-    """Small groups fitted and judged, the largest within the limit, larger ones that failed, candidates turned down."""
+    """What was found so far.
+
+    Attributes:
+        small: groups fitted and judged.
+        largest: the largest that holds within the limit.
+        failed: groups that the largest and another one generate, which do not hold.
+        looked: candidates turned down after a look, where a coarse fit put them, with what they seem to need.
+        hopeless: the same of those turned down at a glance.
+    """
 
     small: tuple[Hypothesis, ...] = ()
     largest: Hypothesis = NOTHING
-    turned_down: tuple[tuple[Placed, float], ...] = ()
     failed: tuple[Hypothesis, ...] = ()
+    looked: tuple[tuple[Placed, float], ...] = ()
+    hopeless: tuple[tuple[Placed, float], ...] = ()
+
+    @property
+    def seen(self) -> list[Placed]:
+        """Candidates where a fit put them."""
+        return [*(h.placed for h in self.small), *(p for p, _ in self.looked)]
+
+    def has(self, placed: Placed) -> bool:
+        """Whether a group is in the largest one, or is one of those fitted."""
+        return self.largest.holds(placed) or any(_same(placed, h.placed) for h in self.small)
 
 
 def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
@@ -57,7 +78,11 @@ def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
     pool = Pool()
     for starts in proposals(evidence):
         pool = _settled(surface, _tried(surface, pool, starts, limit), pool.largest, limit)
-    nearest = sorted(pool.turned_down, key=lambda k: k[1])[:TOLD] if not pool.small else []
+    for axis, glance in _glanced(surface, pool.largest, prime_axes(evidence)):
+        if glance < HOPELESS and not pool.largest.holds(axis):
+            starts = about(evidence, axis.group.frame[2])
+            pool = _settled(surface, _tried(surface, pool, starts, limit), pool.largest, limit)
+    nearest = sorted((*pool.looked, *pool.hopeless), key=lambda k: k[1])[:TOLD] if not pool.small else []
     return replace(pool, small=(*pool.small, *(fitted(surface, start) for start, _ in nearest)))
 
 
@@ -71,8 +96,9 @@ def _settled(surface: Surface, pool: Pool, before: Hypothesis, limit: float) -> 
 
 def _glanced(surface: Surface, largest: Hypothesis, starts: Iterable[Placed]) -> list[tuple[Placed, float]]:
     """The starts that are new with what they seem to need at a glance, large groups that look good first."""
-    glances = [(s, need(surface, s, GLANCE)) for s in starts if not largest.holds(s)]
-    return sorted(glances, key=lambda k: k[1] / math.log2(1.0 + _size(k[0])))
+    new = [s for s in starts if not largest.holds(s)]
+    seen = zip(new, glances(surface, new, HOPELESS), strict=True)
+    return sorted(seen, key=lambda k: k[1] / math.log2(1.0 + _size(k[0])))
 
 
 def _size(placed: Placed) -> float:
@@ -81,29 +107,38 @@ def _size(placed: Placed) -> float:
 
 def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float) -> Pool:
     """The pool with candidates fitted, but for those that the group so far has anyway."""
-    small, largest, turned_down, failed = list(pool.small), pool.largest, list(pool.turned_down), list(pool.failed)
-    for start, glance in _glanced(surface, largest, starts):
-        if largest.holds(start):
+    for start, glance in _glanced(surface, pool.largest, starts):
+        if pool.largest.holds(start) or _is_image(start, pool.seen, pool.largest.group):
             continue
-        moved, needs = (start, glance) if glance > HOPELESS else looked_at(surface, start)
-        if glance > HOPELESS or needs > COARSE * limit:
-            turned_down.append((moved, needs))
+        if glance >= HOPELESS:
+            pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
             continue
-        if largest.holds(moved) or any(_same(moved, h.placed) for h in small):
-            continue
-        found = fitted(surface, moved)
-        if largest.holds(found.placed) or any(_same(found.placed, h.placed) for h in small):
-            continue
-        small.append(found)
-        if found.need > limit:
-            continue
-        both = _join(surface, [largest, found], failed)
-        if both is not None and both.need <= limit:
-            largest = both
-        else:
-            failed += [both] if both is not None else []
-            largest = max(largest, found, key=lambda h: _size(h.placed))
-    return Pool(small=tuple(small), largest=largest, turned_down=tuple(turned_down), failed=tuple(failed))
+        moved, needs = looked_at(surface, start)
+        if needs > COARSE * limit:
+            pool = replace(pool, looked=(*pool.looked, (moved, needs)))
+        elif not pool.has(moved) and not pool.has((found := fitted(surface, moved)).placed):
+            pool = _grown(surface, replace(pool, small=(*pool.small, found)), found, limit)
+    return pool
+
+
+def _grown(surface: Surface, pool: Pool, found: Hypothesis, limit: float) -> Pool:
+    """The pool with its largest group joined to one that was found, if both together hold, or else the larger one."""
+    if found.need > limit:
+        return pool
+    both = _join(surface, [pool.largest, found], pool.failed)
+    if both is not None and both.need <= limit:
+        return replace(pool, largest=both)
+    failed = pool.failed if both is None else (*pool.failed, both)
+    return replace(pool, failed=failed, largest=max(pool.largest, found, key=lambda h: _size(h.placed)))
+
+
+def _is_image(start: Placed, seen: Iterable[Placed], group: PointGroup) -> bool:
+    """Whether the group that holds carries a mirror or turn that was seen already onto this one: it misses as much."""
+    if start.group.symbol.family not in ("C", "Ch") or not group.is_finite:
+        return False
+    images = group.operations() @ start.group.frame[2]
+    known = [p.group.frame[2] for p in seen if p.group.name == start.group.name]
+    return any(float(np.abs(images @ u).max()) > np.cos(SAME_RAD) for u in known)
 
 
 def _same(a: Placed, b: Placed) -> bool:

@@ -4,6 +4,7 @@ All operations are judged on the same local planes: what each needs to be forgiv
 the table that everything else reads.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,7 +15,7 @@ from symrefine.fit.placed import Operations, Placed, common_center, elements
 from symrefine.fit.refine import Iterate, refine
 from symrefine.geometry import Array
 from symrefine.groups import PointGroup, from_elements, is_subgroup
-from symrefine.surface.misses import Deviation
+from symrefine.surface.misses import LIMITS, Deviation
 from symrefine.surface.surface import Surface
 
 # Sources of a glance, a look, a fit, the judgement of all elements together and of each at least: what they cost.
@@ -67,12 +68,21 @@ class Hypothesis:
 NOTHING = Hypothesis(placed=Placed(group=PointGroup(name="C1"), center=np.zeros(3)), elements=(), need=0.0)
 
 
-def need(surface: Surface, placed: Placed, sources: int) -> float:
-    """What the operations of a group need, as a few of them tell on a few points."""
-    parts = elements(placed.group)
-    chosen = parts[:: max(1, len(parts) // 4)]
-    each = max(GLANCE, sources // len(chosen))
-    return max(surface.need(p.motions(placed.center), sources=each) for p in chosen)
+def glances(surface: Surface, starts: Sequence[Placed], most: float = math.inf) -> list[float]:
+    """What each of several groups needs, as a few operations tell on a few points; from `most` on a lower bound."""
+    each = [[m for p in _some(elements(s.group)) for m in p.motions(s.center)] for s in starts]
+    owner = np.repeat(np.arange(len(starts)), [len(motions) for motions in each])
+    every, found = [m for motions in each for m in motions], np.zeros(len(starts))
+    for limit in (LIMITS[1], LIMITS[-1]):  # most candidates are hopeless, and seen to be so without a wide search
+        asked = np.flatnonzero(found[owner] < most)
+        if asked.size:
+            needs = surface.needs([every[i] for i in asked], sources=GLANCE, bound=limit * most)
+            np.maximum.at(found, owner[asked], needs)
+    return found.tolist()
+
+
+def _some(parts: list[Operations]) -> list[Operations]:
+    return parts[:: max(1, len(parts) // 4)]
 
 
 def looked_at(surface: Surface, start: Placed) -> tuple[Placed, float]:
@@ -82,7 +92,7 @@ def looked_at(surface: Surface, start: Placed) -> tuple[Placed, float]:
     for iterate in refine(surface.cloud, state, start_error_rad=START_ERROR, max_outer=3, stride=stride):
         state = iterate.state
     moved = start.moved(state)
-    return moved, need(surface, moved, LOOK)
+    return moved, glances(surface, [moved])[0]
 
 
 def fitted(surface: Surface, start: Placed, *, error: float = START_ERROR, before: int = 0) -> Hypothesis:

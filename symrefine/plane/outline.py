@@ -91,7 +91,7 @@ def _of_raster(raster: Raster, pixels: int, rng: np.random.Generator) -> Outline
     diagonal = smallest_diagonal(np.concatenate(lines))
     # Straight along a row of full and empty pixels, the edge is anywhere between their middles.
     sharp = 0.5 * fine.pitch / diagonal if len(np.unique(fine.values)) <= 2 else 0.0
-    least = Deviation(mean=0.0, p80=0.0, p95=sharp, p97=sharp, p99=sharp, p994=sharp, max=sharp)
+    least = Deviation(mean=0.0, p95=sharp, p97=sharp, p99=sharp, p994=sharp, max=sharp)
     return Outlines(
         surfaces=tuple(_seen(a, b, diagonal, least, rng) for a, b in zip(lines, aside, strict=True)),
         sampled=False,

@@ -27,7 +27,7 @@ APART_RAD = np.radians(3.0)
 FOLDS = 3
 # A fold that no moment reaches: only the coefficients with m = 0 are invariant.
 ROUND_FOLD = 10**6
-# Primes whose axes the moments tell: an axis of any order is one of a prime order too.
+# Primes whose axes the moments tell.
 PRIMES = (2, 3, 5, 7)
 
 
@@ -55,17 +55,26 @@ class Evidence:
 
 
 def proposals(evidence: Evidence) -> Iterator[list[Placed]]:
-    """All that the moments propose, in rounds: about the likeliest axes, mirrors and inversion, about other axes."""
-    likely = apart(np.concatenate([evidence.tuples.directions[:1], _principal(evidence)]))
-    for direction in likely:
+    """What the moments propose first, in rounds: about the likeliest axes, then mirrors and inversion."""
+    for direction in _likely(evidence):
         yield about(evidence, direction)
     spectral = mirror_candidates(evidence.moments).directions
     normals = np.concatenate([evidence.tuples.directions[::-1], _principal(evidence), spectral])
     yield [placed("Ci", np.eye(3)), *(placed("Cs", frame_with_z(n)) for n in apart(normals))]
-    white = whitened(evidence.moments)
-    minima = [local_minima(axis_misses(white, k), count=5).directions for k in PRIMES]
-    for direction in apart([*likely, *np.concatenate(minima)])[len(likely) :]:
-        yield about(evidence, direction)
+
+
+def prime_axes(evidence: Evidence) -> list[Placed]:
+    """Axes of prime order that the moments propose elsewhere: an axis of any order is one of a prime order too."""
+    white, likely = whitened(evidence.moments), _likely(evidence)
+    found = []
+    for k in PRIMES:
+        minima = local_minima(axis_misses(white, k), count=5).directions
+        found += [placed(f"C{k}", frame_with_z(d)) for d in apart([*likely, *minima])[len(likely) :]]
+    return found
+
+
+def _likely(evidence: Evidence) -> list[Array]:
+    return apart(np.concatenate([evidence.tuples.directions[:1], _principal(evidence)]))
 
 
 def about(evidence: Evidence, direction: Array) -> list[Placed]:

@@ -4,9 +4,12 @@ Flat and round parts map onto themselves under wrong operations too, so the mean
 distance is taken between denoised surfaces: each local plane, moved, against the discs of the local planes around it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from functools import reduce
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from symrefine.geometry import Array, Isometry
 from symrefine.shape import Index
@@ -29,7 +32,6 @@ class Deviation:
     """Distribution of the distance between a surface and its image, in fractions of the bounding-box diagonal."""
 
     mean: float
-    p80: float
     p95: float
     p97: float
     p99: float
@@ -39,9 +41,8 @@ class Deviation:
     @classmethod
     def of(cls, distances: Array) -> "Deviation":
         """The distribution of distances [N], in fractions of the diagonal."""
-        p80, p95, p97, p99, p994 = (float(q) for q in np.quantile(distances, [0.8, 0.95, 0.97, 0.99, 0.994]))
-        mean, largest = float(distances.mean()), float(distances.max())
-        return cls(mean=mean, p80=p80, p95=p95, p97=p97, p99=p99, p994=p994, max=largest)
+        mean, p95, p97, p99, p994 = limited(distances).tolist()
+        return cls(mean=mean, p95=p95, p97=p97, p99=p99, p994=p994, max=float(distances.max()))
 
     def at_least(self, other: "Deviation") -> "Deviation":
         """The larger of the two in every statistic."""
@@ -53,13 +54,12 @@ class Deviation:
         Each statistic may reach its own multiple of the tolerance beyond what noise alone shows; noise and miss add up
         in squares.
         """
-        own, base = np.array(self.limited), np.array(noise.limited)
-        return float(np.max(np.sqrt(np.maximum(own**2 - base**2, 0.0)) / np.array(LIMITS)))
+        return float(needs(np.array(self.limited), noise))
 
     @property
     def need_of_atoms(self) -> float:
         """The same of points that stand for themselves."""
-        return max(v / limit for v, limit in zip((self.mean, self.p95, self.max), ATOM_LIMITS, strict=True))
+        return float(needs_of_atoms(self.mean, self.p95, self.max))
 
     def scaled(self, factor: float) -> "Deviation":
         """Each statistic so many times as large."""
@@ -71,13 +71,42 @@ class Deviation:
         return self.mean, self.p95, self.p97, self.p99, self.p994
 
 
-def miss_distances(cloud: LocalPlanes, motion: Isometry, *, stride: int = 1) -> Array:
-    """Distance of every `stride`-th local plane, moved, to the surface [M / stride]."""
-    return disc_distances(cloud, motion.apply(cloud.points[::stride]), cloud.classes(slice(None, None, stride)))
+def limited(distances: Array) -> Array:
+    """The statistics [..., 5] of distances [..., N] that have limits: mean, 95th, 97th, 99th and 99.4th percentile."""
+    upper = np.quantile(distances, [0.95, 0.97, 0.99, 0.994], axis=-1)
+    return np.stack([distances.mean(axis=-1), *upper], axis=-1)
+
+
+def needs(statistics: Array, noise: Deviation) -> Array:
+    """`Deviation.need` of many: the smallest tolerances [...] for statistics [..., 5]."""
+    beyond = np.maximum(statistics**2 - np.square(noise.limited), 0.0)
+    return np.asarray((np.sqrt(beyond) / LIMITS).max(axis=-1))
+
+
+def needs_of_atoms(mean: ArrayLike, p95: ArrayLike, largest: ArrayLike) -> Array:
+    """The same [...] of points that stand for themselves, from mean, 95th percentile and maximum [...] of the miss."""
+    parts = (np.asarray(v) / limit for v, limit in zip((mean, p95, largest), ATOM_LIMITS, strict=True))
+    return np.asarray(reduce(np.maximum, parts))
+
+
+def miss_distances(cloud: LocalPlanes, motions: Sequence[Isometry], *, stride: int = 1, bound: float = np.inf) -> Array:
+    """Distances [K, M / stride] of every `stride`-th local plane, moved by each of K operations, to the surface.
+
+    Those beyond `bound` count as `bound`, which is quicker.
+    """
+    sources, classes = cloud.points[::stride], cloud.classes(slice(None, None, stride))
+    moved = np.concatenate([m.apply(sources) for m in motions])
+    every = None if classes is None else np.tile(classes, len(motions))
+    return disc_distances(cloud, moved, every, bound=bound).reshape(len(motions), len(sources))
 
 
 def disc_distances(
-    cloud: LocalPlanes, queries: Array, classes: Index | None = None, *, skip_self: bool = False
+    cloud: LocalPlanes,
+    queries: Array,
+    classes: Index | None = None,
+    *,
+    skip_self: bool = False,
+    bound: float = np.inf,
 ) -> Array:
     """Distance [Q] from points to the nearest of the discs that the local planes of their class around them span.
 
@@ -85,11 +114,13 @@ def disc_distances(
         queries: [Q, 3].
         classes: [Q] where the cloud has classes.
         skip_self: the queries are points of the cloud, which are not compared with their own discs.
+        bound: queries without a disc so near are not looked at any closer; all distances end there.
     """
     skip = int(skip_self)
     count = min(DISCS + skip, len(cloud.points))
-    _, near = cloud.nearest(queries, classes, k=count)
-    near = near[:, skip:]
+    away, near = cloud.nearest(queries, classes, k=[*range(1 + skip, 1 + count)], distance_upper_bound=bound)
+    seen = np.isfinite(away)
+    near = np.where(seen, near, 0)
     delta = queries[:, None] - cloud.points[near]
     across = np.abs(np.einsum("nki,nki->nk", delta, cloud.normals[near]))
     along = np.sqrt(np.maximum(np.einsum("nki,nki->nk", delta, delta) - across**2, 0.0))
@@ -99,12 +130,11 @@ def disc_distances(
     if cloud.labels is not None and classes is not None:
         distance = np.where(cloud.labels[near] == classes[:, None], distance, np.inf)
         distance[~np.isfinite(distance).any(axis=1)] = 0.0  # the only one of its class has no other to be compared with
-    return distance.min(axis=1)
+    return np.asarray(np.where(seen, distance, bound).min(axis=1).clip(max=bound))
 
 
-def spread_distance(points: Array, motion: Isometry) -> float:
-    """Distance (Bures, Wasserstein-2 of Gaussians) between the covariance of points [M, 3] and of their images."""
-    own = np.cov(points.T)
+def spread_distance(own: Array, motion: Isometry) -> float:
+    """Distance (Bures, Wasserstein-2 of Gaussians) between the covariance [3, 3] of points and of their images."""
     moved = motion.matrix @ own @ motion.matrix.T
     values, vectors = np.linalg.eigh(own)
     root = (vectors * np.sqrt(np.clip(values, 0.0, None))) @ vectors.T
