@@ -116,9 +116,27 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float)
         moved, needs = looked_at(surface, start)
         if needs > COARSE * limit:
             pool = replace(pool, looked=(*pool.looked, (moved, needs)))
-        elif not pool.has(moved) and not pool.has((found := fitted(surface, moved)).placed):
-            pool = _grown(surface, replace(pool, small=(*pool.small, found)), found, limit)
+        elif not pool.has(moved):
+            pool = _joined_at_once(surface, pool, moved) if needs <= limit and pool.largest.elements else pool
+            if not pool.has(moved) and not pool.has((found := fitted(surface, moved)).placed):
+                pool = _grown(surface, replace(pool, small=(*pool.small, found)), found, limit)
     return pool
+
+
+def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
+    """The pool where a candidate and the largest group hold together as far as noise tells: no need to part them."""
+    placed = joined([pool.largest.placed, start])
+    if placed is not None and not any(_same(h.placed, placed) for h in pool.failed):
+        both = fitted(surface, placed, before=pool.largest.iterations)
+        if both.need <= _exact(surface):
+            return replace(pool, largest=both)
+        return replace(pool, failed=(*pool.failed, both))
+    return pool
+
+
+def _exact(surface: Surface) -> float:
+    """The need up to which noise, or the rounding of coordinates, tells nothing apart."""
+    return max(EXACT, 0.5 * surface.floor)
 
 
 def _grown(surface: Surface, pool: Pool, found: Hypothesis, limit: float) -> Pool:
@@ -160,14 +178,14 @@ def _join(surface: Surface, parts: list[Hypothesis], known: Iterable[Hypothesis]
 def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     """Groups from C1 upwards, each inside the next, by what they need; the last one may be beyond the limit."""
     elements = [single(e) for e in pool.largest.elements if e.need < pool.largest.need / ALIKE]
-    rest = sorted([*pool.small, *elements], key=lambda h: h.need)
+    rest = sorted([*pool.small, *elements, pool.largest], key=lambda h: h.need)
     known = [pool.largest, *pool.failed]
     links = [NOTHING]
     while rest := [h for h in rest if not links[-1].holds(h.placed)]:
         here = links[-1]
         if rest[0].need > limit:
             break
-        level = max(ALIKE * rest[0].need, here.need, EXACT, 0.5 * surface.floor)
+        level = max(ALIKE * rest[0].need, here.need, _exact(surface))
         batch = [h for h in rest if h.need <= level]
         found = _join(surface, [here, *batch], known)
         if found is None or found.need > ALIKE * level:

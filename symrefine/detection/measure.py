@@ -180,7 +180,9 @@ def _surface(
         pick = drawn(len(some), EXACT_PLANES if exact else PLANES // 4, rng)
         return skin.local_planes(pick, None if labels is None else labels[some])
 
-    cloud = whole.local_planes(drawn(len(local), EXACT_PLANES if exact else PLANES, rng, chance), labels)
+    pick = drawn(len(local), EXACT_PLANES if exact else PLANES, rng, chance)
+    # Neighbours stand together in memory, and any stride takes an even part of the surface.
+    cloud = whole.local_planes(pick[kd_tree(local[pick]).indices], labels)
     diagonal = tight_diagonal(cloud.points)
     noise = noise_distances(len(local), half, rng)
     return Surface(cloud=cloud, diagonal=diagonal, noise=Deviation.of(noise / diagonal))

@@ -168,11 +168,9 @@ class Skin:
 
     def local_planes(self, pick: Index, labels: Index | None = None) -> LocalPlanes:
         """The planes of some of the points as a surface of their own; `labels` [N] are the classes of all points."""
-        from scipy.spatial import cKDTree
-
         planes = self.denoised(pick)
         classes = None if labels is None else labels[pick]
-        tree = cKDTree(planes.points)
+        tree = kd_tree(planes.points)
         distance, _ = tree.query(planes.points, k=min(6, len(pick)))
         return LocalPlanes(
             points=planes.points,
@@ -182,7 +180,7 @@ class Skin:
             reach=distance[:, -1],
             spacing=float(np.median(distance[:, 1])),
             redundancy=self.shared_by(len(pick)),
-            tree=tree if classes is None else cKDTree(_with_class(planes.points, classes)),
+            tree=tree if classes is None else kd_tree(_with_class(planes.points, classes)),
             labels=classes,
         )
 
@@ -243,9 +241,8 @@ def make_skin(
 
 def isolated_points(points: Array, labels: Index | None = None, *, body: Body = "atoms") -> LocalPlanes:
     """Points [M, 3] that meet points: few that stand for themselves ("atoms"), or samples of a "volume"."""
-    from scipy.spatial import cKDTree
-
-    distance, _ = cKDTree(points).query(points, k=2)
+    tree = kd_tree(points)
+    distance, _ = tree.query(points, k=2)
     none = np.zeros(len(points))
     return LocalPlanes(
         points=points,
@@ -255,7 +252,7 @@ def isolated_points(points: Array, labels: Index | None = None, *, body: Body = 
         reach=none,
         spacing=float(np.median(distance[:, 1])),
         redundancy=1.0,
-        tree=cKDTree(_with_class(points, labels)),
+        tree=tree if labels is None else kd_tree(_with_class(points, labels)),
         body=body,
         labels=labels,
     )
