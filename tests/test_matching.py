@@ -428,3 +428,12 @@ def test_a_residual_at_the_scale_counts_a_quarter(robust):
 
 def test_the_robust_scale_is_three_standard_deviations_of_gaussian_noise():
     assert ROBUST * norm.ppf(0.75) == pytest.approx(3.0, rel=0.02)
+
+
+def test_cells_of_points_that_coincide_are_counted_once():
+    """Of a cloud where each point stands three times, some cells are empty; no point is lost or counted twice."""
+    points = np.repeat(np.random.default_rng(3).standard_normal((700, 3)), 3, axis=0)
+    found = Neighbourhoods.of(points, cKDTree(points), 4 * CELLS)
+    assert len(found.sums) == len(points) // 4
+    np.testing.assert_allclose(found.sums.sum(axis=0)[:4], [len(points), *points.sum(axis=0)], atol=1e-9)
+    assert (found.sums[:, 0] == 0).any()

@@ -1,5 +1,6 @@
 """How large the neighbourhoods of a cloud are, and the planes that fit them."""
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -23,8 +24,6 @@ UNCERTAIN = 0.08
 WIDEST_BLOB = 0.5
 # Cells that larger neighbourhoods are put together from: with half as many, the rims alone add a tenth to the noise.
 CELLS = 48
-# Where the products of the coordinates stand among the averages, as a matrix.
-PRODUCTS = [3, 4, 5, 4, 6, 7, 5, 7, 8]
 
 
 # Points in a leaf of a kd-tree: queries cost a sixth less than with scipy's 16.
@@ -45,27 +44,28 @@ def smallest_eigenvectors(covariance: Array) -> tuple[Array, Array]:
 
 
 def _sums(points: Array) -> Array:
-    """What plane fits need of points [N, 3]: 1, x, and the six products of x, [N, 10]."""
-    x, y, z = points.T
-    return np.stack([np.ones_like(x), x, y, z, x * x, x * y, x * z, y * y, y * z, z * z], axis=1)
+    """What plane fits need of points [N, d]: 1, x and x x', [N, 1 + d + d d]."""
+    products = points[:, :, None] * points[:, None, :]
+    return np.column_stack([np.ones(len(points)), points, products.reshape(len(points), -1)])
 
 
-def _added(sums: Array, near: Index) -> Array:
-    """Rows [M, 10] of sums [N, 10] added up over neighbourhoods [M, k]."""
+def _added(sums: Array, members: Index, ends: Index) -> Array:
+    """Rows of sums [N, .] added up over groups: the i-th has the members from `ends[i]` up to `ends[i + 1]`."""
     from scipy.sparse import csr_array
 
-    starts = np.arange(0, near.size + 1, near.shape[1])
-    return np.asarray(csr_array((np.ones(near.size), near.ravel(), starts), shape=(len(near), len(sums))) @ sums)
+    groups = csr_array((np.ones(len(members)), members, ends), shape=(len(ends) - 1, len(sums)))
+    return np.asarray(groups @ sums)
 
 
 def fit_planes(sums: Array, normals: Array | None = None) -> tuple[Array, Array, Array]:
-    """Means [M, 3], normals [M, 3] and variances [M, 3] (across first) of neighbourhoods, from their sums [M, 10].
+    """Means, normals and variances (across first), all [M, d], of neighbourhoods, from their sums [M, 1 + d + d d].
 
-    With `normals` [M, 3] these are taken, and the first variance is that along them.
+    With `normals` [M, d] these are taken, and the first variance is that along them.
     """
+    dim = math.isqrt(sums.shape[1])
     averages = sums[:, 1:] / sums[:, :1]
-    mean = averages[:, :3]
-    covariance = averages[:, PRODUCTS].reshape(-1, 3, 3) - mean[:, :, None] * mean[:, None, :]
+    mean, squares = averages[:, :dim], averages[:, dim:].reshape(-1, dim, dim)
+    covariance = squares - mean[:, :, None] * mean[:, None, :]
     values, fitted = smallest_eigenvectors(covariance)
     if normals is None:
         return mean, fitted, values
@@ -81,7 +81,7 @@ class Neighbourhoods:
 
     Attributes:
         tree: kd-tree over the middles of the cells.
-        sums: [C, 10] of each cell (see `fit_planes`).
+        sums: [C, 1 + d + d d] of each cell: number, coordinates and their products.
         count: cells to a neighbourhood.
     """
 
@@ -91,21 +91,21 @@ class Neighbourhoods:
 
     @classmethod
     def of(cls, points: Array, tree: Any, size: int) -> "Neighbourhoods":
-        """Neighbourhoods of about `size` of the points [N, 3], of which `tree` is the kd-tree."""
+        """Neighbourhoods of about `size` of the points [N, d], of which `tree` is the kd-tree."""
         if size <= CELLS:
             return cls(tree=tree, sums=_sums(points), count=size)
         count = max(CELLS, len(points) * CELLS // size)
         middles = points[np.random.default_rng(0).permutation(len(points))[:count]]
         cells = kd_tree(middles)
         own = cells.query(points)[1]
-        sums = np.empty((count, 10))
-        for column, s in zip(sums.T, _sums(points).T, strict=True):
-            column[:] = np.bincount(own, weights=s, minlength=count)
-        return cls(tree=cells, sums=sums, count=CELLS)
+        order = np.argsort(own, kind="stable")
+        ends = np.searchsorted(own[order], np.arange(count + 1))
+        return cls(tree=cells, sums=_added(_sums(points), order, ends), count=CELLS)
 
     def around(self, points: Array) -> Array:
-        """Sums [M, 10] of the neighbourhoods of points [M, 3]."""
-        return _added(self.sums, self.tree.query(points, k=[*range(1, self.count + 1)])[1])
+        """Sums [M, .] of the neighbourhoods of points [M, d]."""
+        _, near = self.tree.query(points, k=[*range(1, self.count + 1)])
+        return _added(self.sums, near.ravel(), np.arange(0, near.size + 1, self.count))
 
 
 def choose_neighbours(
