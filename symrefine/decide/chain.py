@@ -23,7 +23,6 @@ from symrefine.decide.hypotheses import (
     single,
 )
 from symrefine.fit.placed import Placed
-from symrefine.groups import PointGroup
 from symrefine.propose.candidates import Evidence, about, beside, prime_axes, proposals
 from symrefine.surface.misses import LIMITS
 from symrefine.surface.surface import Surface
@@ -60,13 +59,15 @@ class Pool:
     hopeless: tuple[tuple[Placed, float], ...] = ()
 
     @property
-    def seen(self) -> list[Placed]:
-        """Candidates where a fit put them."""
-        return [*(h.placed for h in self.small), *(p for p, _ in self.looked)]
+    def seen(self) -> list[tuple[Placed, float]]:
+        """Candidates where a fit put them, with what they need."""
+        return [*((h.placed, h.need) for h in self.small), *self.looked]
 
-    def has(self, placed: Placed) -> bool:
-        """Whether a group is in the largest one, or is one of those fitted."""
-        return self.largest.holds(placed) or any(_same(placed, h.placed) for h in self.small)
+    def has(self, placed: Placed, needs: float) -> bool:
+        """Whether a group is in the largest one, or is one of those fitted and needs no less than it did."""
+        if self.largest.holds(placed):
+            return True
+        return any(h.need <= ALIKE * needs and _same(placed, h.placed) for h in self.small)
 
 
 def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
@@ -108,7 +109,7 @@ def _size(placed: Placed) -> float:
 def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float) -> Pool:
     """The pool with candidates fitted, but for those that the group so far has anyway."""
     for start, glance in _glanced(surface, pool.largest, starts):
-        if pool.largest.holds(start) or _is_image(start, pool.seen, pool.largest.group):
+        if pool.largest.holds(start) or _is_image(start, glance, pool):
             continue
         if glance >= HOPELESS:
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
@@ -116,10 +117,10 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float)
         moved, needs = looked_at(surface, start)
         if needs > COARSE * limit:
             pool = replace(pool, looked=(*pool.looked, (moved, needs)))
-        elif not pool.has(moved):
+        elif not pool.has(moved, max(needs, _exact(surface))):
             pool = _joined_at_once(surface, pool, moved) if needs <= limit and pool.largest.elements else pool
-            if not pool.has(moved) and not pool.has((found := fitted(surface, moved)).placed):
-                pool = _grown(surface, replace(pool, small=(*pool.small, found)), found, limit)
+            if not pool.largest.holds(moved):
+                pool = _grown(surface, pool, fitted(surface, moved), limit)
     return pool
 
 
@@ -140,7 +141,10 @@ def _exact(surface: Surface) -> float:
 
 
 def _grown(surface: Surface, pool: Pool, found: Hypothesis, limit: float) -> Pool:
-    """The pool with its largest group joined to one that was found, if both together hold, or else the larger one."""
+    """The pool with what was fitted, and its largest group joined to it, if both hold together, or else the larger."""
+    if pool.has(found.placed, max(found.need, _exact(surface))):
+        return pool
+    pool = replace(pool, small=(*pool.small, found))
     if found.need > limit:
         return pool
     both = _join(surface, [pool.largest, found], pool.failed)
@@ -150,13 +154,13 @@ def _grown(surface: Surface, pool: Pool, found: Hypothesis, limit: float) -> Poo
     return replace(pool, failed=failed, largest=max(pool.largest, found, key=lambda h: _size(h.placed)))
 
 
-def _is_image(start: Placed, seen: Iterable[Placed], group: PointGroup) -> bool:
-    """Whether the group that holds carries a mirror or turn that was seen already onto this one: it misses as much."""
-    if start.group.symbol.family not in ("C", "Ch") or not group.is_finite:
+def _is_image(start: Placed, glance: float, pool: Pool) -> bool:
+    """Whether the largest group carries a mirror or turn that was seen onto this one, which looks no better."""
+    if start.group.symbol.family not in ("C", "Ch") or not pool.largest.group.is_finite:
         return False
-    images = group.operations() @ start.group.frame[2]
-    known = [p.group.frame[2] for p in seen if p.group.name == start.group.name]
-    return any(float(np.abs(images @ u).max()) > np.cos(SAME_RAD) for u in known)
+    images = pool.largest.group.operations() @ start.group.frame[2]
+    seen = [(p.group.frame[2], need) for p, need in pool.seen if p.group.name == start.group.name]
+    return any(need < ALIKE * glance and np.abs(images @ u).max() > np.cos(SAME_RAD) for u, need in seen)
 
 
 def _same(a: Placed, b: Placed) -> bool:
