@@ -18,8 +18,9 @@ from symrefine.groups import PointGroup, from_elements, is_subgroup
 from symrefine.surface.misses import LIMITS, Deviation
 from symrefine.surface.surface import Surface
 
-# Sources of a glance, a look, a fit, the judgement of all elements together and of each at least: what they cost.
-GLANCE, LOOK, FITTED, JUDGED, JUDGED_EACH = 120, 400, 3000, 12000, 600
+# Local planes that are moved at a glance by each operation; in a fit and in the judgement, by all of them together (a
+# quarter of that by each at most) and by each at least: what they cost.
+GLANCE, MOVED, MOVED_EACH = 120, 12000, 600
 # How far the moments may put a start wrong (radians, RMS radii; 0.04 was the most of 698 true ones), and directions of
 # fitted elements.
 START_ERROR, DIRECTION_ERROR = 0.05, np.radians(1.5)
@@ -88,7 +89,7 @@ def _some(parts: list[Operations]) -> list[Operations]:
 def looked_at(surface: Surface, start: Placed) -> tuple[Placed, float]:
     """A coarse fit on a few points, and what it needs by them."""
     state = start.framed()
-    stride = surface.stride(max(GLANCE, LOOK // len(state.standard)))
+    stride = surface.stride(max(GLANCE, MOVED_EACH // len(state.standard)))
     for iterate in refine(surface.cloud, state, start_error_rad=START_ERROR, max_outer=3, stride=stride):
         state = iterate.state
     moved = start.moved(state)
@@ -98,13 +99,16 @@ def looked_at(surface: Surface, start: Placed) -> tuple[Placed, float]:
 def fitted(surface: Surface, start: Placed, *, error: float = START_ERROR, before: int = 0) -> Hypothesis:
     """The group fitted as a whole from where it stands, and judged."""
     state = start.framed()
-    stride = surface.stride(FITTED if len(state.standard) == 1 else max(JUDGED_EACH, 4 * FITTED // len(state.standard)))
-    history = tuple(refine(surface.cloud, state, start_error_rad=error, max_outer=10, stride=stride))
+    stride = surface.stride(_moved_each(len(state.standard)))
+    history = tuple(refine(surface.cloud, state, start_error_rad=error, stride=stride))
     placed = start.moved(history[-1].state)
     parts = elements(placed.group)
-    each = min(max(JUDGED_EACH, JUDGED // len(parts)), JUDGED // 3)
-    found = tuple(_judged(surface, part, placed.center, each) for part in parts)
+    found = tuple(_judged(surface, part, placed.center, _moved_each(len(parts))) for part in parts)
     return Hypothesis(placed=placed, elements=found, need=max(e.need for e in found), history=history, before=before)
+
+
+def _moved_each(operations: int) -> int:
+    return min(max(MOVED_EACH, MOVED // operations), MOVED // 4)
 
 
 def _judged(surface: Surface, part: Operations, center: Array, sources: int) -> Element:

@@ -20,9 +20,8 @@ from symrefine.surface.surface import Surface
 
 # Order of the moments, and parts of their jackknife.
 ORDER, PARTS = 8, 16
-# Points of a filled cloud at most; local planes of the surface of a cloud; the same of a mesh, whose normals are known,
-# and samples they are taken of.
-SAMPLES, PLANES, EXACT_PLANES, EXACT_SAMPLES = 20000, 8000, 20000, 40000
+# Local planes of a cloud; points that a volume is known by, and planes of a mesh, whose normals are exact.
+PLANES, SAMPLES = 8000, 20000
 # Masses of atoms that differ by more than this fraction are masses of different kinds.
 SAME_MASS = 0.01
 # Variance across, as a fraction of that along, below which points lie on a line: rounding of float32.
@@ -177,14 +176,14 @@ def _surface(
         # As many neighbours as in the whole, so that noise is the same; exact normals need none.
         own = normals[some] if exact and normals is not None else None
         skin = Skin(points=local[some], normals=own, neighbours=whole.neighbours, given=None)
-        pick = drawn(len(some), EXACT_PLANES if exact else PLANES // 4, rng)
+        pick = drawn(len(some), SAMPLES if exact else PLANES // 4, rng)
         return skin.local_planes(pick, None if labels is None else labels[some])
 
-    pick = drawn(len(local), EXACT_PLANES if exact else PLANES, rng, chance)
+    pick = drawn(len(local), SAMPLES if exact else PLANES, rng, chance)
     # Neighbours stand together in memory, and any stride takes an even part of the surface.
     cloud = whole.local_planes(pick[kd_tree(local[pick]).indices], labels)
     diagonal = tight_diagonal(cloud.points)
-    noise = noise_distances(len(local), half, rng)
+    noise = noise_distances(len(local), half, rng, PLANES // 2)
     return Surface(cloud=cloud, diagonal=diagonal, noise=Deviation.of(noise / diagonal))
 
 
@@ -196,7 +195,7 @@ def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Su
         return isolated_points(points[some], None if labels is None else labels[some], body="volume")
 
     diagonal = tight_diagonal(points)
-    noise = noise_distances(len(points), some_of, rng)
+    noise = noise_distances(len(points), some_of, rng, PLANES // 2)
     return Surface(cloud=some_of(np.arange(len(points))), diagonal=diagonal, noise=Deviation.of(noise / diagonal))
 
 
@@ -205,7 +204,7 @@ def _cloud(
 ) -> tuple[Array, Array | None, Array, Index | None]:
     """Points, normals, weights and classes: samples with exact normals for a mesh, else the points themselves."""
     if shape.faces is not None:
-        points, normals, face = sample_surface(shape, EXACT_SAMPLES, rng)
+        points, normals, face = sample_surface(shape, 2 * SAMPLES, rng)
         return points, normals, np.ones(len(points)), None if classes is None else classes[face]
     weights = np.ones(len(shape.points)) if shape.weights is None else shape.weights
     return shape.points, shape.normals, weights, classes

@@ -6,8 +6,6 @@ from symrefine.fit.gauss_newton import Linearisation, minimise
 from symrefine.geometry import Array
 from symrefine.moments.action import FLOOR, Harmonics, flattened, row_variance, turned_by
 
-# A step shorter than this (radians) ends the polish: the points take over from there.
-POLISHED = 1e-4
 # Longest step (radians): what the linear model covers.
 LONGEST = 0.15
 
@@ -43,7 +41,6 @@ def polish_frame(harmonics: dict[int, Array], frame: Array, fold: int, *, steps:
         frame,
         move=lambda f, step: turned_by(f[None], step[None])[0],
         max_steps=steps,
-        tolerance=POLISHED,
         longest=LONGEST,
     )
     return found.x

@@ -9,8 +9,6 @@ from symrefine.geometry import Array, Isometry
 from symrefine.shape import Index
 from symrefine.surface.skin import LocalPlanes, Planes, Skin
 
-# Flatness at which a local plane counts for little in a residual.
-WORTH = 1.0
 # Robust scale over the median absolute residual (three standard deviations), and its bound from below in spacings.
 ROBUST = 4.4
 SCALE_FLOOR = 0.1
@@ -84,7 +82,7 @@ def _facing(moved: Array, normals: Array) -> NDArray[np.bool_]:
 
 def worth(source: Array, target: Array) -> Array:
     """What pairs [N] of planes count for, from the flatness of both."""
-    return np.asarray(np.exp(-((source / WORTH) ** 2) - (target / WORTH) ** 2))
+    return np.asarray(np.exp(-(source**2) - target**2))
 
 
 def robust_scale(error: Array, spacing: float, uncertainty: float, robust: float = ROBUST) -> float:

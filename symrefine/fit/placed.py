@@ -10,12 +10,11 @@ import numpy as np
 from symrefine.fit.refine import Framed, mirror_bundle
 from symrefine.geometry import Array, Isometry, frame_with_z, householder, read_only, rotation, rotoreflection
 from symrefine.groups import PointGroup
+from symrefine.groups.standard import GOLDEN
 
 T = TypeVar("T")
 # Turns that no finite fold below 36 shares; a surface of revolution survives them all.
 FREE_TURNS = 2.0 * np.pi * np.array([0.0823, 0.1381966, 0.2360680, 0.4270510])
-# The smaller part of a golden section: no turn by few steps comes near it.
-GOLDEN = 0.5 * (3.0 - math.sqrt(5.0))
 # Operations of one kind that are fitted together: more add points, but no knowledge.
 FITTED = 8
 
@@ -92,9 +91,12 @@ def _angles(order: float) -> tuple[float, ...]:
 
 
 def wide_angle_rad(order: int) -> float:
-    """Angle of the generator of C_n nearest to the golden section of a full turn, which moves every part far."""
+    """Angle of the generator of C_n nearest to the golden section of a full turn, which moves every part far.
+
+    The smaller part of the section: no turn by few steps comes near it.
+    """
     powers = [k for k in range(1, order) if math.gcd(k, order) == 1]
-    return 2.0 * math.pi * min(powers, key=lambda k: abs(k / order - GOLDEN)) / order
+    return 2.0 * math.pi * min(powers, key=lambda k: abs(k / order - 2.0 + GOLDEN)) / order
 
 
 def fitted_matrices(group: PointGroup) -> list[Array]:

@@ -138,7 +138,7 @@ def _sampled(points: Array, diagonal: float, rng: np.random.Generator) -> Surfac
     def lines(some: Index | slice = slice(None)) -> LocalPlanes:
         return local_planes(points[some], LOCAL_LINES, rng)
 
-    noise = noise_distances(len(points), lines, rng)
+    noise = noise_distances(len(points), lines, rng, LOCAL_LINES)
     return Surface(cloud=lines(), diagonal=diagonal, noise=Deviation.of(noise / diagonal))
 
 

@@ -25,8 +25,6 @@ from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candida
 APART_RAD = np.radians(3.0)
 # Folds about one axis that are tried.
 FOLDS = 3
-# A fold that no moment reaches: only the coefficients with m = 0 are invariant.
-ROUND_FOLD = 10**6
 # Primes whose axes the moments tell.
 PRIMES = (2, 3, 5, 7)
 
@@ -79,7 +77,8 @@ def _likely(evidence: Evidence) -> list[Array]:
 
 def about(evidence: Evidence, direction: Array) -> list[Placed]:
     """What may stand about a direction: revolution; mirrors at the phases of a fold, or turns alone; C2 and C3."""
-    round_frame = polish_frame(evidence.harmonics, frame_with_z(direction), ROUND_FOLD)
+    beyond = max(evidence.harmonics) + 1  # a fold that no moment reaches: only those with m = 0 are invariant
+    round_frame = polish_frame(evidence.harmonics, frame_with_z(direction), beyond)
     found = [placed("Cinfv", round_frame)]
     folds = {2, 3, *(_counted(evidence.points, direction) if evidence.atoms else ())}
     for axis in apart(np.stack([round_frame[2], direction]), 0.2 * APART_RAD):

@@ -22,10 +22,6 @@ from symrefine.shape import Index
 DIRECTIONS = 1500
 # Eigenvalues of the covariance are bounded from below by this fraction of the largest before whitening.
 THIN = 1e-3
-# A candidate that would flip more than this fraction of the energy is kept only among the first few: true mirrors of
-# the catalogued objects stay below 0.05.
-HOPELESS = 0.12
-LEAST = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -94,7 +90,6 @@ def local_minima(misses: Array, *, count: int) -> Candidates:
     """The deepest local minima over the sphere, `count` at most, each moved to the vertex of a fitted paraboloid."""
     lowest = np.flatnonzero(misses <= misses[_neighbours()].min(axis=1))
     lowest = lowest[np.argsort(misses[lowest], kind="stable")][:count]
-    lowest = np.array([i for rank, i in enumerate(lowest) if rank < LEAST or misses[i] < HOPELESS])
     directions = np.array([_vertex(misses, int(i)) for i in lowest]).reshape(-1, 3)
     return Candidates(directions=directions, misses=misses[lowest])
 
