@@ -64,8 +64,8 @@ class Pool:
         return [*((h.placed, h.need) for h in self.small), *self.looked]
 
     def has(self, placed: Placed, needs: float) -> bool:
-        """Whether a group is in the largest one, or is one of those fitted and needs no less than it did."""
-        if self.largest.holds(placed):
+        """Whether a group is in the largest one, or is one of those fitted, and they need no more than it does."""
+        if self.largest.need <= ALIKE * needs and self.largest.holds(placed):
             return True
         return any(h.need <= ALIKE * needs and _same(placed, h.placed) for h in self.small)
 
@@ -79,8 +79,8 @@ def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
     pool = Pool()
     for starts in proposals(evidence):
         pool = _settled(surface, _tried(surface, pool, starts, limit), pool.largest, limit)
-    for axis, glance in _glanced(surface, pool.largest, prime_axes(evidence)):
-        if glance < HOPELESS and not pool.largest.holds(axis):
+    for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
+        if glance < HOPELESS and not pool.has(axis, max(glance, _exact(surface))):
             starts = about(evidence, axis.group.frame[2])
             pool = _settled(surface, _tried(surface, pool, starts, limit), pool.largest, limit)
     nearest = sorted((*pool.looked, *pool.hopeless), key=lambda k: k[1])[:TOLD] if not pool.small else []
@@ -95,9 +95,9 @@ def _settled(surface: Surface, pool: Pool, before: Hypothesis, limit: float) -> 
     return pool
 
 
-def _glanced(surface: Surface, largest: Hypothesis, starts: Iterable[Placed]) -> list[tuple[Placed, float]]:
+def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tuple[Placed, float]]:
     """The starts that are new with what they seem to need at a glance, large groups that look good first."""
-    new = [s for s in starts if not largest.holds(s)]
+    new = [s for s in starts if not pool.has(s, _exact(surface))]
     seen = zip(new, glances(surface, new, HOPELESS), strict=True)
     return sorted(seen, key=lambda k: k[1] / math.log2(1.0 + _size(k[0])))
 
@@ -108,8 +108,9 @@ def _size(placed: Placed) -> float:
 
 def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float) -> Pool:
     """The pool with candidates fitted, but for those that the group so far has anyway."""
-    for start, glance in _glanced(surface, pool.largest, starts):
-        if pool.largest.holds(start) or _is_image(start, glance, pool):
+    for start, glance in _glanced(surface, pool, starts):
+        least = _exact(surface)
+        if pool.has(start, max(glance, least)) or _is_image(start, glance, pool):
             continue
         if glance >= HOPELESS:
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
@@ -117,9 +118,9 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float)
         moved, needs = looked_at(surface, start)
         if needs > COARSE * limit:
             pool = replace(pool, looked=(*pool.looked, (moved, needs)))
-        elif not pool.has(moved, max(needs, _exact(surface))):
+        elif not pool.has(moved, max(needs, least)):
             pool = _joined_at_once(surface, pool, moved) if needs <= limit and pool.largest.elements else pool
-            if not pool.largest.holds(moved):
+            if not pool.has(moved, max(needs, least)):
                 pool = _grown(surface, pool, fitted(surface, moved), limit)
     return pool
 
