@@ -15,12 +15,10 @@ from numpy.typing import NDArray
 
 from symrefine.geometry import Array, householder, read_only, rotation, rotoreflection
 from symrefine.groups.names import Symbol
-from symrefine.groups.orthogonal import Index, axes_and_angles, determinants, unique_lines
+from symrefine.groups.orthogonal import EXACT, Index, axes_and_angles, determinants, unique_lines
 
 OrderedAxis = tuple[Array, float]
 GOLDEN = (1.0 + np.sqrt(5.0)) / 2.0
-_X, _Y, _Z = np.eye(3)
-_SMALL = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,9 +41,10 @@ def standard_operations(symbol: Symbol) -> Array:
 
 def _axial(family: str, fold: int) -> Array:
     """Cosets of the rotations about z: one representative each."""
-    rotations = [rotation(_Z, 2.0 * np.pi * k / fold) for k in range(fold)]
-    flip, alternate = rotation(_X, np.pi), rotoreflection(_Z, np.pi / fold)
-    one, across, through = np.eye(3), householder(_Z), householder(_Y)
+    x, y, z = np.eye(3)
+    rotations = [rotation(z, 2.0 * np.pi * k / fold) for k in range(fold)]
+    flip, alternate = rotation(x, np.pi), rotoreflection(z, np.pi / fold)
+    one, across, through = np.eye(3), householder(z), householder(y)
     representatives: dict[str, list[Array]] = {
         "C": [one],
         "Cv": [one, through],
@@ -88,9 +87,9 @@ def standard_elements(symbol: Symbol) -> Elements:
     operations = standard_operations(symbol)
     det = determinants(operations)
     axes, angles = axes_and_angles(operations)
-    turns = angles > _SMALL
+    turns = angles > EXACT
     lines, counts = unique_lines(axes[turns & (det > 0)])
-    mirrors, _ = unique_lines(axes[(det < 0) & (angles > np.pi - _SMALL)])
+    mirrors, _ = unique_lines(axes[(det < 0) & (angles > np.pi - EXACT)])
     improper, _ = unique_lines(axes[turns & (det < 0)])
     folds = 1 + _same_line(improper, lines) @ counts
     orders = np.where(_same_line(improper, mirrors).any(axis=1), folds, 2 * folds)
