@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from symrefine.decide.alternatives import NEAR
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, check_tolerance, read_only
 from symrefine.moments.moments import shape_moments
@@ -20,8 +21,6 @@ from symrefine.surface.skin import FEW
 
 PARTS = 16
 LARGEST_DIM = 8
-# Candidates turned down that are told of.
-NEAR = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -12,21 +12,20 @@ from itertools import pairwise
 
 import numpy as np
 
+from symrefine.decide.hypotheses import JUDGED, JUDGED_EACH
 from symrefine.geometry import Array
 from symrefine.ntuples.rank import SIGNIFICANT
+from symrefine.surface.misses import LIMITS
 
 LOW, HIGH = (2, 3, 4), (5, 6)
-# What the asymmetry of a mirror may reach, in standard deviations of its sampling noise: of one turned until it fits
-# best, and of one that others imply, of which the first figure would lose one in ten.
-FOUND, IMPLIED = math.sqrt(SIGNIFICANT), 3.0
+# What the asymmetry of a mirror that was turned until it fits best may reach, in standard deviations of its sampling
+# noise; one that others imply may reach more, as this would lose one in ten.
+FOUND = math.sqrt(SIGNIFICANT)
 # Random starts for each dimension in which second moments coincide.
 STARTS = 16
 # A mirror that still holds after a turn by so much is free to turn: halfway between those of a square, and not far from
 # there for all folds that moments to order 6 see.
 TURN_RAD = math.pi / 8.0
-# An image may be farther from the other points than they are from one another by this share of the tolerance in the
-# mean, as in `verify`, beyond so many standard errors of it; from so many points to so many others.
-MEAN, ERRORS, ASKED, OTHERS = 0.28, 3.0, 1000, 8000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -173,15 +172,15 @@ class Neighbours:
         from scipy.spatial import cKDTree
 
         order = rng.permutation(len(points))
-        asked = min(ASKED, len(points) // 2)
+        asked = min(JUDGED_EACH, len(points) // 2)
         self.asked = points[order[:asked]]
-        self.tree = cKDTree(points[order[asked : asked + OTHERS]])
+        self.tree = cKDTree(points[order[asked : asked + JUDGED]])
         self.own = self.tree.query(self.asked)[0]
         self.diameter = diameter
 
     def contradict(self, normal: Array, tolerance: float) -> bool:
-        """Whether reflected points lie farther from the others than chance and tolerance explain."""
+        """Whether reflected points lie farther from the others than chance and tolerance explain, in the mean."""
         image = self.asked - 2.0 * np.outer(self.asked @ normal, normal)
         farther = (self.tree.query(image)[0] - self.own) / self.diameter
         error = float(farther.std()) / math.sqrt(len(farther))
-        return float(farther.mean()) - ERRORS * error > MEAN * tolerance
+        return float(farther.mean()) - SIGNIFICANT * error > LIMITS[0] * tolerance
