@@ -138,19 +138,22 @@ def _sorted(
     if noise > allowed:
         return holds, [], rejected, noise
     fixed, loose = list[Array](), list[Array]()
-    for k, normal in enumerate(holds):
+    for normal in holds:
+        if _turned_to(normal, loose):
+            continue
         turning = samples.free_turns(blocks, normal, tolerance)
         if turning:
             loose.append(np.array([normal, *turning]))
         else:
             fixed.append(normal)
-        if not fixed and k + 1 == len(normal):
-            # If as many as span the space, the best, are all free to turn, then so are the others.
-            loose.append(np.array(holds[k + 1 :]).reshape(-1, len(normal)))
-            break
     # Noise may hold one in its place where others, a little beside it, turn.
-    fixed = [n for n in fixed if all(np.linalg.norm(basis @ n) < math.cos(samples.TURN_RAD) for basis in loose)]
+    fixed = [n for n in fixed if not _turned_to(n, loose)]
     return fixed, loose, rejected, noise
+
+
+def _turned_to(normal: Array, loose: list[Array]) -> bool:
+    """Whether a normal lies in a subspace that others turn in."""
+    return any(np.linalg.norm(basis @ normal) > math.cos(samples.TURN_RAD) for basis in loose)
 
 
 def _same(tolerance: float) -> float:
