@@ -8,10 +8,12 @@ import numpy as np
 
 from symrefine.decide.hypotheses import DIRECTION_ERROR
 from symrefine.geometry import Array
+from symrefine.moments.moments import shape_moments
 from symrefine.ndim import sampled as samples
 from symrefine.ndim.matched import Points, distinct
 from symrefine.ndim.roots import MOST, closed_under_reflection, reflection_group_order
 from symrefine.ntuples.rank import SIGNIFICANT
+from symrefine.shape import Shape
 
 # Sampling noise, in tolerances, beyond which moments of orders 2 to 4 decide nothing.
 ALLOWED = 0.5
@@ -68,7 +70,7 @@ def among_points(cloud: Points, known: list[Array], tolerance: float) -> Search:
 
 
 def among_samples(
-    cloud: Points,
+    shape: Shape,
     low: samples.Block,
     known: list[Array],
     tolerance: float,
@@ -78,7 +80,7 @@ def among_samples(
     """Search random samples.
 
     Args:
-        cloud: the samples about their centre.
+        shape: the samples.
         low: their moments of orders 2 to 4.
         known: normals to start from besides the eigenvectors of the second moments and random ones.
         tolerance: see `detect_nd`.
@@ -94,7 +96,7 @@ def among_samples(
         return Search(holds=[], rejected=[*rejected, *fixed], incomplete=[], order=None, undetermined=doubt)
     incomplete = []
     if loose and low.whole[0].shape[0] <= HIGH_DIM:
-        high = samples.block(cloud.points, cloud.masses, samples.HIGH, len(low.parts))
+        high = samples.block(shape_moments(shape, max(samples.HIGH), parts=len(low.changes)), samples.HIGH)
         finer = _sorted([low, high], [*begin, *fixed], tolerance, tolerance)
         if finer[3] > tolerance:
             incomplete.append(f"of orders 5 and 6 {_hidden(finer[3], tolerance, 'to look closer, give')}")

@@ -39,11 +39,6 @@ class Raster:
         turned = np.array([-self.step[1], self.step[0]])
         return self.origin + np.multiply.outer(column, self.step) + np.multiply.outer(row, turned)
 
-    def cells(self) -> tuple[Array, Array]:
-        """Centres [N, 2] and weights [N] of the cells that weigh anything."""
-        row, column = np.nonzero(self.values)
-        return self.place(row.astype(np.float64), column.astype(np.float64)), self.values[row, column]
-
 
 def raster_of(points: Array, weights: Array | None) -> Raster | None:
     """The grid that points [N, 2] stand on, upright or turned, or None: they are samples or stand for themselves."""
