@@ -69,6 +69,26 @@ def chord_angles(a: Array, b: Array) -> Array:
     return np.asarray(2.0 * np.arcsin(np.minimum(chord / np.sqrt(8.0), 1.0)))
 
 
+def about_z(ends: ArrayLike, dets: ArrayLike, angles_rad: Array) -> Array:
+    """Operations [k, 3, 3] that multiply z by `ends` and, across it, rotate (`dets` +1) or reflect (-1) by angles [k].
+
+    A reflection keeps the direction at half of its angle.
+    """
+    cosine, sine = np.cos(angles_rad), np.sin(angles_rad)
+    operations = np.zeros((len(angles_rad), 3, 3))
+    operations[:, 0, 0], operations[:, 0, 1] = cosine, -np.asarray(dets) * sine
+    operations[:, 1, 0], operations[:, 1, 1] = sine, np.asarray(dets) * cosine
+    operations[:, 2, 2] = ends
+    return operations
+
+
+def angles_about_z(operations: Array, dets: ArrayLike) -> Array:
+    """The angles [k] of the operations of that kind that are nearest to those given [k, 3, 3]."""
+    f = np.asarray(dets)
+    sines, cosines = operations[:, 1, 0] - f * operations[:, 0, 1], operations[:, 0, 0] + f * operations[:, 1, 1]
+    return np.asarray(np.arctan2(sines, cosines))
+
+
 def unique_lines(directions: Array) -> tuple[Array, Index]:
     """Distinct unsigned directions [m, 3] and how often each occurs [m], for directions exact to 1e-9."""
     key = np.round(directions, 9) + 0.0

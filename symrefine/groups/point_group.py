@@ -15,13 +15,18 @@ from numpy.typing import ArrayLike
 from symrefine.errors import InputError
 from symrefine.geometry import Array, orthogonal_factor, read_only, unit
 from symrefine.groups.names import Symbol, parse
-from symrefine.groups.orthogonal import EXACT, chord_angles, determinants, nearest_operations, nearest_orthogonal
+from symrefine.groups.orthogonal import (
+    EXACT,
+    about_z,
+    angles_about_z,
+    chord_angles,
+    determinants,
+    nearest_operations,
+    nearest_orthogonal,
+)
 from symrefine.groups.standard import Elements, OrderedAxis, standard_elements, standard_operations
 
 _POINT_SET = {"C": "Cv", "Cv": "Cv", "Ch": "Dh", "D": "Dh", "Dh": "Dh", "K": "Kh", "Kh": "Kh"}
-# One member of each continuous family of mirrors (rows) and of perpendicular two-fold axes.
-_MIRRORS = {"C": "", "Cv": "y", "Ch": "z", "D": "", "Dh": "yz", "K": "", "Kh": "z"}
-_HALF_TURNS = {"D": "x", "Dh": "x"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -149,7 +154,7 @@ class PointGroup:
         # What it does to its axis (sign of z) and to the plane across (determinant there), each finite member does too.
         members = standard_operations(Symbol(family=family, fold=2))
         parts = {(round(m[2, 2]), round(det * m[2, 2])) for m, det in zip(members, determinants(members), strict=True)}
-        return [_nearest_about_z(turned, z_sign, det) for z_sign, det in parts]
+        return [about_z(end, det, angles_about_z(turned, det)) for end, det in parts]
 
 
 def point_group(name: str, frame: ArrayLike | None = None) -> PointGroup:
@@ -186,27 +191,12 @@ def _turned(axes: Iterable[OrderedAxis], frame: Array) -> list[OrderedAxis]:
     return [(u @ frame, order) for u, order in axes]
 
 
-def _nearest_about_z(turned: Array, z_sign: int, det: int) -> Array:
-    """Nearest matrices to `turned` [k, 3, 3] that map z to `z_sign` z and act on xy with determinant `det`."""
-    (a, b), (c, d) = turned[:, 0, :2].T, turned[:, 1, :2].T
-    angle = np.arctan2(c - det * b, a + det * d)
-    cosine, sine = np.cos(angle), np.sin(angle)
-    nearest = np.zeros_like(turned)
-    nearest[:, 0, 0], nearest[:, 0, 1] = cosine, -det * sine
-    nearest[:, 1, 0], nearest[:, 1, 1] = sine, det * cosine
-    nearest[:, 2, 2] = z_sign
-    return nearest
-
-
 def _continuous_elements(family: str) -> Elements:
     """Elements of a continuous group in the standard placement, one member standing for each continuous family."""
-    rows = dict(zip("xyz", np.eye(3), strict=True))
-    main = "xyz" if family in ("K", "Kh") else "z"
-    two_fold = [(rows[k], 2) for k in _HALF_TURNS.get(family, "")]
-    improper = main if family in ("Ch", "Dh", "Kh") else ""
+    # Those of the member of fold 1, which has one of each, and the endless axes.
+    one = standard_elements(Symbol(family=family.replace("K", "C"), fold=1))
+    endless = tuple((u, math.inf) for u in np.eye(3)[0 if family in ("K", "Kh") else 2 :])
+    across = family in ("Ch", "Dh", "Kh")
     return Elements(
-        mirrors=np.array([rows[k] for k in _MIRRORS[family]]).reshape(-1, 3),
-        axes=(*((rows[k], math.inf) for k in main), *two_fold),
-        improper=tuple((rows[k], math.inf) for k in improper),
-        inversion=bool(improper),
+        mirrors=one.mirrors, axes=(*endless, *one.axes), improper=endless if across else (), inversion=across
     )

@@ -55,18 +55,14 @@ def among_points(cloud: Points, known: list[Array], tolerance: float) -> Search:
             f"the points span {len(free)} dimensions less than the space, so that every hyperplane that holds them all "
             "is one; none of these is listed"
         )
-    holds = [n for n in found if cloud.miss(n) <= tolerance]
+    holds, rejected = _parted(found, lambda n: cloud.miss(n) <= tolerance)
 
     def confirmed(image: Array) -> Array | None:
         normal = cloud.refined(image)
         return normal if cloud.miss(normal) <= tolerance else None
 
-    search = _closed(holds, confirmed, same, incomplete)
-    return replace(
-        search,
-        rejected=[n for n in found if cloud.miss(n) > tolerance],
-        order=search.order if len(free) < 2 else None,
-    )
+    search = _closed(holds, rejected, confirmed, same, incomplete)
+    return search if len(free) < 2 else replace(search, order=None)
 
 
 def among_samples(
@@ -122,10 +118,15 @@ def among_samples(
         (normal,) = samples.minima(blocks, [image])
         return normal if true(normal, SIGNIFICANT) else None
 
-    holds = [n for n in fixed if true(n, samples.FOUND)]
-    rejected = [*rejected, *(n for n in fixed if not any(n is h for h in holds))]
-    search = _closed(holds, confirmed, 3.0 * _same(tolerance), incomplete)
-    return replace(search, rejected=rejected, order=None if loose else search.order)
+    holds, untrue = _parted(fixed, lambda n: true(n, samples.FOUND))
+    search = _closed(holds, [*rejected, *untrue], confirmed, 3.0 * _same(tolerance), incomplete)
+    return replace(search, order=None) if loose else search
+
+
+def _parted(normals: list[Array], test: Callable[[Array], bool]) -> tuple[list[Array], list[Array]]:
+    """Those that pass a test, and those that do not."""
+    passed = [(n, test(n)) for n in normals]
+    return [n for n, good in passed if good], [n for n, good in passed if not good]
 
 
 def _sorted(
@@ -133,9 +134,7 @@ def _sorted(
 ) -> tuple[list[Array], list[Array], list[Array], float]:
     """Normals that hold where they are, bases [k, n] of what others turn in and hold, those that do not; most noise."""
     found, _ = distinct(samples.minima(blocks, begin), _same(tolerance), MOST)
-    holds = [n for n in found if all(samples.holds(b, n, tolerance) for b in blocks)]
-    kept = {id(n) for n in holds}
-    rejected = [n for n in found if id(n) not in kept]
+    holds, rejected = _parted(found, lambda n: all(samples.holds(b, n, tolerance) for b in blocks))
     noise = max((b.against(n)[1] for n in holds for b in blocks), default=0.0)
     if noise > allowed:
         return holds, [], rejected, noise
@@ -168,13 +167,18 @@ def _same(tolerance: float) -> float:
 
 
 def _closed(
-    holds: list[Array], confirmed: Callable[[Array], Array | None], same: float, incomplete: list[str]
+    holds: list[Array],
+    rejected: list[Array],
+    confirmed: Callable[[Array], Array | None],
+    same: float,
+    incomplete: list[str],
 ) -> Search:
     """Normals that hold with their images in one another, and the group, if these hold too."""
     normals, closed = closed_under_reflection(holds, confirmed, same)
     order = reflection_group_order(normals) if closed else None
     open_ = "the reflections listed take one another to others that do not hold, or that are too many"
-    return Search(holds=normals, rejected=[], incomplete=[*incomplete, *([] if order else [open_])], order=order)
+    told = incomplete if order else [*incomplete, open_]
+    return Search(holds=normals, rejected=rejected, incomplete=told, order=order)
 
 
 def _hidden(noise: float, tolerance: float, give: str) -> str:
