@@ -147,9 +147,8 @@ def _sampled(points: Array, diagonal: float, rng: np.random.Generator) -> Surfac
 def _levels(points: Array, weights: Array) -> list[Array]:
     """All points, then those that weigh at least each level, where that leaves some out."""
     heavy = weights / np.quantile(weights, 0.95)
-    chosen = [heavy >= level for level in sorted(LEVELS)]
-    sizes = [len(points), *(int(c.sum()) for c in chosen)]
-    return [points, *(points[c] for c, n, before in zip(chosen, sizes[1:], sizes[:-1], strict=True) if 0 < n < before)]
+    by_count = {int(c.sum()): points[c] for c in (heavy >= level for level in (0.0, *sorted(LEVELS)))}
+    return [some for count, some in by_count.items() if count]
 
 
 def _two(points: Array) -> Array:
