@@ -12,13 +12,13 @@ from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import frame_with_z, householder, random_orthogonal, rotation, rotoreflection
 from symrefine.groups import (
     MAX_FOLD,
+    PointGroup2D,
     close,
     fixed_subspace,
     from_elements,
     identify,
     is_subgroup,
     point_group,
-    point_group_2d,
 )
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -639,7 +639,7 @@ def test_the_listed_elements_give_the_group_back(name):
 @pytest.mark.parametrize("n", range(1, 13))
 def test_groups_of_the_plane(n):
     for name, order in ((f"C{n}", n), (f"D{n}", 2 * n)):
-        group = point_group_2d(name, 0.3)
+        group = PointGroup2D(name=name, angle_rad=0.3)
         operations = group.operations()
         assert len(operations) == group.order == order
         products = (operations[:, None] @ operations[None]).reshape(-1, 4)
@@ -649,15 +649,15 @@ def test_groups_of_the_plane(n):
         for normal in group.mirrors():
             assert np.abs(operations - householder(normal)).max(axis=(1, 2)).min() < 1e-14
     np.testing.assert_allclose(
-        point_group_2d("D1", 0.3).operations()[1] @ [np.cos(0.3), np.sin(0.3)], [np.cos(0.3), np.sin(0.3)]
+        PointGroup2D(name="D1", angle_rad=0.3).operations()[1] @ [np.cos(0.3), np.sin(0.3)], [np.cos(0.3), np.sin(0.3)]
     )
 
 
 def test_continuous_and_bad_groups_of_the_plane():
-    assert point_group_2d("O(2)").order == point_group_2d("SO(2)").order == math.inf
-    assert len(point_group_2d("O(2)").mirrors()) == 1
+    assert PointGroup2D(name="O(2)").order == PointGroup2D(name="SO(2)").order == math.inf
+    assert len(PointGroup2D(name="O(2)").mirrors()) == 1
     with pytest.raises(InputError, match="infinitely many"):
-        point_group_2d("O(2)").operations()
+        PointGroup2D(name="O(2)").operations()
     for name in ("C0", "S4", "C4v", "c4", f"D{MAX_FOLD + 1}"):
         with pytest.raises(InputError, match="no point group of the plane"):
-            point_group_2d(name)
+            PointGroup2D(name=name)

@@ -50,6 +50,12 @@ class Decision:
     probabilities: tuple[float, ...]
     inside: tuple[float, ...]
 
+    @classmethod
+    def of(cls, inside: Sequence[float]) -> "Decision":
+        """The likeliest group, from the probabilities that the true group holds each."""
+        own = [here - beyond for here, beyond in pairwise([*inside, 0.0])]
+        return cls(index=max(range(len(own)), key=own.__getitem__), probabilities=tuple(own), inside=tuple(inside))
+
 
 def decide(links: Sequence[Link], tolerance: float, noise: float = 0.0, curve: Curve = SPACE) -> Decision:
     """The likeliest group of a chain.
@@ -63,8 +69,7 @@ def decide(links: Sequence[Link], tolerance: float, noise: float = 0.0, curve: C
     inside = [1.0]
     for link in links:
         inside.append(min(inside[-1], meant(link, tolerance, noise, curve)))
-    own = [here - beyond for here, beyond in pairwise([*inside, 0.0])]
-    return Decision(index=max(range(len(own)), key=own.__getitem__), probabilities=tuple(own), inside=tuple(inside))
+    return Decision.of(inside)
 
 
 def meant(link: Link, tolerance: float, noise: float = 0.0, curve: Curve = SPACE) -> float:

@@ -4,7 +4,7 @@ from symrefine.groups.closure import Closure, close
 from symrefine.groups.elements import from_elements
 from symrefine.groups.identify import identify
 from symrefine.groups.names import MAX_FOLD
-from symrefine.groups.plane import PointGroup2D, point_group_2d
+from symrefine.groups.plane import PointGroup2D
 from symrefine.groups.point_group import PointGroup, fixed_subspace, is_subgroup, point_group
 from symrefine.groups.standard import OrderedAxis
 
@@ -20,5 +20,4 @@ __all__ = [
     "identify",
     "is_subgroup",
     "point_group",
-    "point_group_2d",
 ]

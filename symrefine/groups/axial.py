@@ -11,7 +11,7 @@ import numpy as np
 
 from symrefine.geometry import Array, frame_with_z, rotation
 from symrefine.groups.names import MAX_FOLD
-from symrefine.groups.orthogonal import Index, axes_and_angles, determinants, nearest_in_span
+from symrefine.groups.orthogonal import Index, about_z, angles_about_z, axes_and_angles, determinants, nearest_in_span
 
 _EXACT = 1e-3
 _ACCIDENTS = 2.0
@@ -67,8 +67,7 @@ def planar_parts(operations: Array, frame: Array) -> Planar:
     turned = frame @ operations @ frame.T
     ends = np.where(turned[:, 2, 2] < 0.0, -1, 1)
     dets = np.rint(determinants(turned)).astype(np.intp) * ends
-    sines, cosines = turned[:, 1, 0] - dets * turned[:, 0, 1], turned[:, 0, 0] + dets * turned[:, 1, 1]
-    return Planar(ends=ends, dets=dets, angles_rad=np.arctan2(sines, cosines))
+    return Planar(ends=ends, dets=dets, angles_rad=angles_about_z(turned, dets))
 
 
 def fit_lattice(parts: Planar, tolerance_rad: float, multiple_of: int, max_fold: int) -> Lattice | None:
@@ -116,11 +115,7 @@ def closed_operations(parts: Planar, lattice: Lattice, frame: Array) -> Array:
     steps = np.rint(offsets * lattice.fold / (2.0 * np.pi)).astype(int) % lattice.fold
     generators = set(zip(parts.ends.tolist(), parts.dets.tolist(), steps.tolist(), strict=True))
     e, f, j = np.array(sorted(_close_steps(generators, lattice.fold))).T
-    angle = 2.0 * np.pi * j / lattice.fold
-    exact = np.zeros((len(j), 3, 3))
-    exact[:, 0, 0], exact[:, 0, 1] = np.cos(angle), -f * np.sin(angle)
-    exact[:, 1, 0], exact[:, 1, 1] = np.sin(angle), f * np.cos(angle)
-    exact[:, 2, 2] = e
+    exact = about_z(e, f, 2.0 * np.pi * j / lattice.fold)
     phased = rotation([0.0, 0.0, 1.0], -0.5 * lattice.phase_rad) @ frame
     return np.asarray(phased.T @ exact @ phased)
 

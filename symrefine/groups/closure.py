@@ -14,14 +14,13 @@ from numpy.typing import ArrayLike
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.groups.axial import axial_operations
-from symrefine.groups.identify import has_alike, identify, polyhedral_start
+from symrefine.groups.identify import POLYHEDRAL, has_alike, identify, polyhedral_start
 from symrefine.groups.names import MAX_FOLD, parse
 from symrefine.groups.orthogonal import Index, nearest_orthogonal, register
 from symrefine.groups.point_group import PointGroup
 from symrefine.groups.standard import standard_operations
 
 DEFAULT_MAX_FOLD = 120
-_POLYHEDRAL = ("T", "Td", "Th", "O", "Oh", "I", "Ih")  # by order: the first that fits is what the operations generate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,7 +78,7 @@ def _candidates(generators: Array, tolerance_rad: float, orders: Index, max_fold
     """Roughly placed groups that may contain the generators, axial ones first, then polyhedral ones by order."""
     for operations in axial_operations(generators, tolerance_rad, orders, max_fold):
         yield identify(operations)
-    for name in _POLYHEDRAL:
+    for name in POLYHEDRAL:  # the first that fits is what they generate
         if has_alike(generators, parse(name), tolerance_rad):
             yield PointGroup(name=name, frame=polyhedral_start(generators, parse(name), 3.0 * tolerance_rad))
 

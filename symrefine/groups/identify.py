@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.errors import InputError
-from symrefine.geometry import Array, frame_with_z, unit
-from symrefine.groups.names import Symbol
+from symrefine.geometry import Array, frame_with_z, rotation, unit
+from symrefine.groups.axial import planar_parts
+from symrefine.groups.names import Symbol, parse
 from symrefine.groups.orthogonal import (
+    ROUGH,
     axes_and_angles,
     determinants,
     nearest_operations,
@@ -20,8 +22,7 @@ from symrefine.groups.orthogonal import (
 from symrefine.groups.point_group import PointGroup
 from symrefine.groups.standard import standard_operations
 
-_POLYHEDRAL = {12: "T", 24: "O", 60: "I"}
-_ANGLE_SLACK_RAD = 0.3  # between classes of a polyhedral group angles differ by 0.6 and more
+POLYHEDRAL = ("T", "Td", "Th", "O", "Oh", "I", "Ih")  # by order
 
 
 def identify(operations: ArrayLike) -> PointGroup:
@@ -55,63 +56,38 @@ def identify(operations: ArrayLike) -> PointGroup:
 
 def _symbol_and_start(rotations: Array, others: Array) -> tuple[Symbol, Array]:
     """The type of the group, and a frame near enough for `register`."""
-    if len(rotations) == 1:
-        return _without_rotations(others)
-    traces = np.trace(rotations, axis1=1, axis2=2)
-    if round(float(np.mean(traces))) == 1:  # one direction is fixed by all rotations
-        return _cyclic(rotations, others)
-    if round(float(np.mean(traces**2))) == 1 and len(rotations) in _POLYHEDRAL:  # no direction is left alone
-        return _polyhedral(rotations, others)
-    return _dihedral(rotations, others)
-
-
-def _without_rotations(others: Array) -> tuple[Symbol, Array]:
-    """C1, Ci and Cs."""
-    if len(others) == 0:
-        return Symbol(family="C", fold=1), np.eye(3)
-    if np.trace(others[0]) < -1.0:
-        return Symbol(family="S", fold=1), np.eye(3)
-    return Symbol(family="Ch", fold=1), frame_with_z(axes_and_angles(others)[0][0])
-
-
-def _cyclic(rotations: Array, others: Array) -> tuple[Symbol, Array]:
-    """Cn, Cnv, Cnh and S2n: the mean rotation is the projection `z z'` on the axis."""
-    fold = len(rotations)
-    frame = frame_with_z(_top_eigenvector(rotations.mean(axis=0)))
-    if len(others) == 0:
-        return Symbol(family="C", fold=fold), frame
-    if np.mean(others @ frame[2] @ frame[2]) > 0.0:
-        normal = axes_and_angles(others)[0][0]
-        return Symbol(family="Cv", fold=fold), _frame_with_zx(frame[2], np.cross(normal, frame[2]))
-    return Symbol(family="Ch" if _turns_in_step(others, frame, fold) else "S", fold=fold), frame
-
-
-def _dihedral(rotations: Array, others: Array) -> tuple[Symbol, Array]:
-    """Dn, Dnh and Dnd: the mean square of all operations is `(1 + z z') / 2`, but 1 for D2 and D2h."""
-    fold = len(rotations) // 2
     everything = np.concatenate([rotations, others])
-    squares = (everything @ everything).mean(axis=0)
-    two_folds = axes_and_angles(rotations)[0][np.argsort(np.trace(rotations, axis1=1, axis2=2))]
-    z = two_folds[0] if np.trace(squares) > 2.5 else _top_eigenvector(squares)
-    frame = _frame_with_zx(z, two_folds[np.argmin(np.abs(two_folds @ z))])
-    if len(others) == 0:
-        return Symbol(family="D", fold=fold), frame
-    across = others[others @ frame[2] @ frame[2] < 0.0]
-    return Symbol(family="Dh" if _turns_in_step(across, frame, fold) else "Dd", fold=fold), frame
-
-
-def _polyhedral(rotations: Array, others: Array) -> tuple[Symbol, Array]:
-    """T, O, I and what mirrors or the inversion make of them."""
-    letter = _POLYHEDRAL[len(rotations)]
-    if len(others) == 0:
-        suffix = ""
-    elif np.trace(others, axis1=1, axis2=2).min() < -2.0:  # the inversion is among them
-        suffix = "h"
+    for symbol in map(parse, POLYHEDRAL):
+        if len(standard_operations(symbol)) == len(everything) and has_alike(everything, symbol, ROUGH):
+            return symbol, polyhedral_start(rotations, symbol, ROUGH)
+    frame = frame_with_z(_main_axis(rotations, others))
+    parts = planar_parts(everything, frame)
+    fold = int(np.count_nonzero((parts.ends > 0) & (parts.dets > 0)))
+    flips, over = parts.dets < 0, parts.ends < 0
+    if flips.any():
+        # The x axis lies in a mirror or, where there are any, along a half turn.
+        phase = parts.angles_rad[flips & over if (flips & over).any() else flips][0]
+        frame = rotation([0.0, 0.0, 1.0], -0.5 * phase) @ frame
+    # Rotoreflections turn by multiples of 2 pi / n (Cnh, Dnh), or by odd multiples of pi / n.
+    in_step = np.cos(fold * parts.angles_rad[over & ~flips]).sum() > 0.0
+    if (flips & over).any():
+        family = "D" if not others.size else "Dh" if in_step else "Dd"
     else:
-        suffix = "d"
-    family = letter + suffix if suffix != "d" or letter == "T" else letter + "h"
-    symbol = Symbol(family=family, fold=0)
-    return symbol, polyhedral_start(rotations, symbol, _ANGLE_SLACK_RAD)
+        family = "C" if not others.size else "Cv" if flips.any() else "Ch" if in_step else "S"
+    return Symbol(family=family, fold=fold), frame
+
+
+def _main_axis(rotations: Array, others: Array) -> Array:
+    """Direction [3] of the z axis of an axial group."""
+    if len(rotations) == 1:
+        return np.asarray(axes_and_angles(others)[0][0]) if len(others) else np.array([0.0, 0.0, 1.0])
+    mean = rotations.mean(axis=0)
+    if round(float(np.trace(mean))) == 1:  # the projection on the one direction that all rotations fix
+        return _top_eigenvector(mean)
+    everything = np.concatenate([rotations, others])
+    squares = (everything @ everything).mean(axis=0)  # `(1 + z z') / 2`, but 1 for D2 and D2h
+    half_turn = axes_and_angles(rotations)[0][np.argmin(np.trace(rotations, axis1=1, axis2=2))]
+    return np.asarray(half_turn) if np.trace(squares) > 2.5 else _top_eigenvector(squares)
 
 
 def polyhedral_start(operations: Array, symbol: Symbol, slack_rad: float) -> Array:
@@ -164,19 +140,6 @@ def _triads(a: Array, b: Array) -> Array:
     return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
-def _turns_in_step(others: Array, frame: Array, fold: int) -> bool:
-    """Whether rotoreflections about z turn by multiples of 2 pi / n (Cnh, Dnh), not by odd multiples of pi / n."""
-    turned = frame @ others @ frame.T
-    angles = np.arctan2(turned[:, 1, 0] - turned[:, 0, 1], turned[:, 0, 0] + turned[:, 1, 1])
-    return bool(np.mean(np.cos(fold * angles)) > 0.0)
-
-
 def _top_eigenvector(matrix: Array) -> Array:
     """Eigenvector [3] of the largest eigenvalue of the symmetric part."""
     return np.asarray(np.linalg.eigh(matrix + matrix.T)[1][:, -1])
-
-
-def _frame_with_zx(z: Array, x: Array) -> Array:
-    """Frame with the z row along `z` and the x row along what of `x` is normal to it."""
-    across = unit(x - (x @ z) * z)
-    return np.stack([across, np.cross(z, across), z])

@@ -11,19 +11,10 @@ MAX_FOLD = 360
 _AXIAL = {"C", "Cv", "Ch", "S", "D", "Dh", "Dd"}
 _CONTINUOUS = {"C", "Cv", "Ch", "D", "Dh"}
 _FIXED = ("T", "Td", "Th", "O", "Oh", "I", "Ih", "K", "Kh")
-_ALIASES: dict[tuple[str, float], tuple[str, float]] = {
-    ("Cv", 1): ("Ch", 1),
-    ("D", 1): ("C", 2),
-    ("Dh", 1): ("Cv", 2),
-    ("Dd", 1): ("Ch", 2),
-}
-_WORDS: dict[str, tuple[str, float]] = {
-    "cs": ("Ch", 1),
-    "ci": ("S", 1),
-    "v": ("D", 2),  # Klein's Vierergruppe
-    "vh": ("Dh", 2),
-    "vd": ("Dd", 2),
-}
+_ALIASES = {
+    "cs": "c1h", "ci": "s2", "c1v": "c1h", "d1": "c2", "d1h": "c2v", "d1d": "c2h",
+    "v": "d2", "vh": "d2h", "vd": "d2d",  # Klein's Vierergruppe
+}  # fmt: skip
 _SPECIAL: dict[tuple[str, float], str] = {("Ch", 1): "Cs", ("S", 1): "Ci"}
 _PATTERN = re.compile(r"([cds])([1-9][0-9]{0,5}|inf|∞)([vhdi]?)")
 
@@ -60,8 +51,7 @@ def parse(name: str) -> Symbol:
     text = str(name).strip().lower()
     if text.capitalize() in _FIXED:
         return Symbol(family=text.capitalize(), fold=0)
-    family, fold = _WORDS.get(text) or _axial(text)
-    family, fold = _ALIASES.get((family, fold), (family, fold))
+    family, fold = _axial(_ALIASES.get(text, text))
     if family not in (_CONTINUOUS if math.isinf(fold) else _AXIAL) or MAX_FOLD < fold < math.inf:
         raise InputError(
             f"{name!r} is not a point group; use C1, Cs, Ci, Cn, Cnv, Cnh, S2n, Dn, Dnh, Dnd (n <= {MAX_FOLD}), "

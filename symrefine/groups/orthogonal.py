@@ -11,8 +11,11 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array
 
 Index = NDArray[np.intp]
-_FAR_FROM_ORTHOGONAL = 0.3
-_FLAT = 1e-9
+# What rounding may leave of a direction, of an angle [rad], or of what vanishes.
+EXACT = 1e-6
+# What is farther than this from an operation is none: angles of the classes of a polyhedral group differ by 0.6 and
+# more.
+ROUGH = 0.3
 
 
 def nearest_orthogonal(matrices: ArrayLike) -> Array:
@@ -25,7 +28,7 @@ def nearest_orthogonal(matrices: ArrayLike) -> Array:
         raise InputError(f"operations must be finite with shape [k, 3, 3]; the shape here is {list(given.shape)}")
     u, s, vt = np.linalg.svd(given)
     worst = float(np.abs(s - 1.0).max(initial=0.0))
-    if worst > _FAR_FROM_ORTHOGONAL:
+    if worst > ROUGH:
         raise InputError(f"operations must be orthogonal; a singular value is off 1 by {worst:.2g}")
     return np.asarray(u @ vt)
 
@@ -36,24 +39,11 @@ def determinants(operations: Array) -> Array:
 
 
 def quaternions(operations: Array) -> Array:
-    """Quaternions [k, 4], w >= 0, of `det(S) S`, accurate at every angle.
+    """Quaternions [k, 4], w >= 0, of `det(S) S`, accurate at every angle."""
+    from scipy.spatial.transform import Rotation
 
-    The matrix 4 q q' is linear in the rotation; the row of its largest diagonal entry is never small.
-    """
-    r = operations * determinants(operations)[:, None, None]
-    xx, yy, zz = r[:, 0, 0], r[:, 1, 1], r[:, 2, 2]
-    wx, wy, wz = r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]
-    xy, xz, yz = r[:, 0, 1] + r[:, 1, 0], r[:, 0, 2] + r[:, 2, 0], r[:, 1, 2] + r[:, 2, 1]
-    rows = np.array([
-        [1 + xx + yy + zz, wx, wy, wz],
-        [wx, 1 + xx - yy - zz, xy, xz],
-        [wy, xy, 1 - xx + yy - zz, yz],
-        [wz, xz, yz, 1 - xx - yy + zz],
-    ]).transpose(2, 0, 1)  # fmt: skip
-    best = np.argmax(np.diagonal(rows, axis1=1, axis2=2), axis=1)
-    q = rows[np.arange(len(rows)), best]
-    q = q / np.linalg.norm(q, axis=1, keepdims=True)
-    return np.asarray(q * np.where(q[:, :1] < 0.0, -1.0, 1.0))
+    proper = operations * determinants(operations)[:, None, None]
+    return np.roll(Rotation.from_matrix(proper).as_quat(canonical=True), 1, axis=1)
 
 
 def axes_and_angles(operations: Array) -> tuple[Array, Array]:
@@ -63,7 +53,7 @@ def axes_and_angles(operations: Array) -> tuple[Array, Array]:
     """
     q = quaternions(operations)
     sine = np.linalg.norm(q[:, 1:], axis=1)
-    still = sine < _FLAT
+    still = sine < EXACT
     axes = np.where(still[:, None], [0.0, 0.0, 1.0], q[:, 1:] / np.where(still, 1.0, sine)[:, None])
     return axes, 2.0 * np.arctan2(sine, q[:, 0])
 
@@ -77,6 +67,26 @@ def chord_angles(a: Array, b: Array) -> Array:
     """Angle [...] of `a' b` for orthogonal matrices [..., 3, 3]; pi where the determinants differ much."""
     chord = np.linalg.norm(a - b, axis=(-2, -1))
     return np.asarray(2.0 * np.arcsin(np.minimum(chord / np.sqrt(8.0), 1.0)))
+
+
+def about_z(ends: ArrayLike, dets: ArrayLike, angles_rad: Array) -> Array:
+    """Operations [k, 3, 3] that multiply z by `ends` and, across it, rotate (`dets` +1) or reflect (-1) by angles [k].
+
+    A reflection keeps the direction at half of its angle.
+    """
+    cosine, sine = np.cos(angles_rad), np.sin(angles_rad)
+    operations = np.zeros((len(angles_rad), 3, 3))
+    operations[:, 0, 0], operations[:, 0, 1] = cosine, -np.asarray(dets) * sine
+    operations[:, 1, 0], operations[:, 1, 1] = sine, np.asarray(dets) * cosine
+    operations[:, 2, 2] = ends
+    return operations
+
+
+def angles_about_z(operations: Array, dets: ArrayLike) -> Array:
+    """The angles [k] of the operations of that kind that are nearest to those given [k, 3, 3]."""
+    f = np.asarray(dets)
+    sines, cosines = operations[:, 1, 0] - f * operations[:, 0, 1], operations[:, 0, 0] + f * operations[:, 1, 1]
+    return np.asarray(np.arctan2(sines, cosines))
 
 
 def unique_lines(directions: Array) -> tuple[Array, Index]:
@@ -108,7 +118,7 @@ def fit_frame(sources: Array, targets: Array, start: Array) -> Array:
     sign = np.where(np.sum((right @ q_start) * (left @ q_start), axis=1) < 0.0, -1.0, 1.0)
     overlap = np.einsum("k,kji,kjl->il", sign, right, left)
     values, vectors = np.linalg.eigh(overlap + overlap.T)
-    top = vectors[:, values > values[-1] - _FLAT * (1.0 + abs(values[-1]))]
+    top = vectors[:, values > values[-1] - EXACT * (1.0 + abs(values[-1]))]
     return rotation_matrix(nearest_in_span(top, q_start))
 
 
@@ -116,7 +126,7 @@ def nearest_in_span(basis: Array, vector: Array) -> Array:
     """Unit vector [n] nearest to `vector` in the span of orthonormal columns [n, m]; the first if none is nearest."""
     shadow = basis @ (basis.T @ vector)
     size = float(np.linalg.norm(shadow))
-    return np.asarray(shadow / size if size > _FLAT else basis[:, 0])
+    return np.asarray(shadow / size if size > EXACT else basis[:, 0])
 
 
 def register(operations: Array, group: Array, start: Array) -> tuple[Array, Array]:

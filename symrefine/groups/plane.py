@@ -9,6 +9,7 @@ import numpy as np
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.groups.names import MAX_FOLD
+from symrefine.groups.orthogonal import about_z
 
 _PATTERN = re.compile(r"([CD])([1-9][0-9]{0,5})")
 _ENDLESS = {"SO(2)": "C", "O(2)": "D"}
@@ -54,12 +55,10 @@ class PointGroup2D:
         if math.isinf(self.fold):
             raise InputError(f"{self.name} has infinitely many operations: take those of a Cn or Dn")
         turns: Array = 2.0 * np.pi * np.arange(self.fold, dtype=np.float64) / self.fold
-        rotations = _matrices(turns, 1.0)
-        return (
-            np.concatenate([rotations, _matrices(2.0 * self.angle_rad + turns, -1.0)])
-            if self.has_mirrors
-            else rotations
-        )
+        found = about_z(1.0, 1.0, turns)
+        if self.has_mirrors:
+            found = np.concatenate([found, about_z(1.0, -1.0, 2.0 * self.angle_rad + turns)])
+        return np.asarray(found[:, :2, :2])
 
     def mirrors(self) -> Array:
         """Unit normals [n, 2] of the mirror lines; O(2) is represented by one."""
@@ -68,17 +67,3 @@ class PointGroup2D:
         count = 1 if math.isinf(self.fold) else int(self.fold)
         angles = self.angle_rad + np.pi * (0.5 + np.arange(count) / count)
         return np.stack([np.cos(angles), np.sin(angles)], axis=1)
-
-
-def point_group_2d(name: str, angle_rad: float = 0.0) -> PointGroup2D:
-    """The point group `Cn`, `Dn`, `SO(2)` or `O(2)` of the plane, one mirror line at `angle_rad` to the x axis.
-
-    Raises:  InputError: no such group.
-    """
-    return PointGroup2D(name=name, angle_rad=angle_rad)
-
-
-def _matrices(angles: Array, det: float) -> Array:
-    """Rotations by `angles` (det +1), or reflections (det -1) that keep the direction at half of each angle."""
-    c, s = np.cos(angles), np.sin(angles)
-    return np.array([[c, -det * s], [s, det * c]]).transpose(2, 0, 1)

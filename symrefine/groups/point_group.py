@@ -15,17 +15,18 @@ from numpy.typing import ArrayLike
 from symrefine.errors import InputError
 from symrefine.geometry import Array, orthogonal_factor, read_only, unit
 from symrefine.groups.names import Symbol, parse
-from symrefine.groups.orthogonal import chord_angles, nearest_operations, nearest_orthogonal
+from symrefine.groups.orthogonal import (
+    EXACT,
+    about_z,
+    angles_about_z,
+    chord_angles,
+    determinants,
+    nearest_operations,
+    nearest_orthogonal,
+)
 from symrefine.groups.standard import Elements, OrderedAxis, standard_elements, standard_operations
 
-_DEFAULT_TOLERANCE_RAD = 1e-6
-_PROPER = {"C": "C", "Cv": "C", "Ch": "C", "S": "C", "D": "D", "Dh": "D", "Dd": "D"}
 _POINT_SET = {"C": "Cv", "Cv": "Cv", "Ch": "Dh", "D": "Dh", "Dh": "Dh", "K": "Kh", "Kh": "Kh"}
-# One member of each continuous family of mirrors (rows) and of perpendicular two-fold axes.
-_MIRRORS = {"C": "", "Cv": "y", "Ch": "z", "D": "", "Dh": "yz", "K": "", "Kh": "z"}
-_HALF_TURNS = {"D": "x", "Dh": "x"}
-# What a group does to its continuous axis (sign of z) and to the plane across it (determinant there).
-_ENDS = {"C": [(1, 1)], "Cv": [(1, 1), (1, -1)], "Ch": [(1, 1), (-1, 1)], "D": [(1, 1), (-1, -1)]}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,7 +39,7 @@ class PointGroup:
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", parse(self.name).name)
         frame = np.asarray(self.frame, dtype=np.float64)
-        if frame.shape != (3, 3) or not np.allclose(frame @ frame.T, np.eye(3), atol=1e-6) or np.linalg.det(frame) < 0:
+        if frame.shape != (3, 3) or not np.allclose(frame @ frame.T, np.eye(3), atol=EXACT) or np.linalg.det(frame) < 0:
             raise InputError(f"the frame of {self.name} must be a rotation matrix [3, 3], determinant +1")
         object.__setattr__(self, "frame", read_only(nearest_orthogonal(frame[None])[0]))
 
@@ -101,8 +102,7 @@ class PointGroup:
 
     def proper_subgroup(self) -> "PointGroup":
         """The rotations among the operations, in the same frame."""
-        family = self.symbol.family
-        name = Symbol(family=_PROPER.get(family, family[0]), fold=self.symbol.fold).name
+        name = Symbol(family=self.symbol.family[0].replace("S", "C"), fold=self.symbol.fold).name
         return PointGroup(name=name, frame=self.frame)
 
     def for_point_set(self) -> "PointGroup":
@@ -137,7 +137,7 @@ class PointGroup:
         images = np.einsum("kij,mj->mki", self.operations(), np.atleast_2d(unit(directions))).reshape(-1, 3)
         keep: list[Array] = []
         for image in images:
-            if not keep or np.min(np.linalg.norm(np.array(keep) - image, axis=1)) > _DEFAULT_TOLERANCE_RAD:
+            if not keep or np.min(np.linalg.norm(np.array(keep) - image, axis=1)) > EXACT:
                 keep.append(image)
         return np.array(keep)
 
@@ -151,8 +151,10 @@ class PointGroup:
             return [turned]
         if family == "K":
             return [orthogonal_factor(turned, proper=True)]
-        parts = _ENDS.get(family, [(1, 1), (1, -1), (-1, 1), (-1, -1)])
-        return [_nearest_about_z(turned, z_sign, det) for z_sign, det in parts]
+        # What it does to its axis (sign of z) and to the plane across (determinant there), each finite member does too.
+        members = standard_operations(Symbol(family=family, fold=2))
+        parts = {(round(m[2, 2]), round(det * m[2, 2])) for m, det in zip(members, determinants(members), strict=True)}
+        return [about_z(end, det, angles_about_z(turned, det)) for end, det in parts]
 
 
 def point_group(name: str, frame: ArrayLike | None = None) -> PointGroup:
@@ -178,7 +180,7 @@ def fixed_subspace(group: PointGroup) -> Array:
     return group.frame[2:].copy() if family in ("C", "Cv") else np.zeros((0, 3))
 
 
-def is_subgroup(a: PointGroup, b: PointGroup, tolerance_rad: float = _DEFAULT_TOLERANCE_RAD) -> bool:
+def is_subgroup(a: PointGroup, b: PointGroup, tolerance_rad: float = EXACT) -> bool:
     """Whether every operation of `a` is, within `tolerance_rad`, an operation of `b`, both where they stand."""
     if b.is_finite and not a.is_finite:
         return False
@@ -189,27 +191,12 @@ def _turned(axes: Iterable[OrderedAxis], frame: Array) -> list[OrderedAxis]:
     return [(u @ frame, order) for u, order in axes]
 
 
-def _nearest_about_z(turned: Array, z_sign: int, det: int) -> Array:
-    """Nearest matrices to `turned` [k, 3, 3] that map z to `z_sign` z and act on xy with determinant `det`."""
-    (a, b), (c, d) = turned[:, 0, :2].T, turned[:, 1, :2].T
-    angle = np.arctan2(c - det * b, a + det * d)
-    cosine, sine = np.cos(angle), np.sin(angle)
-    nearest = np.zeros_like(turned)
-    nearest[:, 0, 0], nearest[:, 0, 1] = cosine, -det * sine
-    nearest[:, 1, 0], nearest[:, 1, 1] = sine, det * cosine
-    nearest[:, 2, 2] = z_sign
-    return nearest
-
-
 def _continuous_elements(family: str) -> Elements:
     """Elements of a continuous group in the standard placement, one member standing for each continuous family."""
-    rows = dict(zip("xyz", np.eye(3), strict=True))
-    main = "xyz" if family in ("K", "Kh") else "z"
-    two_fold = [(rows[k], 2) for k in _HALF_TURNS.get(family, "")]
-    improper = main if family in ("Ch", "Dh", "Kh") else ""
+    # Those of the member of fold 1, which has one of each, and the endless axes.
+    one = standard_elements(Symbol(family=family.replace("K", "C"), fold=1))
+    endless = tuple((u, math.inf) for u in np.eye(3)[0 if family in ("K", "Kh") else 2 :])
+    across = family in ("Ch", "Dh", "Kh")
     return Elements(
-        mirrors=np.array([rows[k] for k in _MIRRORS[family]]).reshape(-1, 3),
-        axes=(*((rows[k], math.inf) for k in main), *two_fold),
-        improper=tuple((rows[k], math.inf) for k in improper),
-        inversion=bool(improper),
+        mirrors=one.mirrors, axes=(*endless, *one.axes), improper=endless if across else (), inversion=across
     )

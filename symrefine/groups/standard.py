@@ -13,14 +13,12 @@ from itertools import permutations, product
 import numpy as np
 from numpy.typing import NDArray
 
-from symrefine.geometry import Array, householder, read_only, rotation, rotoreflection
+from symrefine.geometry import Array, read_only, rotation
 from symrefine.groups.names import Symbol
-from symrefine.groups.orthogonal import Index, axes_and_angles, determinants, unique_lines
+from symrefine.groups.orthogonal import EXACT, Index, about_z, axes_and_angles, determinants, unique_lines
 
 OrderedAxis = tuple[Array, float]
 GOLDEN = (1.0 + np.sqrt(5.0)) / 2.0
-_X, _Y, _Z = np.eye(3)
-_SMALL = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,20 +40,20 @@ def standard_operations(symbol: Symbol) -> Array:
 
 
 def _axial(family: str, fold: int) -> Array:
-    """Cosets of the rotations about z: one representative each."""
-    rotations = [rotation(_Z, 2.0 * np.pi * k / fold) for k in range(fold)]
-    flip, alternate = rotation(_X, np.pi), rotoreflection(_Z, np.pi / fold)
-    one, across, through = np.eye(3), householder(_Z), householder(_Y)
-    representatives: dict[str, list[Array]] = {
-        "C": [one],
-        "Cv": [one, through],
-        "Ch": [one, across],
-        "S": [one, alternate],
-        "D": [one, flip],
-        "Dh": [one, flip, across, through],
-        "Dd": [one, flip, alternate, alternate @ flip],
+    """Cosets of the rotations about z, each by what it does to z and across it, and the steps that it turns by."""
+    turn, through, across, flip = (1, 1, 0.0), (1, -1, 0.0), (-1, 1, 0.0), (-1, -1, 0.0)
+    cosets = {
+        "C": [turn],
+        "Cv": [turn, through],
+        "Ch": [turn, across],
+        "S": [turn, (-1, 1, 0.5)],
+        "D": [turn, flip],
+        "Dh": [turn, flip, across, through],
+        "Dd": [turn, flip, (-1, 1, 0.5), (1, -1, 0.5)],
     }
-    return _products(rotations, representatives[family])
+    ends, dets, steps = np.repeat(cosets[family], fold, axis=0).T
+    steps = steps + dets * np.tile(np.arange(fold), len(cosets[family]))
+    return about_z(ends, dets, 2.0 * np.pi * steps / fold)
 
 
 def _polyhedral(family: str) -> Array:
@@ -88,9 +86,9 @@ def standard_elements(symbol: Symbol) -> Elements:
     operations = standard_operations(symbol)
     det = determinants(operations)
     axes, angles = axes_and_angles(operations)
-    turns = angles > _SMALL
+    turns = angles > EXACT
     lines, counts = unique_lines(axes[turns & (det > 0)])
-    mirrors, _ = unique_lines(axes[(det < 0) & (angles > np.pi - _SMALL)])
+    mirrors, _ = unique_lines(axes[(det < 0) & (angles > np.pi - EXACT)])
     improper, _ = unique_lines(axes[turns & (det < 0)])
     folds = 1 + _same_line(improper, lines) @ counts
     orders = np.where(_same_line(improper, mirrors).any(axis=1), folds, 2 * folds)

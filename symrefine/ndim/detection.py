@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from symrefine.decide.alternatives import NEAR
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, check_tolerance, read_only
 from symrefine.moments.moments import shape_moments
@@ -20,8 +21,6 @@ from symrefine.surface.skin import FEW
 
 PARTS = 16
 LARGEST_DIM = 8
-# Candidates turned down that are told of.
-NEAR = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -101,19 +100,18 @@ def detect_nd(
     sampled = len(shape.points) > FEW if sampled is None else sampled
     moments = shape_moments(shape, 5, parts=PARTS if sampled else 0)
     fixed = fixed_subspace(ntuples(moments, PAPER_ORDERS), floor=FLOOR * tolerance / TOLERANCE)
-    points = (shape.points - moments.center) / moments.scale
-    masses = np.ones(len(points)) if shape.weights is None else shape.weights
+    masses = np.ones(len(shape.points)) if shape.weights is None else shape.weights
     kept = masses > 0
-    points, masses = points[kept], masses[kept] / masses.sum()
+    points, masses = (shape.points[kept] - moments.center) / moments.scale, masses[kept]
     diameter = 2.0 * float(np.linalg.norm(points, axis=1).max())
     cloud = Points(points=points, masses=masses, diameter=diameter)
-    low = samples.block(points, masses, samples.LOW, PARTS if sampled else 1)
-    known = [fixed.directions[-1], *np.linalg.eigh(low.whole[0])[1].T]
+    low = samples.block(moments, samples.LOW)
+    known = [fixed.directions[-1], *np.linalg.eigh(moments.covariance)[1].T]
     if sampled:
         rng = np.random.default_rng(seed)
         # Masses that differ make up for a density that does.
         neighbours = samples.Neighbours(points, diameter, rng) if np.ptp(masses) == 0.0 else None
-        search = among_samples(cloud, low, known, tolerance, neighbours, rng)
+        search = among_samples(shape, low, known, tolerance, neighbours, rng)
     else:
         search = among_points(cloud, known, tolerance)
 

@@ -11,17 +11,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from symrefine.fit.refine import MAX_OUTER
 from symrefine.geometry import Array, read_only
+from symrefine.moments.moments import BLOCK
+from symrefine.ndim.roots import MOST
 
 # Points whose masses differ by more than this fraction are no images of each other.
 MASS = 0.1
-# Candidates are refined if no point tried misses by more than so many tolerances before, and by more than the second
-# figure (fraction of the diameter) only within the tolerance; at most so many.
-LOOSE, LOOSE_REL, CANDIDATES = 4.0, 0.1, 300
+# Candidates that miss by more than this fraction of the diameter before they are refined must not miss by more than the
+# tolerance.
+LOOSE = 0.1
 # Points that candidates are tried on, far ones, as these tell most.
 FIRST = 16
-ROUNDS = 12
-_BLOCK = 1 << 22
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,7 +67,7 @@ class Points:
         `sum |R x - y|^2 = const + 4 n.(sum y x^T) n` with `R = 1 - 2 n n^T`: the eigenvector of the least eigenvalue.
         """
         before: Array | None = None
-        for _ in range(ROUNDS):
+        for _ in range(MAX_OUTER):
             _, nearest = self._nearest(normal)
             if before is not None and np.array_equal(before, nearest):
                 break
@@ -82,17 +83,17 @@ class Points:
             tolerance: as a fraction of the diameter.
             same: angle within which two candidates are one [rad].
         """
-        normals = self._differences(tolerance)
+        # Both points of a pair may be off by the tolerance, and so may the centre.
+        apart = 4.0 * tolerance
+        normals = self._differences(apart)
         misses = self._misses(normals, np.argsort(-np.linalg.norm(self.points, axis=1), kind="stable")[:FIRST])
-        loose = max(tolerance, min(LOOSE * tolerance, LOOSE_REL))
-        best = np.argsort(misses, kind="stable")[: int(np.count_nonzero(misses <= loose))]
-        return distinct(normals[best], same, CANDIDATES)
+        best = np.argsort(misses, kind="stable")[: int(np.count_nonzero(misses <= max(tolerance, min(apart, LOOSE))))]
+        return distinct(normals[best], same, MOST)
 
-    def _differences(self, tolerance: float) -> Array:
+    def _differences(self, apart_rel: float) -> Array:
         """Unit differences [M, n] of all pairs about equally far from the centre."""
         radius = np.linalg.norm(self.points, axis=1)
-        # Both may be off by the tolerance, and so may the centre.
-        alike = np.abs(radius[:, None] - radius) <= 4.0 * tolerance * self.diameter
+        alike = np.abs(radius[:, None] - radius) <= apart_rel * self.diameter
         i, j = np.nonzero(np.triu(alike & np.isfinite(self.foreign), 1))
         apart = self.points[i] - self.points[j]
         length = np.linalg.norm(apart, axis=1)
@@ -102,7 +103,7 @@ class Points:
     def _misses(self, normals: Array, some: NDArray[np.int64]) -> Array:
         """`miss` [M] of each normal as some of the points tell it: |R x - y|^2 = |x - y|^2 + 4 (n.x)(n.y)."""
         squares = np.sum((self.points[some, None] - self.points) ** 2, axis=2) + self.foreign[some]
-        step = max(1, _BLOCK // squares.size)
+        step = max(1, BLOCK // len(some))
         found = [np.zeros(0)]
         for start in range(0, len(normals), step):
             along = normals[start : start + step] @ self.points.T

@@ -12,29 +12,29 @@ from itertools import pairwise
 
 import numpy as np
 
+from symrefine.decide.hypotheses import JUDGED, JUDGED_EACH
 from symrefine.geometry import Array
+from symrefine.moments.moments import Moments, tensor_index
 from symrefine.ntuples.rank import SIGNIFICANT
+from symrefine.surface.misses import LIMITS
 
 LOW, HIGH = (2, 3, 4), (5, 6)
-# What the asymmetry of a mirror may reach, in standard deviations of its sampling noise: of one turned until it fits
-# best, and of one that others imply, of which the first figure would lose one in ten.
-FOUND, IMPLIED = math.sqrt(SIGNIFICANT), 3.0
+# What the asymmetry of a mirror that was turned until it fits best may reach, in standard deviations of its sampling
+# noise; one that others imply may reach more, as this would lose one in ten.
+FOUND = math.sqrt(SIGNIFICANT)
 # Random starts for each dimension in which second moments coincide.
 STARTS = 16
 # A mirror that still holds after a turn by so much is free to turn: halfway between those of a square, and not far from
 # there for all folds that moments to order 6 see.
 TURN_RAD = math.pi / 8.0
-# An image may be farther from the other points than they are from one another by this share of the tolerance in the
-# mean, as in `verify`, beyond so many standard errors of it; from so many points to so many others.
-MEAN, ERRORS, ASKED, OTHERS = 0.28, 3.0, 1000, 8000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Block:
-    """Moment tensors of some orders, of the whole and of each of its equal shares."""
+    """Moment tensors of some orders, and what these change by where one of several parts is left out in turn."""
 
     whole: list[Array]
-    parts: list[list[Array]]
+    changes: list[list[Array]]
 
     @property
     def size(self) -> float:
@@ -46,30 +46,17 @@ class Block:
         return math.sqrt(max(odd(self.whole, normal)[0], 0.0) / self.size)
 
     def against(self, normal: Array) -> tuple[float, float]:
-        """Asymmetry, and what sampling alone would leave of it (jackknife); none where there is a single share."""
-        count = len(self.parts)
-        noise = 0.0
-        if count > 1:
-            apart = ([count * p - t for p, t in zip(part, self.whole, strict=True)] for part in self.parts)
-            noise = math.fsum(odd(tensors, normal)[0] for tensors in apart) / (count * (count - 1))
+        """Asymmetry, and what sampling alone would leave of it (jackknife); none where the moments are exact."""
+        noise = math.fsum(odd(change, normal)[0] for change in self.changes)
+        noise *= 1.0 - 1.0 / max(len(self.changes), 1)
         return self.asymmetry(normal), math.sqrt(max(noise, 0.0) / self.size)
 
 
-def block(points: Array, masses: Array, orders: tuple[int, ...], count: int) -> Block:
-    """Moments of points [N, n] with masses [N], and of each of `count` equal shares of them."""
-    parts = [_tensors(points[k::count], masses[k::count], orders) for k in range(count)]
-    return Block(whole=[np.sum(part, axis=0) for part in zip(*parts, strict=True)], parts=parts)
-
-
-def _tensors(points: Array, masses: Array, orders: tuple[int, ...]) -> list[Array]:
-    powers = [points]
-    while 2 * len(powers) < max(orders):
-        powers.append(np.einsum("ak,ai->aki", powers[-1], points).reshape(len(points), -1))
-    found: list[Array] = []
-    for order in orders:
-        left, right = powers[order // 2 - 1], powers[(order + 1) // 2 - 1]
-        found.append(((masses[:, None] * left).T @ right).reshape((points.shape[1],) * order))
-    return found
+def block(moments: Moments, orders: tuple[int, ...]) -> Block:
+    """The tensors of some orders."""
+    entries = [tensor_index(moments.dim, order, moments.order) for order in orders]
+    changes = moments.replicates - moments.values
+    return Block(whole=[moments.values[i] for i in entries], changes=[[c[i] for i in entries] for c in changes])
 
 
 def odd(tensors: Iterable[Array], normal: Array) -> tuple[float, Array]:
@@ -173,15 +160,15 @@ class Neighbours:
         from scipy.spatial import cKDTree
 
         order = rng.permutation(len(points))
-        asked = min(ASKED, len(points) // 2)
+        asked = min(JUDGED_EACH, len(points) // 2)
         self.asked = points[order[:asked]]
-        self.tree = cKDTree(points[order[asked : asked + OTHERS]])
+        self.tree = cKDTree(points[order[asked : asked + JUDGED]])
         self.own = self.tree.query(self.asked)[0]
         self.diameter = diameter
 
     def contradict(self, normal: Array, tolerance: float) -> bool:
-        """Whether reflected points lie farther from the others than chance and tolerance explain."""
+        """Whether reflected points lie farther from the others than chance and tolerance explain, in the mean."""
         image = self.asked - 2.0 * np.outer(self.asked @ normal, normal)
         farther = (self.tree.query(image)[0] - self.own) / self.diameter
         error = float(farther.std()) / math.sqrt(len(farther))
-        return float(farther.mean()) - ERRORS * error > MEAN * tolerance
+        return float(farther.mean()) - SIGNIFICANT * error > LIMITS[0] * tolerance

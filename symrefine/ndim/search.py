@@ -6,23 +6,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from symrefine.decide.hypotheses import DIRECTION_ERROR
 from symrefine.geometry import Array
+from symrefine.moments.moments import shape_moments
 from symrefine.ndim import sampled as samples
 from symrefine.ndim.matched import Points, distinct
 from symrefine.ndim.roots import MOST, closed_under_reflection, reflection_group_order
+from symrefine.ntuples.rank import SIGNIFICANT
+from symrefine.shape import Shape
 
-# Angle within which two normals are one, at the least [rad]; what the tolerance forgives when a hyperplane turns about
-# the centre; and how much farther off an image may be, of points and of samples, where the errors of two add up.
-SAME_RAD, SAME_TOLERANCES, SLACK = math.radians(2.0), 2.0, (1.5, 3.0)
+# Sampling noise, in tolerances, beyond which moments of orders 2 to 4 decide nothing.
+ALLOWED = 0.5
 # Moments of orders 5 and 6 are not made in more dimensions: they are too many.
 HIGH_DIM = 6
-# Sampling noise, in tolerances, beyond which moments of orders 2 to 4 decide nothing; and those of orders 5 and 6 not
-# which of the hyperplanes that hold for the others are true.
-ALLOWED = (0.5, 1.0)
-# If so many normals, the best, are all free to turn, then so are the others.
-LOOSE = 8
-# Cosine of the angle to a subspace within which a normal lies in it.
-IN_SPAN = 0.95
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,22 +55,18 @@ def among_points(cloud: Points, known: list[Array], tolerance: float) -> Search:
             f"the points span {len(free)} dimensions less than the space, so that every hyperplane that holds them all "
             "is one; none of these is listed"
         )
-    holds = [n for n in found if cloud.miss(n) <= tolerance]
+    holds, rejected = _parted(found, lambda n: cloud.miss(n) <= tolerance)
 
     def confirmed(image: Array) -> Array | None:
         normal = cloud.refined(image)
         return normal if cloud.miss(normal) <= tolerance else None
 
-    search = _closed(holds, confirmed, SLACK[0] * same, incomplete)
-    return replace(
-        search,
-        rejected=[n for n in found if cloud.miss(n) > tolerance],
-        order=search.order if len(free) < 2 else None,
-    )
+    search = _closed(holds, rejected, confirmed, same, incomplete)
+    return search if len(free) < 2 else replace(search, order=None)
 
 
 def among_samples(
-    cloud: Points,
+    shape: Shape,
     low: samples.Block,
     known: list[Array],
     tolerance: float,
@@ -84,7 +76,7 @@ def among_samples(
     """Search random samples.
 
     Args:
-        cloud: the samples about their centre.
+        shape: the samples.
         low: their moments of orders 2 to 4.
         known: normals to start from besides the eigenvectors of the second moments and random ones.
         tolerance: see `detect_nd`.
@@ -94,15 +86,15 @@ def among_samples(
     random, shared = samples.starts(low, tolerance, rng)
     begin = [*known, *random]
     blocks, orders = [low], "2 to 4"
-    fixed, loose, rejected, noise = _sorted(blocks, begin, tolerance, ALLOWED[0])
-    if noise > ALLOWED[0] * tolerance:
+    fixed, loose, rejected, noise = _sorted(blocks, begin, tolerance, ALLOWED * tolerance)
+    if noise > ALLOWED * tolerance:
         doubt = _hidden(noise, tolerance, "give")
         return Search(holds=[], rejected=[*rejected, *fixed], incomplete=[], order=None, undetermined=doubt)
     incomplete = []
     if loose and low.whole[0].shape[0] <= HIGH_DIM:
-        high = samples.block(cloud.points, cloud.masses, samples.HIGH, len(low.parts))
-        finer = _sorted([low, high], [*begin, *fixed], tolerance, ALLOWED[1])
-        if finer[3] > ALLOWED[1] * tolerance:
+        high = samples.block(shape_moments(shape, max(samples.HIGH), parts=len(low.changes)), samples.HIGH)
+        finer = _sorted([low, high], [*begin, *fixed], tolerance, tolerance)
+        if finer[3] > tolerance:
             incomplete.append(f"of orders 5 and 6 {_hidden(finer[3], tolerance, 'to look closer, give')}")
         else:
             blocks, orders = [low, high], "2 to 6"
@@ -124,12 +116,17 @@ def among_samples(
 
     def confirmed(image: Array) -> Array | None:
         (normal,) = samples.minima(blocks, [image])
-        return normal if true(normal, samples.IMPLIED) else None
+        return normal if true(normal, SIGNIFICANT) else None
 
-    holds = [n for n in fixed if true(n, samples.FOUND)]
-    rejected = [*rejected, *(n for n in fixed if not any(n is h for h in holds))]
-    search = _closed(holds, confirmed, SLACK[1] * _same(tolerance), incomplete)
-    return replace(search, rejected=rejected, order=None if loose else search.order)
+    holds, untrue = _parted(fixed, lambda n: true(n, samples.FOUND))
+    search = _closed(holds, [*rejected, *untrue], confirmed, 3.0 * _same(tolerance), incomplete)
+    return replace(search, order=None) if loose else search
+
+
+def _parted(normals: list[Array], test: Callable[[Array], bool]) -> tuple[list[Array], list[Array]]:
+    """Those that pass a test, and those that do not."""
+    passed = [(n, test(n)) for n in normals]
+    return [n for n, good in passed if good], [n for n, good in passed if not good]
 
 
 def _sorted(
@@ -137,39 +134,51 @@ def _sorted(
 ) -> tuple[list[Array], list[Array], list[Array], float]:
     """Normals that hold where they are, bases [k, n] of what others turn in and hold, those that do not; most noise."""
     found, _ = distinct(samples.minima(blocks, begin), _same(tolerance), MOST)
-    holds = [n for n in found if all(samples.holds(b, n, tolerance) for b in blocks)]
-    kept = {id(n) for n in holds}
-    rejected = [n for n in found if id(n) not in kept]
+    holds, rejected = _parted(found, lambda n: all(samples.holds(b, n, tolerance) for b in blocks))
     noise = max((b.against(n)[1] for n in holds for b in blocks), default=0.0)
-    if noise > allowed * tolerance:
+    if noise > allowed:
         return holds, [], rejected, noise
     fixed, loose = list[Array](), list[Array]()
-    for k, normal in enumerate(holds):
+    for normal in holds:
+        if _turned_to(normal, loose):
+            continue
         turning = samples.free_turns(blocks, normal, tolerance)
         if turning:
             loose.append(np.array([normal, *turning]))
         else:
             fixed.append(normal)
-        if not fixed and k + 1 == LOOSE:
-            loose.append(np.array(holds[LOOSE:]).reshape(-1, len(normal)))
-            break
     # Noise may hold one in its place where others, a little beside it, turn.
-    fixed = [n for n in fixed if all(np.linalg.norm(basis @ n) < IN_SPAN for basis in loose)]
+    fixed = [n for n in fixed if not _turned_to(n, loose)]
     return fixed, loose, rejected, noise
 
 
+def _turned_to(normal: Array, loose: list[Array]) -> bool:
+    """Whether a normal lies in a subspace that others turn in."""
+    return any(np.linalg.norm(basis @ normal) > math.cos(samples.TURN_RAD) for basis in loose)
+
+
 def _same(tolerance: float) -> float:
-    return max(SAME_RAD, SAME_TOLERANCES * tolerance)
+    """Angle within which two normals are one [rad].
+
+    A hyperplane that turns by the tolerance about the centre moves the farthest image by the tolerance; each of the two
+    may be off by as much.
+    """
+    return max(DIRECTION_ERROR, 2.0 * tolerance)
 
 
 def _closed(
-    holds: list[Array], confirmed: Callable[[Array], Array | None], same: float, incomplete: list[str]
+    holds: list[Array],
+    rejected: list[Array],
+    confirmed: Callable[[Array], Array | None],
+    same: float,
+    incomplete: list[str],
 ) -> Search:
     """Normals that hold with their images in one another, and the group, if these hold too."""
     normals, closed = closed_under_reflection(holds, confirmed, same)
     order = reflection_group_order(normals) if closed else None
     open_ = "the reflections listed take one another to others that do not hold, or that are too many"
-    return Search(holds=normals, rejected=[], incomplete=[*incomplete, *([] if order else [open_])], order=order)
+    told = incomplete if order else [*incomplete, open_]
+    return Search(holds=normals, rejected=rejected, incomplete=told, order=order)
 
 
 def _hidden(noise: float, tolerance: float, give: str) -> str:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +14,7 @@ from symrefine.geometry import Array, Plane, check_tolerance, read_only
 from symrefine.groups import PointGroup2D
 from symrefine.moments.moments import Moments, shape_moments
 from symrefine.ntuples.contract import NTuples
-from symrefine.plane.chain import Element, Hypothesis, chain, explore
+from symrefine.plane.chain import Hypothesis, chain, explore
 from symrefine.plane.doublets import ORDER, DoubletClass, classify_doublets, planar_doublets
 from symrefine.plane.outline import NOISES, Outlines, make_outlines
 from symrefine.shape import Shape
@@ -143,19 +142,11 @@ def detect_planar(
 
 def _decided(links: Sequence[Hypothesis], tolerance: float) -> tuple[Decision, bool]:
     """The group, as likely as it is on average over what noise may be, and whether it is C1 whatever that is."""
-    lone = [h.placed.mirrored and h.placed.fold == 1 for h in links[1:]]
     each = [
-        decide(
-            [Link(need=h.needs[k], lone_mirror=m) for h, m in zip(links[1:], lone, strict=True)],
-            tolerance,
-            curve=PICTURE,
-        )
+        decide([Link(need=h.needs[k], lone_mirror=h.placed.is_line) for h in links[1:]], tolerance, curve=PICTURE)
         for k in range(len(NOISES))
     ]
-    inside = tuple(np.mean([d.inside for d in each], axis=0).tolist())
-    own = tuple(here - beyond for here, beyond in pairwise((*inside, 0.0)))
-    decision = Decision(index=own.index(max(own)), probabilities=own, inside=inside)
-    return decision, not any(d.index for d in each)
+    return Decision.of(np.mean([d.inside for d in each], axis=0).tolist()), not any(d.index for d in each)
 
 
 def _doubt(outlines: Outlines, tolerance: float) -> str:
@@ -187,15 +178,15 @@ def _report(
         [h.placed.group.name for h in links], [h.need for h in links], decision, -1 if reason else index
     )
 
-    def sure(element: Element) -> float:
+    def sure(element: Hypothesis) -> float:
         """That the true group holds the first group of the chain which has the element."""
         return next(p for h, p in zip(links, decision.inside, strict=True) if h.placed.holds(element.placed))
 
-    def line(element: Element) -> Plane:
-        (found,) = element.placed.lines()
+    def line(element: Hypothesis) -> Plane:
+        found = element.placed.line
         return Plane(normal=found.normal, offset=scale * found.offset + float(found.normal @ origin))
 
-    turns = next((e for e in chosen.elements if not e.is_line), None)
+    turns = next((e for e in chosen.elements if not e.placed.is_line), None)
     return PlanarDetection(
         point_group="undetermined" if reason else chosen.placed.group.name,
         confidence=0.0 if reason else decision.probabilities[index],
@@ -205,14 +196,14 @@ def _report(
         lines=tuple(
             FoundLine(line=line(e), residual=e.deviation, confidence=sure(e))
             for e in sorted(chosen.elements, key=lambda e: e.need)
-            if e.is_line
+            if e.placed.is_line
         ),
         rotation=None
         if turns is None
         else FoundRotation(order=turns.placed.fold, residual=turns.deviation, confidence=sure(turns)),
         near_misses=tuple(
             PlanarNearMiss(
-                line=line(e) if e.is_line else None,
+                line=line(e) if e.placed.is_line else None,
                 center=origin + scale * e.placed.center,
                 order=e.placed.fold,
                 residual=e.deviation,
@@ -229,10 +220,13 @@ def _report(
     )
 
 
-def _turned_down(pool: Sequence[Hypothesis], chosen: Hypothesis) -> list[Element]:
+def _turned_down(pool: Sequence[Hypothesis], chosen: Hypothesis) -> list[Hypothesis]:
     """Elements that were fitted and judged and are not in the group, best first."""
-    found: list[Element] = []
+    found: list[Hypothesis] = []
     for e in sorted((e for h in pool for e in h.elements), key=lambda e: e.need):
-        if not any(p.holds(e.placed) for p in (chosen.placed, *(o.placed for o in found if o.is_line == e.is_line))):
+        if not any(
+            p.holds(e.placed)
+            for p in (chosen.placed, *(o.placed for o in found if o.placed.is_line == e.placed.is_line))
+        ):
             found.append(e)
     return found[:NEAR]

@@ -8,7 +8,7 @@ import numpy as np
 from symrefine.geometry import Array, read_only
 from symrefine.moments.moments import Moments
 from symrefine.ntuples.contract import NTuples, ntuples
-from symrefine.ntuples.rank import FLOOR, SIGNIFICANT, fixed_subspace
+from symrefine.ntuples.rank import FLOOR, fixed_subspace
 from symrefine.surface.misses import TOLERANCE
 
 # The ten vectors of moments of the paper, 56 doublets in all.
@@ -86,22 +86,20 @@ def classify_doublets(moments: Moments, tolerance: float, pixel_noise: float) ->
     floor = float(np.hypot(FLOOR * tolerance / TOLERANCE, pixel_noise))
     fixed = fixed_subspace(planar_doublets(moments), floor=floor)
     along = fixed.directions[0]
-    vectors = []
-    for orders in PLANAR_ORDERS:
-        tuples = ntuples(moments, [orders])
-        own = fixed_subspace(tuples, floor=floor)
-        vectors.append(
-            VectorDoublets(
-                orders=orders,
-                doublets=tuples.vectors,
-                singular_values=own.singular_values,
-                vanish=bool(own.significance[0] <= SIGNIFICANT),
-            )
-        )
+    each = [(orders, ntuples(moments, [orders])) for orders in PLANAR_ORDERS]
+    owns = [fixed_subspace(tuples, floor=floor) for _, tuples in each]
     return DoubletClass(
         kind=_KINDS[fixed.rank],
         singular_values=fixed.singular_values,
         significance=fixed.significance,
         angle_rad=float(np.arctan2(along[1], along[0]) % np.pi),
-        vectors=tuple(vectors),
+        vectors=tuple(
+            VectorDoublets(
+                orders=orders,
+                doublets=tuples.vectors,
+                singular_values=own.singular_values,
+                vanish=own.rank == 0,
+            )
+            for (orders, tuples), own in zip(each, owns, strict=True)
+        ),
     )

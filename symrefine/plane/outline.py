@@ -11,21 +11,17 @@ from symrefine.geometry import Array, Isometry
 from symrefine.plane.raster import Raster, between, coarser, outlines, raster_of
 from symrefine.shape import Index
 from symrefine.surface.misses import Deviation, disc_distances
-from symrefine.surface.noise import noise_distances
-from symrefine.surface.skin import FEW, LocalPlanes, isolated_points, local_planes
+from symrefine.surface.noise import ASKED, noise_distances
+from symrefine.surface.skin import FEW, NEIGHBOURS, LocalPlanes, isolated_points, local_planes
 from symrefine.surface.surface import Surface
 
 # Levels, as fractions of the weight that only one cell in twenty exceeds.
 LEVELS = (0.5, 0.25, 0.75)
-# Local lines of an outline, and the side of a picture in cells.
-LOCAL_LINES, OUTLINED = 4000, 1500
-# Points of an outline at one level, below which it is a detail that says nothing by itself.
-FEWEST = 16
+# Side of a picture in cells.
+OUTLINED = 1500
 # What noise may be, over what was measured: as it was, twice as large, or none. True operations of exact drawings miss
 # by about as much as was measured in the median, and by less than 2.8 times that in 9 of 10 small pictures.
 NOISES = (1.0, 2.0, 0.0)
-# Standard deviation of the covered part of a pixel that the outline cuts: it is uniform, sqrt(1/12).
-CUT = 0.29
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -95,16 +91,17 @@ def _of_raster(raster: Raster, pixels: int, rng: np.random.Generator) -> Outline
     return Outlines(
         surfaces=tuple(_seen(a, b, diagonal, least, rng) for a, b in zip(lines, aside, strict=True)),
         sampled=False,
-        pixel_noise=CUT * math.sqrt(by * len(lines[0])) / pixels,
+        # The part of a pixel that the outline cuts off is uniform, with a variance of 1/12.
+        pixel_noise=math.sqrt(by * len(lines[0]) / 12.0) / pixels,
     )
 
 
 def _seen(line: Array, aside: Array, diagonal: float, least: Deviation, rng: np.random.Generator) -> Surface:
     """The outline [M, 2] of a picture; its noise is how far off pixels half a step aside would have put it."""
-    cloud = local_planes(line, LOCAL_LINES, rng)
-    if len(aside) < FEWEST:
+    cloud = local_planes(line, ASKED, rng)
+    if not _tells(aside):
         return Surface(cloud=cloud, diagonal=diagonal, noise=least)
-    across = disc_distances(cloud, local_planes(aside, LOCAL_LINES, rng).points)
+    across = disc_distances(cloud, local_planes(aside, ASKED, rng).points)
     return Surface(cloud=cloud, diagonal=diagonal, noise=Deviation.of(across / diagonal).at_least(least))
 
 
@@ -116,8 +113,13 @@ def _telling(raster: Raster) -> Array:
     soft = np.count_nonzero((raster.values >= levels[1]) & (raster.values < levels[2]))
     if soft <= 1.2 * len(found[0]):
         return levels[:1]
-    kept = np.array([len(p) >= FEWEST for p in found])
-    return levels[kept] if kept.any() else levels[:1]
+    kept = levels[[_tells(p) for p in found]]
+    return kept if len(kept) else levels[:1]
+
+
+def _tells(line: Array) -> bool:
+    """Whether an outline [M, 2] is more than one neighbourhood, a detail that says nothing by itself."""
+    return len(line) > NEIGHBOURS[0]
 
 
 def _of_points(points: Array, weights: Array | None, rng: np.random.Generator) -> Outlines:
@@ -136,7 +138,7 @@ def _of_points(points: Array, weights: Array | None, rng: np.random.Generator) -
 
 def _sampled(points: Array, diagonal: float, rng: np.random.Generator) -> Surface:
     def lines(some: Index | slice = slice(None)) -> LocalPlanes:
-        return local_planes(points[some], LOCAL_LINES, rng)
+        return local_planes(points[some], ASKED, rng)
 
     noise = noise_distances(len(points), lines, rng, LOCAL_LINES)
     return Surface(cloud=lines(), diagonal=diagonal, noise=Deviation.of(noise / diagonal))
@@ -145,9 +147,8 @@ def _sampled(points: Array, diagonal: float, rng: np.random.Generator) -> Surfac
 def _levels(points: Array, weights: Array) -> list[Array]:
     """All points, then those that weigh at least each level, where that leaves some out."""
     heavy = weights / np.quantile(weights, 0.95)
-    chosen = [heavy >= level for level in sorted(LEVELS)]
-    sizes = [len(points), *(int(c.sum()) for c in chosen)]
-    return [points, *(points[c] for c, n, before in zip(chosen, sizes[1:], sizes[:-1], strict=True) if 0 < n < before)]
+    by_count = {int(c.sum()): points[c] for c in (heavy >= level for level in (0.0, *sorted(LEVELS)))}
+    return [some for count, some in by_count.items() if count]
 
 
 def _two(points: Array) -> Array:

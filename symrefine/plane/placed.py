@@ -6,21 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from symrefine.decide.hypotheses import FITTED as SOURCES
+from symrefine.decide.hypotheses import SAME_RAD, START_ERROR
 from symrefine.fit.gauss_newton import Linearisation, minimise
 from symrefine.fit.matching import match, pair_equations
-from symrefine.fit.placed import FREE_TURNS, evenly, wide_angle_rad
+from symrefine.fit.placed import FITTED, FREE_TURNS, evenly, wide_angle_rad
+from symrefine.fit.refine import MAX_OUTER, SETTLED
 from symrefine.geometry import Array, Isometry, Plane, read_only
 from symrefine.groups import PointGroup2D
 from symrefine.plane.outline import Outlines
-
-# Operations of one kind that are judged together, those that are fitted, and the points that they are fitted to.
-MOST, FITTED, SOURCES = 8, 4, 1000
-# Matches at most; one that moves nothing by more than the second (radians, RMS radii) is the last.
-MATCHES, SETTLED = 16, 5e-5
-# How far what is proposed may be off, radians and RMS radii: 250 samples put the centroid wrong by 0.05.
-START_ERROR = 0.05
-# Mirror lines that are nearer than this are one.
-SAME_RAD = math.radians(3.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -58,34 +52,46 @@ class Placed:
         apart = abs((self.angle_rad - other.angle_rad + 0.5 * period) % period - 0.5 * period)
         return not other.mirrored or (self.mirrored and apart < min(SAME_RAD, 0.25 * period))
 
-    def lines(self) -> tuple[Plane, ...]:
-        """The mirror lines of a finite group."""
-        if math.isinf(self.fold):
-            return ()
-        return tuple(Plane(normal=n, offset=float(n @ self.center)) for n in self.group.mirrors())
+    @property
+    def is_line(self) -> bool:
+        """Whether it is one mirror line."""
+        return self.mirrored and self.fold == 1
 
-    def turns(self) -> tuple[Isometry, ...]:
-        """Rotations that stand for all of them; their inverses need no second look."""
-        if math.isinf(self.fold):
-            angles = [float(a) for a in FREE_TURNS]
-        else:
-            angles = [2.0 * np.pi * k / self.fold for k in evenly(range(1, int(self.fold) // 2 + 1), MOST)]
-        return tuple(self.turn(a) for a in angles)
+    def lines(self) -> list["Placed"]:
+        """The mirror lines of a finite group, each as a group of its own."""
+        if not self.mirrored or math.isinf(self.fold):
+            return []
+        first, apart = self.group.angle_rad, math.pi / self.fold
+        return [replace(self, fold=1, angle_rad=first + k * apart) for k in range(int(self.fold))]
+
+    @property
+    def line(self) -> Plane:
+        """One mirror line."""
+        normal = self.group.mirrors()[0]
+        return Plane(normal=normal, offset=float(normal @ self.center))
+
+    def elements(self) -> list["Placed"]:
+        """Each mirror line, and all turns together; those of O(2) stand for its lines as well."""
+        turns = [] if self.fold == 1 else [replace(self, mirrored=math.isinf(self.fold))]
+        return self.lines() + turns
 
     def turn(self, angle_rad: float) -> Isometry:
         """The rotation by an angle about the centre."""
         c, s = math.cos(angle_rad), math.sin(angle_rad)
         return Isometry.about(self.center, [[c, -s], [s, c]])
 
-    def wide_turn(self) -> Isometry:
-        """A generator of the turns far from the identity, which every object nearly bears."""
-        return self.turn(wide_angle_rad(int(self.fold)))
+    def operations(self) -> list[Isometry]:
+        """Mirrors that generate the group, or turns where it has none, whose inverses need no second look."""
+        if math.isinf(self.fold):
+            return [self.turn(float(a)) for a in FREE_TURNS]
+        if self.mirrored:
+            return [Isometry.reflection(line.line) for line in evenly(self.lines(), FITTED)]
+        steps = evenly(range(1, int(self.fold) // 2 + 1), FITTED)
+        return [self.turn(2.0 * math.pi * k / self.fold) for k in steps]
 
-    def generators(self) -> tuple[Isometry, ...]:
-        """Mirrors that generate the group, or turns where it has none; no more than are fitted."""
-        if not self.mirrored or math.isinf(self.fold):
-            return tuple(evenly(self.turns(), FITTED))
-        return tuple(Isometry.reflection(line) for line in evenly(self.lines(), FITTED))
+    def widest(self) -> Isometry:
+        """An operation of a finite group far from the identity, which every object nearly bears."""
+        return Isometry.reflection(self.line) if self.mirrored else self.turn(wide_angle_rad(int(self.fold)))
 
     def moved(self, x: Array) -> "Placed":
         """Moved by a shift and turned by an angle, x [3]."""
@@ -95,12 +101,11 @@ class Placed:
 def fitted(outlines: Outlines, start: Placed) -> Placed:
     """The group where the points and their images agree best, from where it was proposed."""
     placed, error = start, START_ERROR
-    for _ in range(MATCHES):
+    for _ in range(MAX_OUTER):
+        motions = placed.operations()
+        each = SOURCES // len(motions)
         matched = [
-            [
-                pair_equations(s.cloud, match(s.cloud, motion, error, stride=s.stride(SOURCES)))
-                for motion in placed.generators()
-            ]
+            [pair_equations(s.cloud, match(s.cloud, m, error, stride=s.stride(each))) for m in motions]
             for s in outlines.surfaces
         ]
 
@@ -123,7 +128,7 @@ def _linearised(placed: Placed, matched: Sequence[Sequence[Equations]]) -> Linea
     cost, gradient, hessian = 0.0, np.zeros(3), np.zeros((3, 3))
     turning = placed.mirrored and not math.isinf(placed.fold)
     for outline in matched:
-        for motion, (sources, targets, normals, weights) in zip(placed.generators(), outline, strict=True):
+        for motion, (sources, targets, normals, weights) in zip(placed.operations(), outline, strict=True):
             arm = motion.turn(sources - placed.center)
             # A mirror line that turns by an angle turns the images by twice that, a quarter turn ahead of them.
             by_angle = 2.0 * (normals[:, 1] * arm[:, 0] - normals[:, 0] * arm[:, 1]) * turning

@@ -6,6 +6,7 @@ import numpy as np
 
 from symrefine.geometry import Array, read_only
 from symrefine.shape import Index
+from symrefine.surface.noise import ASKED
 
 # Points that make a grid, and the share of their weight that must have a neighbour one step away.
 FEWEST, JOINED = 64, 0.9
@@ -13,8 +14,6 @@ FEWEST, JOINED = 64, 0.9
 SPARSE = 50
 # Deviation from the grid, in steps.
 _OFF = 0.02
-# Points whose neighbours show step and direction of a turned grid.
-_PROBES = 2000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,11 +38,6 @@ class Raster:
         """Points [N, 2] of space at fractional rows and columns [N]."""
         turned = np.array([-self.step[1], self.step[0]])
         return self.origin + np.multiply.outer(column, self.step) + np.multiply.outer(row, turned)
-
-    def cells(self) -> tuple[Array, Array]:
-        """Centres [N, 2] and weights [N] of the cells that weigh anything."""
-        row, column = np.nonzero(self.values)
-        return self.place(row.astype(np.float64), column.astype(np.float64)), self.values[row, column]
 
 
 def raster_of(points: Array, weights: Array | None) -> Raster | None:
@@ -73,7 +67,7 @@ def _turned_step(points: Array) -> Array | None:
     """The step whose direction and length the nearest neighbours agree on."""
     from scipy.spatial import cKDTree
 
-    some = points[:: max(1, len(points) // _PROBES)]
+    some = points[:: max(1, len(points) // ASKED)]
     distance, near = cKDTree(points).query(some, k=2)
     pitch = float(np.median(distance[:, 1]))
     close = np.abs(distance[:, 1] - pitch) < _OFF * pitch
