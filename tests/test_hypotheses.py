@@ -52,7 +52,7 @@ def scene(name, noise=0.002):
     points = ((sample(shape, 3000, noise, rng) - moments.center) / moments.scale) @ turn.T + off
     cloud = local_planes(points, 2000, rng)
     diagonal = tight_diagonal(cloud.points)
-    own = noise_distances(len(points), lambda some: local_planes(points[some], 750, rng), rng, 4000)
+    own = noise_distances(len(points), lambda some: local_planes(points[some], 750, rng), rng)
     surface = Surface(cloud=cloud, diagonal=diagonal, noise=Deviation.of(own / diagonal))
     # The mirror of the mug is normal to y.
     standard = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]) if group == "Cs" else np.eye(3)

@@ -34,7 +34,7 @@ def surface_of(shape, noise=0.0, *, count=4000, seed=0):
     points = (sample(shape, count, noise, rng) - moments.center) / moments.scale
     cloud = local_planes(points, count // 2, rng)
     diagonal = tight_diagonal(cloud.points)
-    own = noise_distances(count, lambda some: local_planes(points[some], count // 4, rng), rng, 4000)
+    own = noise_distances(count, lambda some: local_planes(points[some], count // 4, rng), rng)
     return Surface(cloud=cloud, diagonal=diagonal, noise=Deviation.of(own / diagonal))
 
 
@@ -366,7 +366,7 @@ def test_noise_is_measured_by_both_halves_and_grows_with_the_noise():
         rng = np.random.default_rng(14)
         points = rng.standard_normal((2001, 3))
         points = points / np.linalg.norm(points, axis=1, keepdims=True) + noise * rng.standard_normal((2001, 3))
-        distances = noise_distances(2001, lambda some, p=points, r=rng: local_planes(p[some], len(some), r), rng, 4000)
+        distances = noise_distances(2001, lambda some, p=points, r=rng: local_planes(p[some], len(some), r), rng)
         assert distances.shape == (2001,)
         assert distances.min() >= 0.0
         shown.append(np.quantile(distances, 0.95))
@@ -381,7 +381,7 @@ def test_noise_is_what_another_sample_would_miss_by(noise):
     points, another = (p / np.linalg.norm(p, axis=1, keepdims=True) for p in rng.standard_normal((2, 1600, 3)))
     points, another = (p + noise * rng.standard_normal(p.shape) for p in (points, another))
     whole, other = (local_planes(p, len(p), rng) for p in (points, another))
-    promised = noise_distances(1600, lambda some: local_planes(points[some], len(some), rng), rng, 4000)
+    promised = noise_distances(1600, lambda some: local_planes(points[some], len(some), rng), rng)
     found = disc_distances(whole, other.points)
     # Both are estimates: neighbouring planes of one sample share their points, those of two samples do not.
     assert 0.6 < promised.mean() / found.mean() < 1.6
@@ -401,7 +401,7 @@ def test_noise_is_measured_class_by_class():
         return local_planes(points[some], len(some), rng, labels=labels[some])
 
     # Random edges overlap by less than a disc.
-    assert np.quantile(noise_distances(2000, planes, rng, 4000), 0.9) < 1e-9
+    assert np.quantile(noise_distances(2000, planes, rng), 0.9) < 1e-9
     np.testing.assert_array_equal(np.sort(np.concatenate(made)), np.arange(2000))
     assert [len(some) for some in made] == [1000, 1000]
 

@@ -183,7 +183,7 @@ def _surface(
     # Neighbours stand together in memory, and any stride takes an even part of the surface.
     cloud = whole.local_planes(pick[kd_tree(local[pick]).indices], labels)
     diagonal = tight_diagonal(cloud.points)
-    noise = noise_distances(len(local), half, rng, PLANES // 2)
+    noise = noise_distances(len(local), half, rng)
     return Surface(cloud=cloud, diagonal=diagonal, noise=Deviation.of(noise / diagonal))
 
 
@@ -195,7 +195,7 @@ def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Su
         return isolated_points(points[some], None if labels is None else labels[some], body="volume")
 
     diagonal = tight_diagonal(points)
-    noise = noise_distances(len(points), some_of, rng, PLANES // 2)
+    noise = noise_distances(len(points), some_of, rng)
     return Surface(cloud=some_of(np.arange(len(points))), diagonal=diagonal, noise=Deviation.of(noise / diagonal))
 
 

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from symrefine.decide.hypotheses import JUDGED, JUDGED_EACH
+from symrefine.decide.hypotheses import MOVED, MOVED_EACH
 from symrefine.geometry import Array
 from symrefine.moments.moments import Moments, tensor_index
 from symrefine.ntuples.rank import SIGNIFICANT
@@ -160,9 +160,9 @@ class Neighbours:
         from scipy.spatial import cKDTree
 
         order = rng.permutation(len(points))
-        asked = min(JUDGED_EACH, len(points) // 2)
+        asked = min(MOVED_EACH, len(points) // 2)
         self.asked = points[order[:asked]]
-        self.tree = cKDTree(points[order[asked : asked + JUDGED]])
+        self.tree = cKDTree(points[order[asked : asked + MOVED]])
         self.own = self.tree.query(self.asked)[0]
         self.diameter = diameter
 

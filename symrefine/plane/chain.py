@@ -9,7 +9,7 @@ import numpy as np
 
 from symrefine.decide.alternatives import NEAR
 from symrefine.decide.chain import ALIKE, EXACT, HOPELESS
-from symrefine.decide.hypotheses import DIRECTION_ERROR, LOOK, START_ERROR
+from symrefine.decide.hypotheses import DIRECTION_ERROR, MOVED_EACH, START_ERROR
 from symrefine.geometry import Array
 from symrefine.plane.outline import NOISES, Outlines
 from symrefine.plane.placed import Placed, fitted
@@ -70,7 +70,7 @@ def explore(outlines: Outlines, hint_rad: float | None, limit: float) -> tuple[H
 
 
 def _looks(outlines: Outlines, starts: Sequence[Placed]) -> Array:
-    return outlines.glances([p.widest() for p in starts], LOOK)
+    return outlines.glances([p.widest() for p in starts], MOVED_EACH)
 
 
 def _best(starts: Sequence[Placed], looks: Array) -> list[Placed]:

@@ -11,8 +11,9 @@ from symrefine.geometry import Array, Isometry
 from symrefine.plane.raster import Raster, between, coarser, outlines, raster_of
 from symrefine.shape import Index
 from symrefine.surface.misses import Deviation, disc_distances
+from symrefine.surface.neighbourhoods import NEIGHBOURS
 from symrefine.surface.noise import ASKED, noise_distances
-from symrefine.surface.skin import FEW, NEIGHBOURS, LocalPlanes, isolated_points, local_planes
+from symrefine.surface.skin import FEW, LocalPlanes, isolated_points, local_planes
 from symrefine.surface.surface import Surface
 
 # Levels, as fractions of the weight that only one cell in twenty exceeds.
@@ -140,7 +141,7 @@ def _sampled(points: Array, diagonal: float, rng: np.random.Generator) -> Surfac
     def lines(some: Index | slice = slice(None)) -> LocalPlanes:
         return local_planes(points[some], ASKED, rng)
 
-    noise = noise_distances(len(points), lines, rng, LOCAL_LINES)
+    noise = noise_distances(len(points), lines, rng)
     return Surface(cloud=lines(), diagonal=diagonal, noise=Deviation.of(noise / diagonal))
 
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.decide.hypotheses import FITTED as SOURCES
-from symrefine.decide.hypotheses import SAME_RAD, START_ERROR
+from symrefine.decide.hypotheses import MOVED, SAME_RAD, START_ERROR
 from symrefine.fit.gauss_newton import Linearisation, minimise
 from symrefine.fit.matching import match, pair_equations
 from symrefine.fit.placed import FITTED, FREE_TURNS, evenly, wide_angle_rad
@@ -103,7 +102,7 @@ def fitted(outlines: Outlines, start: Placed) -> Placed:
     placed, error = start, START_ERROR
     for _ in range(MAX_OUTER):
         motions = placed.operations()
-        each = SOURCES // len(motions)
+        each = MOVED // (4 * len(motions))
         matched = [
             [pair_equations(s.cloud, match(s.cloud, m, error, stride=s.stride(each))) for m in motions]
             for s in outlines.surfaces
