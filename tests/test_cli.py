@@ -13,12 +13,14 @@ import numpy as np
 import pytest
 
 import symrefine
-from symrefine.cli import batch, invoke, journal, values
+from symrefine.cli import batch, invoke, values
+from symrefine.cli.outputs import naming
 from symrefine.cli.tables import batch_table, detection_lines, headline
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.files import whole
 from symrefine.geometry import random_orthogonal
+from symrefine.journal import Journal
 from symrefine.ntuples import notation
 from symrefine.ntuples.affine import derive_affine
 from symrefine.ntuples.derive import derive
@@ -319,8 +321,12 @@ def test_a_full_disk_is_told() -> None:
 def test_a_full_disk_is_told_with_the_file(run: Run, data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told = "symrefine: /dev/full: cannot be written: No space left on device\n"
     assert run("derive", "--dim", 3, "--orders", 3, "--json", "/dev/full") == (2, "", told)
-    with pytest.raises(InputError, match=r"^/dev/full: cannot be written: No space left on device$"):
-        journal.append(Path("/dev/full"), {"file": "a.ply"})
+    with (
+        Path("/dev/full").open("ab", buffering=0) as full,
+        pytest.raises(InputError, match=r"^/dev/full: cannot be written: No space left on device$"),
+        naming("/dev/full"),
+    ):
+        Journal(rows=[], torn=False, descriptor=full.fileno()).append({"file": "a.ply"})
 
     def fail(*_: object) -> None:
         with whole(data / "draft.html"):
@@ -580,7 +586,7 @@ def test_batch_goes_on_and_resumes(run: Run, shelf: Path, tmp_path: Path, monkey
 def test_two_batches_cannot_write_to_one_file(run: Run, shelf: Path, tmp_path: Path) -> None:
     pytest.importorskip("fcntl")
     out = tmp_path / "rows.jsonl"
-    with journal.locked(out):
+    with batch.opened(out):
         assert_refused(run("batch", shelf, "--out", out), str(out), "another `symrefine batch` is writing")
         assert out.read_bytes() == b""
     assert run("batch", shelf, "--out", out)[0] == 1
@@ -592,8 +598,8 @@ def test_a_batch_that_was_killed_leaves_no_lock(run: Run, shelf: Path, tmp_path:
     out = tmp_path / "rows.jsonl"
     hold = f"""
 from pathlib import Path
-from symrefine.cli import journal
-with journal.locked(Path({str(out)!r})):
+from symrefine.cli import batch
+with batch.opened(Path({str(out)!r})):
     print("held", flush=True)
     input()
 """

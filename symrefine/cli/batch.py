@@ -3,12 +3,13 @@
 import argparse
 import re
 from collections.abc import Iterator
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from symrefine.cli import journal
-from symrefine.cli.outputs import check_beside, check_outputs, console, note, progress, text_writer, write_all
+from symrefine import journal
+from symrefine.cli.outputs import check_beside, check_outputs, console, naming, note, progress, text_writer, write_all
 from symrefine.cli.values import add_class_options, add_detection_options, count, positive
 from symrefine.errors import InputError, SymrefineError
 
@@ -58,14 +59,17 @@ def run(args: argparse.Namespace) -> int:
     scale = _check_bop(args, files)
     options = {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed}
     options |= {name: given for name in ("labels", "weights") if (given := getattr(args, name)) is not None}
-    with journal.locked(Path(args.out)) if args.out else nullcontext():
-        rows = journal.finished(Path(args.out), Path(args.dir), files, options) if args.out else {}
-        rows = {name: row for name, row in rows.items() if _serves_bop(row, scale)}
+    with opened(Path(args.out)) if args.out else nullcontext() as out:
+        latest = {row["file"]: row for row in out.rows} if out else {}
+        rows = {
+            name: latest[name] for name in files if name in latest and _holds(latest[name], args.dir, options, scale)
+        }
         jobs = [(args.dir, name, options, scale) for name in files if name not in rows]
         with progress("detecting", len(files), len(rows)) as advance:
             for row in _rows(jobs, args.workers):
-                if args.out:
-                    journal.append(Path(args.out), row)
+                if out:
+                    with naming(args.out):
+                        out.append(row)
                 rows[row["file"]] = row
                 advance()
     _print([rows[name] for name in files], len(files) - len(jobs))
@@ -95,9 +99,46 @@ def _check_bop(args: argparse.Namespace, files: list[str]) -> float | None:
     return float(args.bop_scale or 1.0)
 
 
-def _serves_bop(row: Row, scale: float | None) -> bool:
-    """Whether a row done before holds the entry of BOP, if one is wanted and can be had."""
+@contextmanager
+def opened(path: Path) -> Iterator[journal.Journal]:
+    """The journal of a batch, which is told if its last row was incomplete.
+
+    Raises:
+        InputError: another batch is writing to it, or it holds something else than rows of a batch.
+    """
+    busy = f"{path}: another `symrefine batch` is writing to it"
+    with journal.opened(path, ("file",), busy=busy, rows_of="`symrefine batch`", other="another file") as found:
+        if found.torn:
+            note(f"{path}: the last row is incomplete; it is removed and done again")
+        yield found
+
+
+def _holds(row: Row, folder: str, options: dict[str, Any], scale: float | None) -> bool:
+    """Whether a row done before still tells of its file, with the entry of BOP if one is wanted and can be had."""
+    now = _head(Path(folder, row["file"]), row["file"], options)
+    if now["sha256"] is None or any(row.get(key) != now[key] for key in ("sha256", "version", "options")):
+        return False
     return scale is None or row["error"] is not None or row.get("bop", {}).get("scale") == scale
+
+
+def _head(path: Path, name: str, options: dict[str, Any]) -> Row:
+    """What names a row: the file, its content, the options, the version; `error` is set if the file cannot be read."""
+    from hashlib import file_digest
+
+    row: Row = {"file": name, "sha256": None, "error": None, "version": _version(), "options": options}
+    try:
+        with path.open("rb") as stream:
+            row["sha256"] = file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        row["error"] = f"{path}: cannot be read: {error.strerror}"
+    return row
+
+
+@cache
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("symrefine")
 
 
 def _write_bop(name: str, rows: dict[str, Row]) -> int:
@@ -148,7 +189,7 @@ def examine_file(job: Job) -> Row:
 
     folder, name, options, scale = job
     path = Path(folder, name)
-    row = journal.head(path, name, options)
+    row = _head(path, name, options)
     if row["error"] is not None:
         return row
     try:

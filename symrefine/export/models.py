@@ -47,7 +47,7 @@ def model_bytes(path: Path, shape: Shape) -> bytes:
     return _WRITERS[path.suffix.lower()](shape)
 
 
-def moved(data: bytes, suffix: str, matrix: Array, source: str) -> bytes | None:
+def moved(data: bytes, suffix: str, matrix: Array) -> bytes | None:
     """A PLY or OBJ file with its positions moved by `matrix` [4, 4] and its normals turned, all else as it was.
 
     Returns:
@@ -55,7 +55,7 @@ def moved(data: bytes, suffix: str, matrix: Array, source: str) -> bytes | None:
     """
     if suffix == ".obj":
         return None if b"\\\n" in data or b"\\\r" in data else _moved_obj(data, matrix)
-    return _moved_ply(data, matrix, source) if suffix == ".ply" else None
+    return _moved_ply(data, matrix) if suffix == ".ply" else None
 
 
 def _directions(matrix: Array) -> Array:
@@ -77,8 +77,8 @@ def _moved_obj(data: bytes, matrix: Array) -> bytes:
     return b"\n".join(lines)
 
 
-def _moved_ply(data: bytes, matrix: Array, source: str) -> bytes | None:
-    header = parse_header(data, source)
+def _moved_ply(data: bytes, matrix: Array) -> bytes | None:
+    header = parse_header(data)
     vertex = header.elements[0] if header.elements else Element(name="", count=0)
     whole = [p.name for p in vertex.properties if p.name in (*_POSITION, *_NORMAL) and not p.type.startswith("f")]
     if vertex.name != "vertex" or vertex.has_lists or whole:

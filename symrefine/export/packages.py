@@ -106,7 +106,7 @@ def _model(path: Path, shape: Shape, pose: Canonical, scale: float) -> tuple[byt
     """The file of the shape with its coordinates moved, or else the shape written anew."""
     source, suffix = Path(shape.source), path.suffix.lower()
     if source.suffix.lower() == suffix and source.is_file():
-        kept = moved(source.read_bytes(), suffix, pose.matrix(scale), shape.source)
+        kept = moved(source.read_bytes(), suffix, pose.matrix(scale))
         if kept is not None:
             has_materials = suffix == ".obj" and b"\nmtllib" in b"\n" + kept
             return kept, ["materials and textures stay where they are: copy them beside the model"] * has_materials

@@ -36,31 +36,27 @@ _NOISE = 5.0
 _GRAIN, _SHARP, _SOFT, _SEEN = 0.02, 0.3, 5.0, 400
 
 
-def read_image(data: bytes, source: str, suffix: str, *, threshold: Threshold | None, invert: bool) -> Content:
+def read_image(data: bytes, suffix: str, *, threshold: Threshold | None, invert: bool) -> Content:
     """Pixels of the object in a picture, with their weights; what weighs nothing is left out.
 
     Args:
         data: bytes of the file.
-        source: file, for messages.
         suffix: one of `FORMATS`, which the content has to agree with.
         threshold: make the picture binary: the grey value that parts dark from light, or "otsu" to choose it.
         invert: exchange object and background.
 
     Raises:
-        InputError: damaged, animated, too large, of one grey value only, or a threshold outside (0, 1).
+        InputError: damaged, animated, too large, of one grey value only.
     """
-    named = threshold is None or threshold == "otsu"
-    if not named and not (isinstance(threshold, int | float) and 0.0 < threshold < 1.0):
-        raise InputError(f"threshold is {threshold}; expected a grey value between 0 (black) and 1 (white), or 'otsu'")
-    grey = _grey(_open(data, source, suffix))
+    grey = _grey(_open(data, suffix))
     if np.ptp(grey) == 0.0:
         size = f"{grey.shape[1]} x {grey.shape[0]} pixels"
-        raise InputError(f"{source}: all {size} have the same grey value {grey.flat[0]:.3g}: there is no object")
+        raise InputError(f"all {size} have the same grey value {grey.flat[0]:.3g}: there is no object")
     weights = pixel_weights(without_grain(grey), threshold=threshold, invert=invert)
     if np.ptp(weights) == 0.0:
         low, high = float(grey.min()), float(grey.max())
         raise InputError(
-            f"{source}: nothing stands out: grey values run from {low:.3g} to {high:.3g}"
+            f"nothing stands out: grey values run from {low:.3g} to {high:.3g}"
             + (f"; choose a threshold between them, not {threshold}" if threshold is not None else "")
         )
     row, column = np.nonzero(weights)
@@ -137,7 +133,7 @@ def _majority(border: Sequence[NDArray[np.bool_]], everywhere: Sequence[NDArray[
     return max(votes)[-1]
 
 
-def _open(data: bytes, source: str, suffix: str) -> "Image":
+def _open(data: bytes, suffix: str) -> "Image":
     """The picture as a viewer shows it, complete and undamaged."""
     from PIL import Image, ImageOps, UnidentifiedImageError
 
@@ -148,26 +144,26 @@ def _open(data: bytes, source: str, suffix: str) -> "Image":
             if kind == "PNG":
                 Image.open(io.BytesIO(data), formats=[kind]).verify()  # the checksums of all chunks
             image = Image.open(io.BytesIO(data), formats=[kind])
-            _check(image, source)
+            _check(image)
             image.load()
             return ImageOps.exif_transpose(image)
     except InputError:
         raise
     except Image.DecompressionBombError:
-        raise InputError(f"{source}: more pixels than {LARGEST:,}; scale it down") from None
+        raise InputError(f"more pixels than {LARGEST:,}; scale it down") from None
     except UnidentifiedImageError:
-        raise InputError(f"{source}: not a {kind} image: begins with {shorten(data[:8].decode('latin-1'))}") from None
+        raise InputError(f"not a {kind} image: begins with {shorten(data[:8].decode('latin-1'))}") from None
     except Exception as error:  # noqa: BLE001 (Pillow leaks many types on damaged files; nothing else in the block)
-        raise InputError(f"{source}: not a whole {kind} image: {shorten(str(error), 80)}") from None
+        raise InputError(f"not a whole {kind} image: {shorten(str(error), 80)}") from None
 
 
-def _check(image: "Image", source: str) -> None:
+def _check(image: "Image") -> None:
     width, height = image.size
     if width * height > LARGEST:
-        raise InputError(f"{source}: {width} x {height} pixels; at most {LARGEST:,} pixels: scale it down")
+        raise InputError(f"{width} x {height} pixels; at most {LARGEST:,} pixels: scale it down")
     frames = getattr(image, "n_frames", 1)
     if frames > 1:
-        raise InputError(f"{source}: holds {frames} pictures, an animation or a series; save one of them by itself")
+        raise InputError(f"holds {frames} pictures, an animation or a series; save one of them by itself")
 
 
 def _grey(image: "Image") -> Array:

@@ -33,16 +33,16 @@ class Rows:
     lines: list[int] | None = None
 
 
-def read_rows(data: bytes, header: Header, source: str) -> dict[str, Rows]:
+def read_rows(data: bytes, header: Header) -> dict[str, Rows]:
     """Rows of every element of the header, by its name.
 
     Raises:
         InputError: fewer or more rows than declared, or rows that do not have the declared form.
     """
-    return _read_binary(data, header, source) if header.byte_order else _read_text(data, header, source)
+    return _read_binary(data, header) if header.byte_order else _read_text(data, header)
 
 
-def _read_binary(data: bytes, header: Header, source: str) -> dict[str, Rows]:
+def _read_binary(data: bytes, header: Header) -> dict[str, Rows]:
     offset = header.size
     rows = {}
     for element in header.elements:
@@ -51,12 +51,12 @@ def _read_binary(data: bytes, header: Header, source: str) -> dict[str, Rows]:
             rows[element.name] = _columns(table, element)
             offset += table.nbytes
         elif element.has_lists:
-            rows[element.name], offset = _unequal_rows(data, offset, element, header.byte_order, source)
+            rows[element.name], offset = _unequal_rows(data, offset, element, header.byte_order)
         else:
-            raise _cut_off(element, (len(data) - offset) // _record(element, header.byte_order, []).itemsize, source)
+            raise _cut_off(element, (len(data) - offset) // _record(element, header.byte_order, []).itemsize)
     if offset != len(data):
         raise InputError(
-            f"{source}: {count(len(data) - offset, 'byte')} behind {_declared(header)}; "
+            f"{count(len(data) - offset, 'byte')} behind {_declared(header)}; "
             "the counts in the header are wrong, or something was added to the file"
         )
     return rows
@@ -111,7 +111,7 @@ def _columns(table: NDArray[np.void], element: Element) -> Rows:
     )
 
 
-def _unequal_rows(data: bytes, offset: int, element: Element, byte_order: str, source: str) -> tuple[Rows, int]:
+def _unequal_rows(data: bytes, offset: int, element: Element, byte_order: str) -> tuple[Rows, int]:
     """Rows one by one, and where they end."""
     builder = _Builder(element)
     for row in range(element.count):
@@ -122,12 +122,12 @@ def _unequal_rows(data: bytes, offset: int, element: Element, byte_order: str, s
                     (size,) = struct.unpack_from(byte_order + _STRUCT[p.length_type], data, offset)
                     offset += struct.calcsize(byte_order + _STRUCT[p.length_type])
                     if size < 0:
-                        raise InputError(f"{source}: row {row} of element '{element.name}': list of length {size}")
+                        raise InputError(f"row {row} of element '{element.name}': list of length {size}")
                 layout = f"{byte_order}{size}{_STRUCT[p.type]}"
                 builder.add(p.name, struct.unpack_from(layout, data, offset))
                 offset += struct.calcsize(layout)
         except struct.error:
-            raise _cut_off(element, row, source) from None
+            raise _cut_off(element, row) from None
     return builder.rows(None), offset
 
 
@@ -154,42 +154,42 @@ class _Builder:
         return Rows(columns=columns, lines=lines)
 
 
-def _read_text(data: bytes, header: Header, source: str) -> dict[str, Rows]:
-    lines = [(number + header.lines, text) for number, text in numbered_lines(data[header.size :], source)]
+def _read_text(data: bytes, header: Header) -> dict[str, Rows]:
+    lines = [(number + header.lines, text) for number, text in numbered_lines(data[header.size :])]
     rows = {}
     start = 0
     for element in header.elements:
         part = lines[start : start + element.count]
         read = _text_lists if element.has_lists else _text_values
-        rows[element.name] = read(part, element, source)
+        rows[element.name] = read(part, element)
         # After the rows themselves: where one count is too large, the first row of the wrong form says more.
         if len(part) < element.count:
-            raise _cut_off(element, len(part), source)
+            raise _cut_off(element, len(part))
         start += element.count
     if start < len(lines):
         raise InputError(
-            f"{source}: line {lines[start][0]}: {shorten(lines[start][1])} behind {_declared(header)}; "
+            f"line {lines[start][0]}: {shorten(lines[start][1])} behind {_declared(header)}; "
             "the counts in the header are wrong, or something was added to the file"
         )
     return rows
 
 
-def _text_values(lines: list[Line], element: Element, source: str) -> Rows:
+def _text_values(lines: list[Line], element: Element) -> Rows:
     names = [p.name for p in element.properties]
     layout = f"a row of element '{element.name}': {' '.join(names)}"
-    table = parse_table(lines, source, columns=(len(names),), layout=layout)
+    table = parse_table(lines, columns=(len(names),), layout=layout)
     columns = {name: Column(values=table[:, k]) for k, name in enumerate(names)}
     return Rows(columns=columns, lines=[number for number, _ in lines])
 
 
-def _text_lists(lines: list[Line], element: Element, source: str) -> Rows:
+def _text_lists(lines: list[Line], element: Element) -> Rows:
     names = " ".join(f"LENGTH {p.name}..." if p.length_type else p.name for p in element.properties)
     layout = f"a row of element '{element.name}': {names}"
     builder = _Builder(element)
     for line in lines:
-        parts = _split(parse_numbers(line, source, layout), element)
+        parts = _split(parse_numbers(line, layout), element)
         if len(parts) != len(element.properties):
-            raise InputError(f"{source}: line {line[0]}: {shorten(line[1])}; expected {layout}")
+            raise InputError(f"line {line[0]}: {shorten(line[1])}; expected {layout}")
         for p, part in zip(element.properties, parts, strict=True):
             builder.add(p.name, part)
     return builder.rows([number for number, _ in lines])
@@ -211,9 +211,9 @@ def _split(numbers: list[float], element: Element) -> list[list[float]]:
     return parts if position == len(numbers) else [*parts, numbers[position:]]
 
 
-def _cut_off(element: Element, rows: int, source: str) -> InputError:
+def _cut_off(element: Element, rows: int) -> InputError:
     return InputError(
-        f"{source}: cut off in element '{element.name}': the header declares {count(element.count, 'row')}, "
+        f"cut off in element '{element.name}': the header declares {count(element.count, 'row')}, "
         f"only {rows} {'is' if rows == 1 else 'are'} there"
     )
 

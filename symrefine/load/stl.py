@@ -21,7 +21,7 @@ _PATTERN = [
 _BRACKET = {False: re.compile(r"solid\b", re.IGNORECASE), True: re.compile(r"endsolid\b", re.IGNORECASE)}
 
 
-def read_stl(data: bytes, source: str) -> Content:
+def read_stl(data: bytes) -> Content:
     """Content of an STL file; normals of facets repeat what the vertices say.
 
     Many binary files begin with `solid` like text files do, so the size decides.
@@ -31,13 +31,13 @@ def read_stl(data: bytes, source: str) -> Content:
         records = np.frombuffer(data, _RECORD, offset=_HEADER)
         return _content(as_float64(records["vertices"].reshape(-1, 3)), None)
     if data.lstrip()[:5].lower() == b"solid" and b"\0" not in data:
-        lines = _vertex_lines(numbered_lines(data, source), source)
-        table = parse_table(lines, source, columns=(3,), layout="vertex x y z")
+        lines = _vertex_lines(numbered_lines(data))
+        table = parse_table(lines, columns=(3,), layout="vertex x y z")
         return _content(table, [number for number, _ in lines])
     if declared is None:
-        raise InputError(f"{source}: not an STL file: neither 'solid' nor a header of {_HEADER} bytes")
+        raise InputError(f"not an STL file: neither 'solid' nor a header of {_HEADER} bytes")
     raise InputError(
-        f"{source}: not a whole STL file: does not begin with 'solid', and as a binary file would hold {declared} "
+        f"not a whole STL file: does not begin with 'solid', and as a binary file would hold {declared} "
         f"triangles in {_HEADER + declared * _RECORD.itemsize} bytes; it has {len(data)}"
     )
 
@@ -55,7 +55,7 @@ def _count_to(number: int) -> Index:
     return np.arange(number, dtype=np.int64)
 
 
-def _vertex_lines(lines: list[Line], source: str) -> list[Line]:
+def _vertex_lines(lines: list[Line]) -> list[Line]:
     """Coordinates of all vertices in order; every line must be the one the grammar asks for.
 
     file := (solid facet* endsolid)+
@@ -70,12 +70,12 @@ def _vertex_lines(lines: list[Line], source: str) -> list[Line]:
         match = _PATTERN[position].match(text) if inside else None
         if match is None:
             choice = _expected(position) if inside else "solid"
-            raise InputError(f"{source}: line {number}: {shorten(text)}; expected {choice}")
+            raise InputError(f"line {number}: {shorten(text)}; expected {choice}")
         if _FACET[position] == "vertex":
             vertices.append((number, text[match.end() :]))
         position = (position + 1) % len(_FACET)
     if inside:
-        raise InputError(f"{source}: ends after line {lines[-1][0]}, where {_expected(position)} should follow")
+        raise InputError(f"ends after line {lines[-1][0]}, where {_expected(position)} should follow")
     return vertices
 
 

@@ -85,7 +85,7 @@ def run_study(
         jobs = [(index, plan.cases[index]) for index in wanted if index not in entries]
         with progress("running", len(wanted), before) as advance:
             for entry in finish(plan.experiment, jobs, workers):
-                journal.append(entry)
+                journal.append(asdict(stamp) | asdict(entry))
                 entries[entry.index] = entry
                 advance()
         done = [entries[index] for index in sorted(entries)]
