@@ -3,11 +3,13 @@
 A file that grows row by row has one writer at a time.
 """
 
+import json
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from symrefine.errors import InputError
 
@@ -61,6 +63,22 @@ def whole(path: Path) -> Iterator[Path]:
             yield draft
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def json_text(data: Mapping[str, Any]) -> str:
+    """Strict JSON in ASCII: a line for each entry, and for each object in a list of objects.
+
+    Raises:
+        ValueError: NaN or infinity, which JSON does not know.
+    """
+    entries = [f"  {json.dumps(key)}: {_entry(value)}" for key, value in data.items()]
+    return "{\n" + ",\n".join(entries) + "\n}\n"
+
+
+def _entry(value: Any) -> str:
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return "[\n" + ",\n".join(f"    {json.dumps(v, allow_nan=False)}" for v in value) + "\n  ]"
+    return json.dumps(value, allow_nan=False)
 
 
 def is_only_writer(descriptor: int) -> bool:

@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
     check_outputs({"--json": args.json}, [Path(args.source), Path(args.target)])
     with waiting("aligning"):
         record = _record(args)
-    from symrefine.export.files import json_text
+    from symrefine.files import json_text
 
     if args.json == STDOUT:
         say(json_text(record))

@@ -143,7 +143,7 @@ def _version() -> str:
 
 def _write_bop(name: str, rows: dict[str, Row]) -> int:
     """Write the entries of all rows that have one; tells of the others, and how many they are."""
-    from symrefine.export.bop import bop_texts
+    from symrefine.export.bop import bop_text
 
     entries, left_out = {}, 0
     for file, row in sorted(rows.items()):
@@ -154,7 +154,7 @@ def _write_bop(name: str, rows: dict[str, Row]) -> int:
             entries[int(_BOP_NAME.fullmatch(Path(file).stem)[1])] = found["entry"]  # type: ignore[index]
         else:
             left_out += 1
-    write_all({name: text_writer(bop_texts(Path(name), dict(sorted(entries.items()))))})
+    write_all({name: text_writer(bop_text(Path(name), dict(sorted(entries.items()))))})
     console().print(f"wrote {name}: {len(entries)} of {len(rows)} objects", soft_wrap=True)
     return left_out
 

@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
     if args.bop is not None:
         _note_limits(detection)
     if args.json == STDOUT:
-        from symrefine.export.files import json_text
+        from symrefine.files import json_text
 
         say(json_text(record))
     else:
@@ -119,7 +119,7 @@ def examine(
             f"{path}: points have {shape.dim} coordinates; labels are for objects in space, leave them out"
         )
     if shape.dim == 2:
-        from symrefine.export.planar import planar_record
+        from symrefine.export.records import planar_record
         from symrefine.plane import detect_planar
 
         flat = detect_planar(shape, tolerance=tolerance, seed=seed)
@@ -127,7 +127,7 @@ def examine(
             options |= {"threshold": threshold, "invert": invert}
         return shape, flat, planar_record(flat, shape, options=options, load_s=load_s)
     if shape.dim > 3:
-        from symrefine.export.spaces import subspace_record
+        from symrefine.export.records import subspace_record
         from symrefine.ndim import detect_nd
 
         start = time.perf_counter()
@@ -155,7 +155,7 @@ def _writers(
 ) -> dict[str, Writer]:
     writers: dict[str, Writer] = {}
     if args.json not in (None, STDOUT):
-        from symrefine.export.files import json_text
+        from symrefine.files import json_text
 
         writers[args.json] = text_writer(json_text(record))
     if shape.dim != 3:
@@ -192,7 +192,7 @@ def _bop_writer(args: argparse.Namespace, shape: "Shape", detection: "Detection"
 
     entry = bop_entry(detection, shape, scale=args.bop_scale or 1.0)
     number = 1 if args.bop_id is None else args.bop_id
-    return text_writer(bop_text(Path(args.bop), number, entry))
+    return text_writer(bop_text(Path(args.bop), {number: entry}))
 
 
 def _note_limits(detection: "Detection") -> None:

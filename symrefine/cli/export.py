@@ -130,7 +130,7 @@ def _check_folder(out: Path) -> None:
 
 def _check_files(args: argparse.Namespace, package: "Package") -> None:
     """Refuse to write over the input, or over what cannot be written."""
-    from symrefine.export.files import check_target
+    from symrefine.files import check_target
 
     for path in package.files:
         if path.resolve() == Path(args.path).resolve():

@@ -24,7 +24,7 @@ def check_outputs(outputs: dict[str, str | None], inputs: list[Path]) -> None:
     Args:
         outputs: option to path, None where the option is not given; only `--json` may be "-", for stdout.
     """
-    from symrefine.export.files import check_target
+    from symrefine.files import check_target
 
     taken = {path.resolve(): "the input" for path in inputs}
     for option, name in outputs.items():
@@ -54,7 +54,7 @@ def check_beside(option: str, name: str | None, details: dict[str, object]) -> N
 
 def write_all(writers: dict[str, Writer]) -> None:
     """Write every file under another name first; only when all are complete does each take its place."""
-    from symrefine.export.files import replacing
+    from symrefine.files import replacing
 
     with ExitStack() as stack:
         for name, write in writers.items():

@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
         made = _symmetrize(args, shape, detection)
         data = model_bytes(Path(args.out), made.shape)
         record = _record(args, shape, detection, made)
-        from symrefine.export.files import json_text
+        from symrefine.files import json_text
 
         writers = {args.out: lambda path: _write(path, data)}
         if args.json not in (None, STDOUT):

@@ -7,8 +7,10 @@ materials, polygons, comments, the order of everything. `model_bytes` writes wha
 import io
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
@@ -172,8 +174,13 @@ def _npy(shape: Shape) -> bytes:
 def _npz(shape: Shape) -> bytes:
     arrays = {"points": shape.points, "normals": shape.normals, "faces": shape.faces}
     arrays |= {"weights": shape.weights} if shape.faces is None else {}
+    return npz_bytes(**{name: array for name, array in arrays.items() if array is not None})
+
+
+def npz_bytes(**arrays: NDArray[Any]) -> bytes:
+    """A .npz file of arrays by name."""
     stream = io.BytesIO()
-    np.savez(stream, **{name: array for name, array in arrays.items() if array is not None})  # type: ignore[arg-type]
+    np.savez(stream, **arrays)  # type: ignore[arg-type]
     return stream.getvalue()
 
 

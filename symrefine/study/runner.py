@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from symrefine.errors import InputError
-from symrefine.export.files import replacing
+from symrefine.files import replacing
 from symrefine.study.claims import Verdict, check_claims, claims_table, judge, verdict_rows
 from symrefine.study.document import Node
 from symrefine.study.experiment import Row
