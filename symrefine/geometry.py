@@ -41,6 +41,12 @@ def unit(vector: ArrayLike) -> Array:
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
+def toward_positive(direction: Array) -> float:
+    """The sign, +1.0 or -1.0, that makes the first component of at least a tenth of the largest positive."""
+    size = np.abs(direction)
+    return float(np.copysign(1.0, direction[int(np.argmax(size >= 0.1 * size.max()))]))
+
+
 def _length(vector: ArrayLike, name: str) -> float:
     """Length of a vector that is to be a direction."""
     length = float(np.linalg.norm(vector))

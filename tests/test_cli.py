@@ -145,7 +145,7 @@ def test_stdout_holds_the_json_alone_and_equal_runs_give_equal_bytes(data: Path,
 def test_the_table_says_it_in_words_and_without_colour(run: Run, data: Path) -> None:
     status, out, err = run("detect", data / "box.ply")
     assert (status, err) == (0, "")
-    assert "D2h, 3 mirror planes, 3 rotation axes, inversion centre; tolerance 2 %" in out
+    assert "D2h, three mirror planes at right angles; tolerance 2 %" in out
     assert "mirror planes: normal" in out
     assert "% of the diagonal" in out
     assert "\x1b" not in out
@@ -377,12 +377,12 @@ except AttributeError as error:
         ({"point_group": "Cinfv"}, "Cinfv, surface of revolution"),
         ({"point_group": "Cs", "planes": [{"confidence": 0.5}], "axes": []}, "Cs, one mirror plane"),
         ({"point_group": "Ci", "planes": [], "axes": [], "confidence": 0.75},
-         "Ci, an inversion centre; tolerance 2 %, confidence 0.75"),
+         "Ci, an inversion centre, no mirror plane; tolerance 2 %, confidence 0.75"),
         ({"point_group": "C1", "tolerance": 0.005}, "C1, no symmetry; tolerance 0.5 %, confidence "),
         ({"point_group": "C1", "undetermined": "40 points are too few"}, "undetermined: 40 points are too few"),
         ({"point_group": "S4", "planes": [], "inversion": False, "confidence": 0.25,
           "axes": [{"improper": False, "confidence": 0.25}, {"improper": True, "confidence": 0.25}]},
-         "S4, 1 rotation axis, 1 rotoreflection axis; tolerance 2 %, confidence 0.25"),
+         "S4, a four-fold rotoreflection axis, no mirror plane; tolerance 2 %, confidence 0.25"),
     ],
 )  # fmt: skip
 def test_headlines(record: dict[str, Any], changes: dict[str, Any], part: str) -> None:

@@ -22,9 +22,8 @@ from scipy.spatial.distance import cdist
 
 from symrefine.detection.result import Detection
 from symrefine.errors import InputError
-from symrefine.export.records import toward_positive
 from symrefine.files import json_text
-from symrefine.geometry import Array, Isometry, frame_with_z, rotation, unit
+from symrefine.geometry import Array, Isometry, frame_with_z, rotation, toward_positive, unit
 from symrefine.groups import PointGroup
 from symrefine.shape import Shape
 from symrefine.symmetrize import exact_place

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symrefine.geometry import Array, Plane
+from symrefine.geometry import Array, Plane, toward_positive
 from symrefine.shape import Shape
 from symrefine.surface.misses import Deviation
 
@@ -233,12 +233,6 @@ def _classes(shape: Shape) -> Record | None:
         return None
     sizes = np.unique(shape.labels, return_counts=True)[1].tolist()
     return {"count": len(sizes), "sizes": sizes}
-
-
-def toward_positive(direction: Array) -> float:
-    """The sign, +1.0 or -1.0, that makes the first component of at least a tenth of the largest positive."""
-    size = np.abs(direction)
-    return math.copysign(1.0, direction[int(np.argmax(size >= 0.1 * size.max()))])
 
 
 def number(value: float, scale: float = 0.0) -> float | str | None:

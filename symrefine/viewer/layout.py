@@ -1,18 +1,23 @@
 """How a recording looks when it opens: the shape on the left, series and texts on the right."""
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
+import rerun.blueprint as rrb
+
 from symrefine.detection.result import Detection
+from symrefine.fit.refine import Iterate
 from symrefine.picture.camera import look_at
+from symrefine.picture.measures import cost_series, inlier_series, step_series, turn_series_deg
 from symrefine.picture.scene import Colour, Scene
 
-# Series of the refinement: entity under /series, title and colour.
-SERIES: dict[str, tuple[str, Colour]] = {
-    "turn_deg": ("turn of the frame [deg]", (255, 150, 60)),
-    "cost": ("cost: mean squared residual", (86, 180, 233)),
-    "inliers": ("pairs in agreement", (60, 200, 150)),
-    "step": ("step [rad, RMS radii]", (220, 130, 190)),
+# Series of the refinement: entity under /series, title, colour and values.
+SERIES: dict[str, tuple[str, Colour, Callable[[Sequence[Iterate]], list[float]]]] = {
+    "turn_deg": ("turn of the frame [deg]", (255, 150, 60), turn_series_deg),
+    "cost": ("cost: mean squared residual", (86, 180, 233), cost_series),
+    "inliers": ("pairs in agreement", (60, 200, 150), inlier_series),
+    "step": ("step [rad, RMS radii]", (220, 130, 190), step_series),
 }
 # What the viewer's camera spans unless told otherwise, and the share of it that is filled.
 FOV_RAD, FILL = math.radians(55.0), 0.78
@@ -21,19 +26,11 @@ BACKGROUND = (22, 25, 32)
 
 def blueprint(detection: Detection, scene: Scene, scale: float) -> Any:
     """The layout; `scale` is that of the transform above all positions."""
-    import rerun.blueprint as rrb
-
     refined = len(detection.history) > 1
     views = [_view("Result", scene, scale, ["- /object/refinement/**"])]
     if refined:
-        without = [
-            "- /object/cloud",
-            "- /object/mesh",
-            "- /object/planes/**",
-            "- /object/ntuples",
-            "- /object/near_misses/**",
-        ]
-        views.append(_view("Refinement", scene, scale, without))
+        without = ("cloud", "mesh", "planes/**", "ntuples", "near_misses/**")
+        views.append(_view("Refinement", scene, scale, [f"- /object/{entity}" for entity in without]))
     report = rrb.TextDocumentView(origin="/report", name="Report")
     log = rrb.TextLogView(origin="/log", name="Log")
     right = rrb.Vertical(report, _series(), log, row_shares=[4, 4, 2]) if refined else rrb.Vertical(report, log)
@@ -48,8 +45,6 @@ def blueprint(detection: Detection, scene: Scene, scale: float) -> Any:
 
 def _view(name: str, scene: Scene, scale: float, without: list[str]) -> Any:
     """A 3-D view from where the scene shows best; near misses, and planes that crowd it, are switched off."""
-    import rerun.blueprint as rrb
-
     hidden = ["object/near_misses", *(["object/planes", "object/refinement/planes"] if scene.crowded else [])]
     camera = look_at(scene, aspect=1.1, fov_rad=FOV_RAD, fill=FILL)
     return rrb.Spatial3DView(
@@ -67,12 +62,10 @@ def _view(name: str, scene: Scene, scale: float, without: list[str]) -> Any:
 
 def _series() -> Any:
     """A tab for each series, and one for the planes' own angles."""
-    import rerun.blueprint as rrb
-
     hidden = rrb.PlotLegend(visible=False)
     views = [
         rrb.TimeSeriesView(origin=f"/series/{name}", name=title.split(":")[0], plot_legend=hidden)
-        for name, (title, _) in SERIES.items()
+        for name, (title, *_) in SERIES.items()
     ]
     views.insert(1, rrb.TimeSeriesView(origin="/series/theta_deg", name="theta [deg]"))
     return rrb.Tabs(*views, active_tab=0)
