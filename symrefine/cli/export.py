@@ -3,13 +3,13 @@
 import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from symrefine.cli.outputs import check_outputs, console, note, waiting, write_all
+from symrefine.cli.outputs import bytes_writer, check_outputs, note, tell, waiting, write_all
 from symrefine.cli.values import add_detection_options, count, natural, positive
 from symrefine.errors import InputError
+from symrefine.files import check_target
 
 if TYPE_CHECKING:
     from symrefine.detection.result import Detection
@@ -68,11 +68,8 @@ def run(args: argparse.Namespace) -> int:
         package = _package(args, shape, detection)
         _check_files(args, package)
         with _folder(args):
-            write_all({str(path): partial(_write, data=data) for path, data in package.files.items()})
-    out = console()
-    out.print(f"{args.path}: {detection.point_group}", soft_wrap=True)
-    for path in package.files:
-        out.print(f"wrote {path}", soft_wrap=True)
+            write_all({str(path): bytes_writer(data) for path, data in package.files.items()})
+    tell(None, {}, lambda: [f"{args.path}: {detection.point_group}"], map(str, package.files))
     for text in package.notes:
         note(text)
     return 0
@@ -130,8 +127,6 @@ def _check_folder(out: Path) -> None:
 
 def _check_files(args: argparse.Namespace, package: "Package") -> None:
     """Refuse to write over the input, or over what cannot be written."""
-    from symrefine.files import check_target
-
     for path in package.files:
         if path.resolve() == Path(args.path).resolve():
             raise InputError(f"--out {args.out}: {path} is the input itself; name another folder")
@@ -172,7 +167,3 @@ def _folder(args: argparse.Namespace) -> Iterator[None]:
         if fresh:
             out.rmdir()
         raise
-
-
-def _write(path: Path, data: bytes) -> None:
-    path.write_bytes(data)
