@@ -109,14 +109,10 @@ def check_finite(content: Content) -> None:
 def check_distinct(content: Content) -> None:
     """Refuse files without two distinct points, or with points so close together that areas underflow."""
     points = content.points
-    if len(points) == 0:
-        raise InputError("no points; a shape needs at least two distinct points")
-    if len(points) == 1:
-        raise InputError(f"only one point, {points[0].tolist()}; a shape needs at least two distinct points")
-    if (points == points[0]).all():
-        raise InputError(
-            f"all {len(points)} points are {points[0].tolist()}; a shape needs at least two distinct points"
-        )
+    if len(points) < 2 or (points == points[0]).all():
+        told = f"all {len(points)} points are {points[0].tolist()}" if len(points) > 1 else "no points"
+        told = f"only one point, {points[0].tolist()}" if len(points) == 1 else told
+        raise InputError(f"{told}; a shape needs at least two distinct points")
     spread = float(np.ptp(points, axis=0).max())
     if spread < SMALLEST:
         raise InputError(

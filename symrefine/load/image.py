@@ -94,7 +94,7 @@ def without_grain(grey: Array) -> Array:
 
     The grain is what pixels differ by from the mean of their four neighbours, in the median: edges do not count.
     """
-    if min(grey.shape) < 3 or grey.size < _SEEN or _is_binary(grey):
+    if min(grey.shape) < 3 or grey.size < _SEEN or len(np.unique(grey)) <= 2:
         return grey
     beside = 0.25 * (grey[:-2, 1:-1] + grey[2:, 1:-1] + grey[1:-1, :-2] + grey[1:-1, 2:])
     grain = 1.4826 * float(np.median(np.abs(grey[1:-1, 1:-1] - beside))) / np.sqrt(1.25)
@@ -106,11 +106,6 @@ def without_grain(grey: Array) -> Array:
     from scipy.ndimage import gaussian_filter
 
     return np.asarray(gaussian_filter(grey, min(width, _SOFT), mode="nearest"))
-
-
-def _is_binary(grey: Array) -> bool:
-    low, high = float(grey.min()), float(grey.max())
-    return bool(((grey == low) | (grey == high)).all())
 
 
 def otsu(grey: Array) -> float:

@@ -4,10 +4,8 @@ import ctypes
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
@@ -149,10 +147,6 @@ def _read_binary(data: bytes, header: _Header, wanted: list[str]) -> Array:
             f"{header.points * record.itemsize} in all; {len(data) - header.size} follow it"
         )
     table = np.frombuffer(data, record, offset=header.size)
-    return _pick(table, header, wanted)
-
-
-def _pick(table: NDArray[Any], header: _Header, wanted: list[str]) -> Array:
     return np.stack([as_float64(table[str(header.names.index(name))][:, 0]) for name in wanted], axis=1)
 
 

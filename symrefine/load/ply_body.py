@@ -1,6 +1,7 @@
 """Rows of a PLY file: all of them, and nothing behind them."""
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -113,8 +114,9 @@ def _columns(table: NDArray[np.void], element: Element) -> Rows:
 
 def _unequal_rows(data: bytes, offset: int, element: Element, byte_order: str) -> tuple[Rows, int]:
     """Rows one by one, and where they end."""
-    builder = _Builder(element)
+    rows: list[list[tuple[float, ...]]] = []
     for row in range(element.count):
+        rows.append([])
         try:
             for p in element.properties:
                 size = 1
@@ -124,34 +126,21 @@ def _unequal_rows(data: bytes, offset: int, element: Element, byte_order: str) -
                     if size < 0:
                         raise InputError(f"row {row} of element '{element.name}': list of length {size}")
                 layout = f"{byte_order}{size}{_STRUCT[p.type]}"
-                builder.add(p.name, struct.unpack_from(layout, data, offset))
+                rows[-1].append(struct.unpack_from(layout, data, offset))
                 offset += struct.calcsize(layout)
         except struct.error:
             raise _cut_off(element, row) from None
-    return builder.rows(None), offset
+    return _rows(element, rows, None), offset
 
 
-class _Builder:
-    """Columns that grow row by row."""
-
-    def __init__(self, element: Element) -> None:
-        self._element = element
-        self._values: dict[str, list[float]] = {p.name: [] for p in element.properties}
-        self._counts: dict[str, list[int]] = {p.name: [] for p in element.properties}
-
-    def add(self, name: str, values: tuple[float, ...] | list[float]) -> None:
-        self._values[name].extend(values)
-        self._counts[name].append(len(values))
-
-    def rows(self, lines: list[int] | None) -> Rows:
-        columns = {
-            p.name: Column(
-                values=np.array(self._values[p.name]),
-                counts=np.array(self._counts[p.name], dtype=np.int64) if p.length_type else None,
-            )
-            for p in self._element.properties
-        }
-        return Rows(columns=columns, lines=lines)
+def _rows(element: Element, rows: Sequence[Sequence[Sequence[float]]], lines: list[int] | None) -> Rows:
+    """Columns of rows that were read one by one, each with the values of every property."""
+    columns = {}
+    for k, p in enumerate(element.properties):
+        parts = [row[k] for row in rows]
+        counts = np.array([len(part) for part in parts], dtype=np.int64) if p.length_type else None
+        columns[p.name] = Column(values=np.array([value for part in parts for value in part]), counts=counts)
+    return Rows(columns=columns, lines=lines)
 
 
 def _read_text(data: bytes, header: Header) -> dict[str, Rows]:
@@ -160,8 +149,7 @@ def _read_text(data: bytes, header: Header) -> dict[str, Rows]:
     start = 0
     for element in header.elements:
         part = lines[start : start + element.count]
-        read = _text_lists if element.has_lists else _text_values
-        rows[element.name] = read(part, element)
+        rows[element.name] = _text_rows(part, element)
         # After the rows themselves: where one count is too large, the first row of the wrong form says more.
         if len(part) < element.count:
             raise _cut_off(element, len(part))
@@ -174,25 +162,20 @@ def _read_text(data: bytes, header: Header) -> dict[str, Rows]:
     return rows
 
 
-def _text_values(lines: list[Line], element: Element) -> Rows:
-    names = [p.name for p in element.properties]
-    layout = f"a row of element '{element.name}': {' '.join(names)}"
-    table = parse_table(lines, columns=(len(names),), layout=layout)
-    columns = {name: Column(values=table[:, k]) for k, name in enumerate(names)}
-    return Rows(columns=columns, lines=[number for number, _ in lines])
-
-
-def _text_lists(lines: list[Line], element: Element) -> Rows:
+def _text_rows(lines: list[Line], element: Element) -> Rows:
     names = " ".join(f"LENGTH {p.name}..." if p.length_type else p.name for p in element.properties)
     layout = f"a row of element '{element.name}': {names}"
-    builder = _Builder(element)
+    numbers = [number for number, _ in lines]
+    if not element.has_lists:
+        table = parse_table(lines, columns=(len(element.properties),), layout=layout)
+        columns = {p.name: Column(values=table[:, k]) for k, p in enumerate(element.properties)}
+        return Rows(columns=columns, lines=numbers)
+    rows = []
     for line in lines:
-        parts = _split(parse_numbers(line, layout), element)
-        if len(parts) != len(element.properties):
+        rows.append(_split(parse_numbers(line, layout), element))
+        if len(rows[-1]) != len(element.properties):
             raise InputError(f"line {line[0]}: {shorten(line[1])}; expected {layout}")
-        for p, part in zip(element.properties, parts, strict=True):
-            builder.add(p.name, part)
-    return builder.rows([number for number, _ in lines])
+    return _rows(element, rows, numbers)
 
 
 def _split(numbers: list[float], element: Element) -> list[list[float]]:

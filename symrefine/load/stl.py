@@ -8,7 +8,6 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.content import Content, Polygons, as_float64
 from symrefine.load.text import Line, numbered_lines, parse_table, shorten
-from symrefine.shape import Index
 
 _HEADER = 84
 _RECORD = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -45,14 +44,10 @@ def read_stl(data: bytes) -> Content:
 def _content(points: Array, lines: list[int] | None) -> Content:
     if len(points) == 0:
         return Content(points=points)
-    faces = Polygons(corners=_count_to(len(points)), counts=np.full(len(points) // 3, 3))
+    faces = Polygons(corners=np.arange(len(points), dtype=np.int64), counts=np.full(len(points) // 3, 3))
     return Content(
         points=points, faces=faces, point_lines=lines, face_lines=None if lines is None else lines[::3], split=True
     )
-
-
-def _count_to(number: int) -> Index:
-    return np.arange(number, dtype=np.int64)
 
 
 def _vertex_lines(lines: list[Line]) -> list[Line]:

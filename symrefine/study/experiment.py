@@ -9,6 +9,7 @@ from types import ModuleType, NoneType, UnionType
 from typing import Any, get_args, get_type_hints
 
 from symrefine.errors import InputError
+from symrefine.study.document import Node
 from symrefine.study.typed import Scalar
 
 Row = dict[str, Scalar | None]
@@ -38,6 +39,16 @@ class Experiment:
     trace: Callable[[Any], list[dict[str, Any]]] | None
     record: Callable[[Any, Path], None] | None
     measured: frozenset[str]
+
+    def field(self, name: str, node: Node) -> Any:
+        """The type of a field of the case, which `node` names.
+
+        Raises:
+            InputError: there is none.
+        """
+        if name not in self.hints:
+            raise node.error(f"{self.name} has no field {name!r}; expected one of {sorted(self.hints)}")
+        return self.hints[name]
 
 
 def find_root(name: str, start: Path) -> Path:

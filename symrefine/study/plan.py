@@ -153,10 +153,7 @@ def _range(node: Node) -> range:
 
 def _case(nodes: Mapping[str, Node], root: Node, experiment: Experiment) -> Any:
     """The case that the nodes describe; wrong names, types and impossible values are told where they stand."""
-    hints = experiment.hints
-    for name, node in nodes.items():
-        if name not in hints:
-            raise node.error(f"{experiment.name} has no field {name!r}; expected one of {sorted(hints)}")
+    hints = {name: experiment.field(name, node) for name, node in nodes.items()}
     needed = [f.name for f in fields(experiment.case) if f.default is MISSING and f.default_factory is MISSING]
     if missing := [name for name in needed if name not in nodes]:
         raise root.error(f"neither `fixed` nor `sweep` sets {', '.join(missing)}")
@@ -179,12 +176,17 @@ def select(where: Node, experiment: Experiment) -> Mapping[str, frozenset[Any]]:
     """
     picked = {}
     for name, node in mapping(where).items():
-        if name not in experiment.hints:
-            raise node.error(f"{experiment.name} has no field {name!r}; expected one of {sorted(experiment.hints)}")
-        picked[name] = frozenset(scalar(inner, experiment.hints[name]) for inner in spread(node))
+        kind = experiment.field(name, node)
+        picked[name] = frozenset(scalar(inner, kind) for inner in spread(node))
     return picked
 
 
 def matches(row: Row, picked: Mapping[str, frozenset[Any]]) -> bool:
     """Whether a row, or the fields of a case, is among those picked."""
     return all(row[name] in values for name, values in picked.items())
+
+
+def chosen(rows: Sequence[Row], where: Node, experiment: Experiment) -> list[Row]:
+    """The rows that a `where` picks."""
+    picked = select(where, experiment)
+    return [row for row in rows if matches(row, picked)]

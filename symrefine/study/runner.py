@@ -12,7 +12,7 @@ from symrefine.files import replacing
 from symrefine.study.claims import Verdict, check_claims, claims_table, judge, verdict_rows
 from symrefine.study.document import Node
 from symrefine.study.experiment import Row
-from symrefine.study.figures import check_figures, draw, wants_trace
+from symrefine.study.figures import check_figures, draw
 from symrefine.study.journal import Entry, Stamp, opened
 from symrefine.study.plan import Plan, matches, select
 from symrefine.study.schema import Figure
@@ -77,7 +77,8 @@ def run_study(
         InputError: something in the config does not fit, or the folder holds other rows.
     """
     measures = _check(plan)
-    stamp = _stamp(plan)
+    code = code_version(plan.experiment.name, plan.experiment.root)
+    stamp = Stamp(config=plan.config_hash, code=code, libraries=library_versions())
     _make(folder)
     wanted = range(len(plan.cases) if limit is None else min(limit, len(plan.cases)))
     with opened(folder / JOURNAL, stamp, replace=replace) as (entries, journal):
@@ -95,7 +96,7 @@ def run_study(
 def _check(plan: Plan) -> list[Measure]:
     """The measures of everything that is made of the rows, after a look at the names in the config."""
     study, experiment = plan.study, plan.experiment
-    measures = [check(study, experiment) for check in (check_tables, check_figures, check_claims)]
+    measures = [*check_tables(study, experiment), *check_figures(study, experiment), *check_claims(study)]
     if study.record and experiment.record is None:
         raise study.record[0].error(f"{experiment.name} has no `record`")
     selections = [*study.record, *(table.where for table in study.tables), *(figure.where for figure in study.figures)]
@@ -108,7 +109,7 @@ def _check(plan: Plan) -> list[Measure]:
     for figure, slug in zip(study.figures, slugs, strict=True):
         if not slug or slugs.count(slug) > 1:
             raise figure.node.at("title").error("names the file: expected a title of its own")
-    return [measure for some in measures for measure in some]
+    return measures
 
 
 def _must_pick(where: Node, plan: Plan, *common: Node) -> None:
@@ -116,11 +117,6 @@ def _must_pick(where: Node, plan: Plan, *common: Node) -> None:
     picks = [select(node, plan.experiment) for node in (where, *common)]
     if not plan.changed and not any(all(matches(asdict(case), p) for p in picks) for case in plan.cases):
         raise where.error("picks no run of the sweep")
-
-
-def _stamp(plan: Plan) -> Stamp:
-    code = code_version(plan.experiment.name, plan.experiment.root)
-    return Stamp(config=plan.config_hash, code=code, libraries=library_versions())
 
 
 def _make(folder: Path) -> None:
@@ -189,8 +185,7 @@ def _figures(
 def _trace(plan: Plan, chosen: Sequence[Any], progress: Progress) -> list[Row]:
     """A row for each iteration of each run that a figure shows."""
     trace = plan.experiment.trace
-    picks = [p for figure in plan.study.figures if (p := wants_trace(figure, plan.experiment)) is not None]
-    cases = [case for case in chosen if any(matches(asdict(case), picked) for picked in picks)]
+    cases = _picked(plan, chosen, [figure.where for figure in plan.study.figures if figure.kind == "convergence"])
     if trace is None or not cases:
         return []
     rows: list[Row] = []
@@ -199,6 +194,12 @@ def _trace(plan: Plan, chosen: Sequence[Any], progress: Progress) -> list[Row]:
             rows += [{"run": run, **asdict(case), "error": None, **step} for step in trace(case)]
             advance()
     return rows
+
+
+def _picked(plan: Plan, cases: Sequence[Any], wheres: Sequence[Node]) -> list[Any]:
+    """The cases that one of the selections picks."""
+    picks = [select(where, plan.experiment) for where in wheres]
+    return [case for case in cases if any(matches(asdict(case), picked) for picked in picks)]
 
 
 def _check_trace(figure: Figure, rows: Sequence[Row]) -> None:
@@ -210,8 +211,7 @@ def _check_trace(figure: Figure, rows: Sequence[Row]) -> None:
 
 def _record(plan: Plan, folder: Path, chosen: Sequence[Any], progress: Progress) -> None:
     record = plan.experiment.record
-    picks = [select(where, plan.experiment) for where in plan.study.record]
-    cases = [case for case in chosen if any(matches(asdict(case), picked) for picked in picks)]
+    cases = _picked(plan, chosen, plan.study.record)
     if record is None or not cases:
         return
     _make(folder / "recordings")
