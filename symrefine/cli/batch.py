@@ -4,7 +4,6 @@ import argparse
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -124,21 +123,15 @@ def _holds(row: Row, folder: str, options: dict[str, Any], scale: float | None) 
 def _head(path: Path, name: str, options: dict[str, Any]) -> Row:
     """What names a row: the file, its content, the options, the version; `error` is set if the file cannot be read."""
     from hashlib import file_digest
+    from importlib.metadata import version
 
-    row: Row = {"file": name, "sha256": None, "error": None, "version": _version(), "options": options}
+    row: Row = {"file": name, "sha256": None, "error": None, "version": version("symrefine"), "options": options}
     try:
         with path.open("rb") as stream:
             row["sha256"] = file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         row["error"] = f"{path}: cannot be read: {error.strerror}"
     return row
-
-
-@cache
-def _version() -> str:
-    from importlib.metadata import version
-
-    return version("symrefine")
 
 
 def _write_bop(name: str, rows: dict[str, Row]) -> int:

@@ -29,7 +29,7 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
     yield _place(record)
     if record["classes"]:
         yield f"labels: {_count(record['classes']['count'], 'class', 'classes')}"
-    yield from _apart(_planes(record), _axes(record), _inversion(record), _near_misses(record))
+    yield from _apart(*_spatial(record))
     yield ""
     if record["planes"] or record["axes"] or record["inversion"] or record["near_misses"]:
         yield "Offsets in units of the file, misses in % of the diagonal; axes go through the centre."
@@ -98,7 +98,7 @@ def planar_lines(record: Record) -> Iterator[Table | str]:
         yield f"It may be meant otherwise: {otherwise(record)}."
     yield f"n-tuples {_DOUBLETS[record['ntuples']['kind']]}"
     yield _place(record)
-    yield from _apart(_planar_elements(record), _planar_near_misses(record))
+    yield from _apart(*_planar(record))
     if record["ntuples"]["kind"] != "centre":
         yield from _apart(_ratios(record))
     yield ""
@@ -108,19 +108,17 @@ def planar_lines(record: Record) -> Iterator[Table | str]:
     yield f"{_seconds(record)} s"
 
 
-def _planar_elements(record: Record) -> Table:
+def _planar(record: Record) -> Iterator[Table]:
+    """Mirror lines with the turns, and near misses, of a detection in the plane."""
     rotation = record["rotation"]
     lines = [((*_mirror(line, record), "mirror"), line) for line in record["lines"]]
     turns = [(("", "", _turns(rotation["order"])), rotation)] if rotation else []
-    return _elements(("mirror lines: normal", "offset", "kind"), "confidence", lines + turns)
-
-
-def _planar_near_misses(record: Record) -> Table:
-    rows = [
+    yield _elements(("mirror lines: normal", "offset", "kind"), "confidence", lines + turns)
+    near = [
         ((*_mirror(m, record), "mirror") if m["kind"] == "line" else ("", "", _turns(m["order"])), m)
         for m in record["near_misses"]
     ]
-    return _elements(("near misses: normal", "offset", "kind"), "x limit", rows)
+    yield _elements(("near misses: normal", "offset", "kind"), "x limit", near)
 
 
 def _turns(order: int | str) -> str:
@@ -222,7 +220,9 @@ def batch_table(rows: Sequence[Record]) -> Table:
             told = "undetermined" if row["undetermined"] else f"{row['dimension']}-D"
             table.add_row(row["file"], told, str(len(row["hyperplanes"])), "", "", "", _seconds(row))
             continue
-        mirrors, turns = _mirrors_and_turns(row)
+        # Planes and axes of a detection in space, lines and turns of one in the plane.
+        mirrors = row["lines"] if "lines" in row else row["planes"]
+        turns = ([row["rotation"]] if row["rotation"] else []) if "lines" in row else row["axes"]
         elements = mirrors + turns + _inversions(row)
         table.add_row(
             row["file"],
@@ -236,13 +236,6 @@ def batch_table(rows: Sequence[Record]) -> Table:
     return table
 
 
-def _mirrors_and_turns(row: Record) -> tuple[list[Record], list[Record]]:
-    """Planes and axes of a detection in space, lines and turns of one in the plane."""
-    if "lines" in row:
-        return row["lines"], [row["rotation"]] if row["rotation"] else []
-    return row["planes"], row["axes"]
-
-
 def _inversions(record: Record) -> list[Record]:
     """The inversion as an element, if there is one; rows of a batch in the plane, or of an early version, tell none."""
     if not record.get("inversion_residual"):
@@ -250,27 +243,16 @@ def _inversions(record: Record) -> list[Record]:
     return [{"residual": record["inversion_residual"], "confidence": record["inversion_confidence"]}]
 
 
-def _planes(record: Record) -> Table:
-    rows = [(_mirror(p, record), p) for p in record["planes"]]
-    return _elements(("mirror planes: normal", "offset"), "confidence", rows)
-
-
-def _axes(record: Record) -> Table:
-    rows = [
-        ((_direction(a["direction"]), _turn("improper" if a["improper"] else "axis", a["order"])), a)
-        for a in record["axes"]
-    ]
-    return _elements(("axes: direction", "kind"), "confidence", rows)
-
-
-def _inversion(record: Record) -> Table:
-    return _elements(("inversion",), "confidence", [(("about the centre",), found) for found in _inversions(record)])
-
-
-def _near_misses(record: Record) -> Table:
-    return _elements(
-        ("near misses: direction", "offset", "kind"), "x limit", [(_near(m, record), m) for m in record["near_misses"]]
-    )
+def _spatial(record: Record) -> Iterator[Table]:
+    """Planes, axes, the inversion and near misses of a detection in space."""
+    planes = [(_mirror(p, record), p) for p in record["planes"]]
+    yield _elements(("mirror planes: normal", "offset"), "confidence", planes)
+    turns = [_turn("improper" if a["improper"] else "axis", a["order"]) for a in record["axes"]]
+    axes = [((_direction(a["direction"]), turn), a) for a, turn in zip(record["axes"], turns, strict=True)]
+    yield _elements(("axes: direction", "kind"), "confidence", axes)
+    yield _elements(("inversion",), "confidence", [(("about the centre",), found) for found in _inversions(record)])
+    near = [(_near(m, record), m) for m in record["near_misses"]]
+    yield _elements(("near misses: direction", "offset", "kind"), "x limit", near)
 
 
 def _near(miss: Record, record: Record) -> tuple[str, ...]:

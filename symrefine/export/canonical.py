@@ -73,7 +73,8 @@ def canonical_pose(group: PointGroup, center: Array, shape: Shape) -> Canonical:
     if shape.dim != 3:
         raise InputError(f"{shape.source}: a canonical pose is for 3-D shapes; these points have {shape.dim}")
     nodes, weights = _masses(shape)
-    standard = _best(_choices(group, nodes, weights), nodes, weights, _fold(group))
+    fold = int(group.symbol.fold) if group.is_finite and group.symbol.fold else 1
+    standard = _best(_choices(group, nodes, weights), nodes, weights, fold)
     tilt = _FIVE_UP if group.symbol.family in ("I", "Ih") else np.eye(3)
     turn = tilt @ standard
     placed = PointGroup(name=group.name, frame=tilt.T)
@@ -90,10 +91,6 @@ def _free(group: PointGroup) -> Array:
     if family == "Ch" and fold == 1:
         return np.array([1.0, 1.0, 0.0])
     return _Z if family in ("C", "Cv") else np.zeros(3)
-
-
-def _fold(group: PointGroup) -> int:
-    return int(group.symbol.fold) if group.is_finite and group.symbol.fold else 1
 
 
 def _masses(shape: Shape) -> tuple[Array, Array]:

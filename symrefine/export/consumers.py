@@ -70,7 +70,7 @@ def _foundationpose(group: PointGroup, points: Array) -> Reading:
         rest = rest[STEPS - 1 :]
         notes = (f"a continuous axis is read as turns by {360 // STEPS} degrees",)
     if len(rest):
-        entry |= {"symmetries_discrete": [_exact(m).reshape(-1).tolist() for m in rest]}
+        entry |= {"symmetries_discrete": [m.reshape(-1).tolist() for m in np.where(np.abs(rest) < 1e-12, 0.0, rest)]}
     content = motions_bytes(group, _ORIGIN)
     return Reading(models_info=entry, name="symmetry_tfs.npz", content=content, notes=notes)
 
@@ -79,16 +79,12 @@ def _dope(group: PointGroup, points: Array) -> Reading:
     """`model_info.json`: symmetries as in BOP, and `align_axes`, by which one of all equal poses is chosen."""
     entry = placed_entry(group, _ORIGIN, points)
     kept = {key: value for key, value in entry.items() if key.startswith("symmetries")}
+    # Which axis of the object is brought near which of the camera: y to the view, then z (if turned over) down.
+    near = [{"object": [0, 1, 0], "camera": [0, 0, 1]}, {"object": [0, 0, 1], "camera": [0, 1, 0]}]
     if kept:
-        kept |= {"align_axes": _align_axes(group)}
+        kept |= {"align_axes": near[:1] if group.symbol.family.startswith(("C", "S")) else near}
     notes = (_SPHERE,) * _is_sphere(group)
     return Reading(name="model_info.json", content=json_text(kept).encode(), notes=notes)
-
-
-def _align_axes(group: PointGroup) -> list[dict[str, list[int]]]:
-    """Which axis of the object is brought near which of the camera: y to the view, then z (if turned over) down."""
-    both = [{"object": [0, 1, 0], "camera": [0, 0, 1]}, {"object": [0, 0, 1], "camera": [0, 1, 0]}]
-    return both[:1] if group.symbol.family.startswith(("C", "S")) else both
 
 
 def _isaac(group: PointGroup, _: Array) -> Reading:
@@ -155,11 +151,6 @@ def isaac_products(x_deg: list[float], y_deg: list[float], z_deg: list[float]) -
 
 def _is_sphere(group: PointGroup) -> bool:
     return group.symbol.family in ("K", "Kh")
-
-
-def _exact(matrix: Array) -> Array:
-    """A matrix without the rounding of what is 0."""
-    return np.where(np.abs(matrix) < 1e-12, 0.0, matrix)
 
 
 _READINGS: dict[str, Callable[[PointGroup, Array], Reading]] = {

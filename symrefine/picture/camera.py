@@ -55,7 +55,8 @@ def look_at(scene: Scene, *, aspect: float, fov_rad: float, fill: float = 0.92) 
     """
     back = _line_of_sight(scene)
     frame = _frame(back, scene.stage.frame[2])
-    corners = _outline(scene) @ frame.T
+    sheets = [] if scene.crowded else [q.corners for q in scene.planes]
+    corners = np.concatenate([scene.stage.points, *sheets, *(a.ends for a in scene.axes)]) @ frame.T
     tangent = np.array([aspect, 1.0]) * fill * math.tan(0.5 * fov_rad)
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     for _ in range(4):  # what is near looks larger, so the middle moves with the distance
@@ -67,12 +68,6 @@ def look_at(scene: Scene, *, aspect: float, fov_rad: float, fill: float = 0.92) 
     return Camera(eye=target + distance * back, target=target, up=scene.stage.frame[2], fov_rad=fov_rad)
 
 
-def _outline(scene: Scene) -> Array:
-    """Points that must be in view."""
-    sheets = [] if scene.crowded else [q.corners for q in scene.planes]
-    return np.concatenate([scene.stage.points, *sheets, *(a.ends for a in scene.axes)])
-
-
 def _frame(back: Array, up: Array) -> Array:
     back = unit(back)
     right = unit(np.cross(up, back))
@@ -81,15 +76,11 @@ def _frame(back: Array, up: Array) -> Array:
 
 def _line_of_sight(scene: Scene) -> Array:
     """Direction from the shape to the eye: the best of a grid."""
-    angles = product(ELEVATIONS_DEG, range(0, 360, AZIMUTH_STEP_DEG))
-    candidates = np.array([_direction(math.radians(e), math.radians(a)) for e, a in angles]) @ scene.stage.frame
+    angles = np.radians(list(product(ELEVATIONS_DEG, range(0, 360, AZIMUTH_STEP_DEG))))
+    level = [(math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)) for e, a in angles]
+    candidates = np.array(level) @ scene.stage.frame
     best = int(np.argmax(np.round(_merit(candidates, scene), 4)))
     return np.asarray(candidates[best])
-
-
-def _direction(elevation: float, azimuth: float) -> tuple[float, float, float]:
-    level = math.cos(elevation)
-    return level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)
 
 
 def _merit(candidates: Array, scene: Scene) -> Array:

@@ -228,13 +228,11 @@ def _lines(detection: Detection, stage: Stage) -> tuple[Line, ...]:
             bundles.append([found])
     bundles = [sorted(bundle, key=lambda found: found.improper) for bundle in bundles]
     marked = len(bundles) <= MAX_MARKS
-    return tuple(_line(stage, bundle, marked) for bundle in bundles)
-
-
-def _line(stage: Stage, bundle: list[FoundAxis], marked: bool) -> Line:
-    first = bundle[0]
-    names = " ".join(order_name(found.order, found.improper) for found in bundle)
-    return stage.line(first.axis.point, first.axis.direction, names, AXIS, first.order, marked=marked)
+    names = [" ".join(order_name(found.order, found.improper) for found in bundle) for bundle in bundles]
+    return tuple(
+        stage.line(first.axis.point, first.axis.direction, name, AXIS, first.order, marked=marked)
+        for name, (first, *_) in zip(names, bundles, strict=True)
+    )
 
 
 def _missed(detection: Detection, stage: Stage) -> tuple[tuple[Quad, ...], tuple[Line, ...]]:
