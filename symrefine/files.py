@@ -58,11 +58,26 @@ def whole(path: Path) -> Iterator[Path]:
         InputError: the file cannot be written, before or while it is.
     """
     check_target(path)
+    with naming(str(path)), replacing(path) as draft:
+        yield draft
+
+
+@contextmanager
+def naming(name: str) -> Iterator[None]:
+    """Name the file that could not be written: the system names none, or its draft.
+
+    Raises:
+        InputError: the disk is full, or the like.
+    """
     try:
-        with replacing(path) as draft:
-            yield draft
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+        yield
+    except BrokenPipeError:
+        raise
+    except (OSError, InputError) as error:
+        reason = error if isinstance(error, OSError) else error.__cause__
+        if not isinstance(reason, OSError):
+            raise
+        raise InputError(f"{name}: cannot be written: {reason.strerror or reason}") from reason
 
 
 def json_text(data: Mapping[str, Any]) -> str:

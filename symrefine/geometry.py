@@ -4,7 +4,7 @@ Conventions: a plane is `n.x = d` with |n| = 1, and (n, d) ~ (-n, -d); an axis i
 direction u ~ -u; `T_a_b` maps b to a.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import Any
 
@@ -33,6 +33,16 @@ def read_only(values: ArrayLike) -> Array:
     array = np.array(values, dtype=np.float64, order="C")
     array.flags.writeable = False
     return array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReadOnly:
+    """Base of dataclasses that nobody can write to: every field declared as `Array` holds a private, read-only copy."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if field.type == Array:
+                object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
 
 
 def unit(vector: ArrayLike) -> Array:

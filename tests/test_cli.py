@@ -14,11 +14,10 @@ import pytest
 
 import symrefine
 from symrefine.cli import batch, invoke, values
-from symrefine.cli.outputs import naming
 from symrefine.cli.tables import batch_table, detection_lines, headline
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
-from symrefine.files import whole
+from symrefine.files import naming, whole
 from symrefine.geometry import random_orthogonal
 from symrefine.journal import Journal
 from symrefine.ntuples import notation

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from symrefine import journal
-from symrefine.cli.outputs import check_beside, check_outputs, console, naming, note, progress, text_writer, write_all
+from symrefine.cli.outputs import check_beside, check_outputs, console, note, progress, text_writer, write_all
 from symrefine.cli.values import add_class_options, add_detection_options, count, positive
 from symrefine.errors import InputError, SymrefineError
+from symrefine.files import naming
 
 if TYPE_CHECKING:
     from symrefine.detection.result import Detection

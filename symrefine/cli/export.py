@@ -44,12 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--to", required=True, choices=tuple(_OPTIONS), help="what to write")
     parser.add_argument("--out", required=True, metavar="OUT", help="file, or folder for " + ", ".join(_FOLDERS))
     parser.add_argument("--id", type=natural, metavar="N", help="number of the object in models_info.json (default: 1)")
-    parser.add_argument(
-        "--scale",
-        type=positive,
-        metavar="X",
-        help="millimetres in one unit of PATH: 1000 for metres (default: 1)",
-    )
+    scaled = "millimetres in one unit of PATH: 1000 for metres (default: 1)"
+    parser.add_argument("--scale", type=positive, metavar="X", help=scaled)
     parser.add_argument("--improper", action="store_true", default=None, help="npz: mirrors and the like too")
     parser.add_argument("--steps", type=count, metavar="N", help="npz: turns for a continuous axis (default: 72)")
     parser.add_argument(
@@ -95,7 +91,11 @@ def _check(args: argparse.Namespace) -> None:
             users = ", ".join(name for name, options in _OPTIONS.items() if option in options)
             raise InputError(f"--{option}: does not apply to --to {args.to}; it is for {users}")
     if args.to in _FOLDERS:
-        _check_folder(Path(args.out))
+        out = Path(args.out)
+        if out.exists() and not out.is_dir():
+            raise InputError(f"--out {out}: is a file; expected a folder")
+        if not out.parent.is_dir():
+            raise InputError(f"--out {out}: cannot be made: there is no directory {out.parent}")
         return
     outputs = {"--out": args.out, "--transform": str(_transform(args)) if args.to == "canonical" else None}
     check_outputs(outputs, [Path(args.path)])
@@ -116,13 +116,6 @@ def _check_names(args: argparse.Namespace) -> None:
         check_suffix(out)
         if _transform(args).suffix.lower() not in (".json", ".npz"):
             raise InputError(f"--transform {args.transform}: expected a name that ends in .json or .npz")
-
-
-def _check_folder(out: Path) -> None:
-    if out.exists() and not out.is_dir():
-        raise InputError(f"--out {out}: is a file; expected a folder")
-    if not out.parent.is_dir():
-        raise InputError(f"--out {out}: cannot be made: there is no directory {out.parent}")
 
 
 def _check_files(args: argparse.Namespace, package: "Package") -> None:

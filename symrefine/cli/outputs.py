@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from symrefine.errors import InputError
-from symrefine.files import check_target, json_text, replacing
+from symrefine.files import check_target, json_text, naming, replacing
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -57,24 +57,6 @@ def write_all(writers: dict[str, Writer]) -> None:
         for name, write in writers.items():
             stack.enter_context(naming(name))
             write(stack.enter_context(replacing(Path(name))))
-
-
-@contextmanager
-def naming(name: str) -> Iterator[None]:
-    """Name the file that could not be written: the system names none, or its draft.
-
-    Raises:
-        InputError: the disk is full, or the like.
-    """
-    try:
-        yield
-    except BrokenPipeError:
-        raise
-    except (OSError, InputError) as error:
-        reason = error if isinstance(error, OSError) else error.__cause__
-        if not isinstance(reason, OSError):
-            raise
-        raise InputError(f"{name}: cannot be written: {reason.strerror or reason}") from None
 
 
 def text_writer(text: str) -> Writer:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symrefine.errors import InputError
-from symrefine.geometry import Array, frame_with_z, read_only, rotation
+from symrefine.geometry import Array, ReadOnly, frame_with_z, rotation
 from symrefine.groups import PointGroup
 from symrefine.groups.standard import GOLDEN
 from symrefine.moments.quadrature import mesh_nodes
@@ -30,7 +30,7 @@ _DEGREE = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Canonical:
+class Canonical(ReadOnly):
     """A canonical pose: `canonical = rotation (x - center)` for x in the units of the file.
 
     Attributes:
@@ -42,10 +42,6 @@ class Canonical:
     rotation: Array
     center: Array
     group: PointGroup
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", read_only(self.rotation))
-        object.__setattr__(self, "center", read_only(self.center))
 
     def matrix(self, scale: float = 1.0) -> Array:
         """The transform [4, 4] from the file to the canonical pose, `scale` units there for one of the file."""

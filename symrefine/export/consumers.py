@@ -48,7 +48,7 @@ def reading(consumer: Consumer, group: PointGroup, points: Array) -> Reading:
     Args:
         points: [N, 3] vertices in the canonical pose, in millimetres.
     """
-    found = _READINGS[consumer](group, points)
+    found = CONSUMERS[consumer][0](group, points)
     return replace(found, notes=(*reflections_left_out(group), *found.notes))
 
 
@@ -153,16 +153,10 @@ def _is_sphere(group: PointGroup) -> bool:
     return group.symbol.family in ("K", "Kh")
 
 
-_READINGS: dict[str, Callable[[PointGroup, Array], Reading]] = {
-    "foundationpose": _foundationpose,
-    "megapose": _megapose,
-    "dope": _dope,
-    "isaac": _isaac,
-}
-# What their models are written as, and in how many units a metre.
-MODELS: dict[str, tuple[str, float]] = {
-    "foundationpose": (".ply", 1000.0),
-    "megapose": (".ply", 1000.0),
-    "dope": (".obj", 1.0),
-    "isaac": (".obj", 1.0),
+# How each reads, what its models are written as, and in how many units a metre.
+CONSUMERS: dict[str, tuple[Callable[[PointGroup, Array], Reading], str, float]] = {
+    "foundationpose": (_foundationpose, ".ply", 1000.0),
+    "megapose": (_megapose, ".ply", 1000.0),
+    "dope": (_dope, ".obj", 1.0),
+    "isaac": (_isaac, ".obj", 1.0),
 }

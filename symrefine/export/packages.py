@@ -11,7 +11,7 @@ from symrefine.detection.result import Detection
 from symrefine.errors import InputError
 from symrefine.export.bop import bop_entry, bop_limits, bop_text, decided
 from symrefine.export.canonical import Canonical, canonical_pose
-from symrefine.export.consumers import MODELS, Consumer, reading
+from symrefine.export.consumers import CONSUMERS, Consumer, reading
 from symrefine.export.models import check_suffix, model_bytes, moved, npz_bytes
 from symrefine.export.operations import motions_bytes, motions_limits, reflections_left_out
 from symrefine.files import json_text
@@ -66,7 +66,7 @@ def consumer_package(
         scale: millimetres in one unit of the shape.
     """
     pose = canonical_pose(*decided(detection, shape), shape)
-    suffix, per_metre = MODELS[consumer]
+    _, suffix, per_metre = CONSUMERS[consumer]
     found = reading(consumer, pose.group, pose.apply(shape.points, scale))
     stem = f"obj_{number:06d}" if found.models_info is not None else "model"
     unit = scale * per_metre / 1000.0

@@ -142,7 +142,14 @@ def _flatten(scene: Any) -> Content:
     fields = {"color": np.concatenate(colours)} if colours and len(colours) == len(meshes) + len(clouds) else {}
     if not meshes:
         return Content(points=np.concatenate(clouds) if clouds else np.empty((0, 3)), point_fields=fields)
-    return _join(meshes, fields)
+    shifts = np.cumsum([0] + [len(points) for points, _ in meshes[:-1]])
+    joined = np.concatenate([faces + shift for (_, faces), shift in zip(meshes, shifts, strict=True)])
+    return Content(
+        points=np.concatenate([points for points, _ in meshes]),
+        faces=Polygons(corners=joined.ravel(), counts=np.full(len(joined), 3)),
+        point_fields=fields,
+        split=True,
+    )
 
 
 def _colours(part: Any) -> list[Values]:
@@ -151,14 +158,3 @@ def _colours(part: Any) -> list[Values]:
         return []
     colours = np.asarray(part.visual.vertex_colors)  # those of clouds may be empty
     return [colours[:, :3]] if colours.ndim == 2 and len(colours) == len(part.vertices) else []
-
-
-def _join(meshes: list[tuple[Array, Index]], fields: dict[str, Values]) -> Content:
-    shifts = np.cumsum([0] + [len(points) for points, _ in meshes[:-1]])
-    faces = np.concatenate([faces + shift for (_, faces), shift in zip(meshes, shifts, strict=True)])
-    return Content(
-        points=np.concatenate([points for points, _ in meshes]),
-        faces=Polygons(corners=faces.ravel(), counts=np.full(len(faces), 3)),
-        point_fields=fields,
-        split=True,
-    )

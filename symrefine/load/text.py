@@ -52,18 +52,17 @@ def parse_table(
     """
     if not lines:
         return np.empty((0, max(columns, default=0)))
-    if not all(text for _, text in lines):
-        # NumPy would leave the row out.
-        _explain(lines, columns, layout, delimiter)
+    fault: object = "an empty row"
     try:
-        table = np.loadtxt([text for _, text in lines], comments=None, delimiter=delimiter, ndmin=2)
+        if all(text for _, text in lines):  # NumPy would leave an empty row out
+            table = np.loadtxt([text for _, text in lines], comments=None, delimiter=delimiter, ndmin=2)
+            if not columns or table.shape[1] in columns:
+                return table
     except ValueError as error:
-        # NumPy counts rows, not lines, and stops at the first fault of any kind: look again, slowly, for a message.
-        _explain(lines, columns, layout, delimiter)
-        raise InputError(f"{error}; expected {layout}") from None
-    if columns and table.shape[1] not in columns:
-        _explain(lines, columns, layout, delimiter)
-    return table
+        fault = error
+    # NumPy counts rows, not lines, and stops at the first fault of any kind: look again, slowly, for a message.
+    _explain(lines, columns, layout, delimiter)
+    raise InputError(f"{fault}; expected {layout}")
 
 
 def parse_integers(line: Line, what: str) -> list[int]:

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from symrefine.geometry import Array, read_only, unit
+from symrefine.geometry import Array, ReadOnly, unit
 from symrefine.picture.scene import Scene
 
 ELEVATIONS_DEG = (22, 26, 30, 34)
@@ -16,17 +16,13 @@ OPEN, FRONTAL = 0.35, 0.8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Camera:
+class Camera(ReadOnly):
     """Pinhole camera at `eye` [3], looking at `target` [3], with `up` [3] upwards; `fov_rad` spans the height."""
 
     eye: Array
     target: Array
     up: Array
     fov_rad: float
-
-    def __post_init__(self) -> None:
-        for name in ("eye", "target", "up"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def frame(self) -> Array:

@@ -45,15 +45,9 @@ def _row(name: str, colour: Colour, kind: str, vector: str, found: FoundPlane | 
 
 def near_miss_rows(detection: Detection) -> list[Row]:
     """Candidates turned down, best first."""
-    return [
-        Row(
-            name=str(k),
-            colour=MISS,
-            kind=kind_name(m.kind, m.order)
-            + (f" {order_name(m.order, m.kind == 'improper')}" if m.kind in ("axis", "improper") else ""),
-            vector=direction(m.direction),
-            residual=m.residual,
-            score=m.excess,
-        )
-        for k, m in enumerate(detection.near_misses, start=1)
-    ]
+    rows = []
+    for k, m in enumerate(detection.near_misses, start=1):
+        order = f" {order_name(m.order, m.kind == 'improper')}" if m.kind in ("axis", "improper") else ""
+        kind, where = kind_name(m.kind, m.order) + order, direction(m.direction)
+        rows.append(Row(name=str(k), colour=MISS, kind=kind, vector=where, residual=m.residual, score=m.excess))
+    return rows

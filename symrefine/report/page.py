@@ -8,7 +8,7 @@ from importlib.metadata import version
 
 from symrefine.detection.result import Detection
 from symrefine.ntuples.rank import SIGNIFICANT
-from symrefine.picture.measures import inlier_series, rms_series, turn_series_deg
+from symrefine.picture.measures import rms_series, series, turn_series_deg
 from symrefine.picture.rows import Row, found_rows, near_miss_rows
 from symrefine.picture.words import coordinates, fit, headline, meaning, percent, symbol, tuples_meaning
 from symrefine.report.charts import bar_chart, line_chart
@@ -153,7 +153,7 @@ def _convergence(d: Detection) -> str:
     charts = (
         _chart("Turn of the frame [degrees]", turns, "°", "#d55e00", log=True),
         _chart("RMS residual [% of the diagonal]", misses, " %", "#0072b2"),
-        _chart("Pairs in agreement", inlier_series(d.history), "", "#009e73"),
+        _chart("Pairs in agreement", series(d.history, "inliers"), "", "#009e73"),
     )
     return _section("How the refinement converged", told, f'<div class="charts">{"".join(charts)}</div>')
 

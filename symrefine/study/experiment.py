@@ -79,17 +79,9 @@ def load_experiment(name: str, root: Path) -> Experiment:
         kinds = get_args(kind) if isinstance(kind, UnionType) else (kind,)
         if not set(kinds) <= {int, float, str, bool, NoneType}:
             raise InputError(f"{name}.Case.{field}: is {kind}; fields are int, float, str or bool")
-    return Experiment(
-        name=name,
-        root=root,
-        case=case,
-        hints=hints,
-        run=module.run,
-        check=getattr(module, "check", None),
-        trace=getattr(module, "trace", None),
-        record=getattr(module, "record", None),
-        measured=frozenset(getattr(module, "MEASURED", ())),
-    )
+    optional: dict[str, Any] = {part: getattr(module, part, None) for part in ("check", "trace", "record")}
+    measured = frozenset(getattr(module, "MEASURED", ()))
+    return Experiment(name=name, root=root, case=case, hints=hints, run=module.run, measured=measured, **optional)
 
 
 def _import(name: str, root: Path) -> ModuleType:

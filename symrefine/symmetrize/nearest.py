@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from symrefine.errors import DegenerateShapeError, InputError
-from symrefine.geometry import Array, orthogonal_factor, read_only, tight_diagonal, unit
+from symrefine.geometry import Array, ReadOnly, orthogonal_factor, tight_diagonal, unit
 from symrefine.groups import PointGroup
 from symrefine.shape import Index, Shape
 from symrefine.surface.skin import FEW
@@ -42,7 +42,7 @@ Method = Literal["vertices", "orbits", "surface"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Symmetrized:
+class Symmetrized(ReadOnly):
     """A shape made symmetric.
 
     Attributes:
@@ -70,9 +70,6 @@ class Symmetrized:
     rms: float
     residual: float
     diagonal: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "center", read_only(self.center))
 
 
 def symmetrize(

@@ -1,23 +1,20 @@
 """How a recording looks when it opens: the shape on the left, series and texts on the right."""
 
 import math
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import rerun.blueprint as rrb
 
 from symrefine.detection.result import Detection
-from symrefine.fit.refine import Iterate
 from symrefine.picture.camera import look_at
-from symrefine.picture.measures import cost_series, inlier_series, step_series, turn_series_deg
 from symrefine.picture.scene import Colour, Scene
 
-# Series of the refinement: entity under /series, title, colour and values.
-SERIES: dict[str, tuple[str, Colour, Callable[[Sequence[Iterate]], list[float]]]] = {
-    "turn_deg": ("turn of the frame [deg]", (255, 150, 60), turn_series_deg),
-    "cost": ("cost: mean squared residual", (86, 180, 233), cost_series),
-    "inliers": ("pairs in agreement", (60, 200, 150), inlier_series),
-    "step": ("step [rad, RMS radii]", (220, 130, 190), step_series),
+# Series of the refinement: entity under /series, title and colour.
+SERIES: dict[str, tuple[str, Colour]] = {
+    "turn_deg": ("turn of the frame [deg]", (255, 150, 60)),
+    "cost": ("cost: mean squared residual", (86, 180, 233)),
+    "inliers": ("pairs in agreement", (60, 200, 150)),
+    "step": ("step [rad, RMS radii]", (220, 130, 190)),
 }
 # What the viewer's camera spans unless told otherwise, and the share of it that is filled.
 FOV_RAD, FILL = math.radians(55.0), 0.78
@@ -65,7 +62,7 @@ def _series() -> Any:
     hidden = rrb.PlotLegend(visible=False)
     views = [
         rrb.TimeSeriesView(origin=f"/series/{name}", name=title.split(":")[0], plot_legend=hidden)
-        for name, (title, *_) in SERIES.items()
+        for name, (title, _) in SERIES.items()
     ]
     views.insert(1, rrb.TimeSeriesView(origin="/series/theta_deg", name="theta [deg]"))
     return rrb.Tabs(*views, active_tab=0)

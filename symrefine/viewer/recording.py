@@ -22,7 +22,7 @@ from symrefine.files import whole
 from symrefine.fit.refine import Iterate
 from symrefine.geometry import Array, Plane
 from symrefine.moments.quadrature import triangle_areas_and_normals
-from symrefine.picture.measures import theta_series_deg
+from symrefine.picture.measures import series, theta_series_deg, turn_series_deg
 from symrefine.picture.scene import AXIS as DARK
 from symrefine.picture.scene import MISS, OBJECT, Colour, Line, Quad, Scene, make_scene, plane_colour
 from symrefine.shape import Shape
@@ -233,8 +233,8 @@ def _log_pairs(stream: Any, detection: Detection, scene: Scene, before: Iterate,
 
 def _log_series(stream: Any, detection: Detection) -> None:
     history = detection.history
-    for name, (title, colour, series) in SERIES.items():
-        if values := series(history):
+    for name, (title, colour) in SERIES.items():
+        if values := turn_series_deg(history) if name == "turn_deg" else series(history, name):
             _send(stream, f"series/{name}", title, colour, values)
     for k, column in enumerate(theta_series_deg(history)):
         _send(stream, f"series/theta_deg/{k + 1}", f"theta {k + 1} [deg]", _bright(plane_colour(k)), column)
