@@ -60,10 +60,8 @@ def run(args: argparse.Namespace) -> int:
     options = {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed}
     options |= {name: given for name in ("labels", "weights") if (given := getattr(args, name)) is not None}
     with opened(Path(args.out)) if args.out else nullcontext() as out:
-        latest = {row["file"]: row for row in out.rows} if out else {}
-        rows = {
-            name: latest[name] for name in files if name in latest and _holds(latest[name], args.dir, options, scale)
-        }
+        latest = {row["file"]: row for row in out.rows if row["file"] in files} if out else {}
+        rows = {name: row for name, row in latest.items() if _holds(row, args.dir, options, scale)}
         jobs = [(args.dir, name, options, scale) for name in files if name not in rows]
         with progress("detecting", len(files), len(rows)) as advance:
             for row in _rows(jobs, args.workers):
@@ -72,9 +70,14 @@ def run(args: argparse.Namespace) -> int:
                         out.append(row)
                 rows[row["file"]] = row
                 advance()
-    _print([rows[name] for name in files], len(files) - len(jobs))
+    from symrefine.cli.tables import batch_table
+
+    screen, kept, failed = console(), len(files) - len(jobs), sum(row["error"] is not None for row in rows.values())
+    screen.print(batch_table([rows[name] for name in files]))
+    parts = [f"{len(files)} files", f"{kept} done before" if kept else "", f"{failed} failed" if failed else ""]
+    screen.print(", ".join(part for part in parts if part))
     left_out = _write_bop(args.bop, rows) if args.bop else 0
-    return int(left_out > 0 or any(row["error"] is not None for row in rows.values()))
+    return int(left_out > 0 or failed > 0)
 
 
 def _check_bop(args: argparse.Namespace, files: list[str]) -> float | None:
@@ -210,13 +213,3 @@ def _bop(found: "Detection | PlanarDetection", shape: "Shape", scale: float) -> 
         return {"scale": scale, "note": str(error)}
     limits = bop_limits(detection)
     return {"scale": scale, "entry": entry, "note": f"{shape.source}: {limits}" if limits else None}
-
-
-def _print(rows: list[Row], kept: int) -> None:
-    from symrefine.cli.tables import batch_table
-
-    failed = sum(row["error"] is not None for row in rows)
-    out = console()
-    out.print(batch_table(rows))
-    parts = [f"{len(rows)} files", f"{kept} done before" if kept else "", f"{failed} failed" if failed else ""]
-    out.print(", ".join(part for part in parts if part))

@@ -43,13 +43,10 @@ def run(args: argparse.Namespace) -> int:
 
     with waiting("deriving"):
         basis = _basis(args)
-    if args.json == STDOUT:
-        say(notation.to_json(basis))
-        return 0
-    if args.json is not None:
+    if args.json not in (None, STDOUT):
         write_all({args.json: text_writer(notation.to_json(basis))})
     write = notation.to_latex if args.latex else notation.to_python if args.python else notation.to_text
-    say(write(basis))
+    say((notation.to_json if args.json == STDOUT else write)(basis))
     return 0
 
 

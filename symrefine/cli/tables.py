@@ -147,10 +147,8 @@ def hyperplane_lines(record: Record) -> Iterator[Table | str]:
     if record["incomplete"]:
         yield f"there may be more: {record['incomplete']}"
     yield f"n-tuples of rank {record['ntuples']['rank']}; turns are not looked for in {dim} dimensions"
-    yield from _apart(
-        _hyperplanes("hyperplanes: normal", found, record),
-        _hyperplanes("turned down: normal", record["rejected"], record),
-    )
+    titled = {"hyperplanes: normal": found, "turned down: normal": record["rejected"]}
+    yield from _apart(*(_hyperplanes(title, candidates, record) for title, candidates in titled.items()))
     yield ""
     yield "Offsets in units of the file, asymmetry and noise in % of the moments, largest miss in % of the diameter."
     yield f"{_seconds(record)} s"

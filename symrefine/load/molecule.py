@@ -12,9 +12,8 @@ _SYMBOLS = (
     "Hg Tl Pb Bi Po At Rn Fr Ra Ac Th Pa U Np Pu Am Cm Bk Cf Es Fm Md No Lr Rf Db Sg Bh Hs Mt Ds Rg Cn Nh Fl Mc Lv Ts "
     "Og"
 ).split()
-_NUMBERS = {symbol: number for number, symbol in enumerate(_SYMBOLS, start=1)}
 # Heavy hydrogen is told apart, as it is where vibrations or spins matter: D is no H.
-_ISOTOPES = {"D": -2, "T": -3}
+_NUMBERS = {symbol: number for number, symbol in enumerate(_SYMBOLS, start=1)} | {"D": -2, "T": -3}
 _LAYOUT = "an element and x y z, as 'O 0.0 0.0 0.1'"
 
 
@@ -59,14 +58,10 @@ def read_molecule(data: bytes) -> Content:
 def _element(line: Line) -> int:
     number, text = line
     word = text.split()[0]
-    if NATURAL.fullmatch(word):
-        if 1 <= int(word) <= len(_SYMBOLS):
-            return int(word)
-    else:
-        symbol = word.capitalize()
-        known = _NUMBERS.get(symbol, _ISOTOPES.get(symbol))
-        if known is not None:
-            return known
+    whole = int(word) if NATURAL.fullmatch(word) else 0
+    known = whole if 1 <= whole <= len(_SYMBOLS) else _NUMBERS.get(word.capitalize())
+    if known is not None:
+        return known
     raise InputError(
         f"line {number}: {shorten(word)} is no element; expected a symbol (H, He, ... Og, D, T) or an atomic "
         f"number from 1 to {len(_SYMBOLS)}"
