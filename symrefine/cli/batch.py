@@ -59,12 +59,14 @@ def run(args: argparse.Namespace) -> int:
     scale = _check_bop(args, files)
     options = {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed}
     options |= {name: given for name in ("labels", "weights") if (given := getattr(args, name)) is not None}
+    from symrefine.study.work import in_processes
+
     with opened(Path(args.out)) if args.out else nullcontext() as out:
         latest = {row["file"]: row for row in out.rows if row["file"] in files} if out else {}
         rows = {name: row for name, row in latest.items() if _holds(row, args.dir, options, scale)}
         jobs = [(args.dir, name, options, scale) for name in files if name not in rows]
         with progress("detecting", len(files), len(rows)) as advance:
-            for row in _rows(jobs, args.workers):
+            for row in in_processes(examine_file, jobs, args.workers):
                 if out:
                     with naming(args.out):
                         out.append(row)
@@ -168,16 +170,6 @@ def _files(folder: Path, *, recursive: bool) -> list[str]:
     if not shown:
         raise InputError(f"{folder}: no mesh and no cloud in it; known are {' '.join(sorted(READERS))}")
     return shown
-
-
-def _rows(jobs: list[Job], workers: int) -> Iterator[Row]:
-    """A row for each job, as soon as it is done."""
-    if workers == 1 or len(jobs) < 2:
-        yield from map(examine_file, jobs)
-        return
-    from symrefine.study.work import in_processes
-
-    yield from in_processes(examine_file, jobs, workers)
 
 
 def examine_file(job: Job) -> Row:

@@ -89,47 +89,37 @@ def _dope(group: PointGroup, points: Array) -> Reading:
 
 def _isaac(group: PointGroup, _: Array) -> Reading:
     """ROS parameters: all products Rz Ry Rx of the listed angles about x, y and z count as symmetries."""
-    proper = group.proper_subgroup()
-    names, count = _isaac_strings(proper)
+    names, notes = _isaac_strings(group.proper_subgroup())
     quoted = ", ".join(f'"{name}"' for name in names)
     text = f"/**:\n  ros__parameters:\n    symmetry_axes: [{quoted}]\n" if names else "/**:\n  ros__parameters: {}\n"
-    return Reading(name="symmetry_axes.yaml", content=text.encode(), notes=_isaac_notes(proper, count))
+    return Reading(name="symmetry_axes.yaml", content=text.encode(), notes=notes)
 
 
-def _isaac_notes(proper: PointGroup, count: int) -> tuple[str, ...]:
+def _isaac_strings(proper: PointGroup) -> tuple[list[str], tuple[str, ...]]:
+    """Strings whose products are all in the group, as many as can be, and what they do not say of it."""
     if _is_sphere(proper):
-        return ("a sphere is read as products of turns by 30 degrees about z, y and x",)
+        note = "a sphere is read as products of turns by 30 degrees about z, y and x"
+        return [f"{axis}_full" for axis in "xyz"], (note,)
     if not proper.is_finite:
-        return ("a continuous axis is read as turns by 30 degrees",)
-    if count < proper.order:
-        left = int(proper.order) - count
-        return (f"{left} of {int(proper.order)} rotations left out: no product of turns about x, y and z gives them",)
-    return ()
-
-
-def _isaac_strings(proper: PointGroup) -> tuple[list[str], int]:
-    """Strings whose products are all in the group, and how many different rotations these products are."""
-    if _is_sphere(proper):
-        return [f"{axis}_full" for axis in "xyz"], 0
-    if not proper.is_finite:
-        return (["x_180"] if proper.symbol.family == "D" else []) + ["z_full"], 0
+        half = ["x_180"] if proper.symbol.family == "D" else []
+        return [*half, "z_full"], ("a continuous axis is read as turns by 30 degrees",)
     angles = {axis: _angles(proper, direction) for axis, direction in zip("xyz", np.eye(3), strict=True)}
-    best = max(_allowed(angles), key=lambda chosen: _products_inside(proper, chosen))
+    # All angles about some of the axes, none about the others.
+    allowed = [
+        {axis: angles[axis] if axis in kept else [] for axis in angles} for kept in ("z", "xz", "xyz", "x", "y", "")
+    ]
+    best = max(allowed, key=lambda chosen: _products_inside(proper, chosen))
     names = [f"{axis}_{angle:.9g}" for axis, degrees in best.items() for angle in degrees]
-    return names, _products_inside(proper, best)
+    order = int(proper.order)
+    left = order - _products_inside(proper, best)
+    note = f"{left} of {order} rotations left out: no product of turns about x, y and z gives them"
+    return names, (note,) * (left > 0)
 
 
 def _angles(proper: PointGroup, axis: Array) -> list[float]:
     """Angles in degrees, other than 0, by which the group turns about an axis."""
     order = max((n for u, n in proper.rotation_axes() if abs(float(u @ axis)) > 1.0 - 1e-9), default=1)
     return [360.0 * k / order for k in range(1, int(order))]
-
-
-def _allowed(angles: dict[str, list[float]]) -> list[dict[str, list[float]]]:
-    """All angles about some of the axes, none about the others."""
-    return [
-        {axis: angles[axis] if axis in kept else [] for axis in angles} for kept in ("z", "xz", "xyz", "x", "y", "")
-    ]
 
 
 def _products_inside(proper: PointGroup, chosen: dict[str, list[float]]) -> int:

@@ -8,7 +8,6 @@ smoothed away, unless the picture is binary.
 
 import io
 import warnings
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -80,8 +79,9 @@ def pixel_weights(grey: Array, *, threshold: Threshold | None = None, invert: bo
     border = np.concatenate([grey[0], grey[-1], grey[1:-1, 0], grey[1:-1, -1]])
     levels = np.unique(grey)
     if len(levels) <= 2:
-        background = _majority([border == level for level in levels], [grey == level for level in levels])
-        return ((grey != levels[background]) != invert).astype(np.float64)
+        # The level that most of the border has; of the whole picture if that is a tie; then the lightest.
+        votes = [(int((border == level).sum()), int((grey == level).sum()), k) for k, level in enumerate(levels)]
+        return ((grey != levels[max(votes)[-1]]) != invert).astype(np.float64)
     level = float(np.median(border))
     scatter = 1.4826 * float(np.median(np.abs(border - level)))
     contrast = np.abs(grey - level)
@@ -120,12 +120,6 @@ def otsu(grey: Array) -> float:
     # Between two clean levels every threshold is as good: take the middle of them.
     best = np.flatnonzero(score >= score.max() * (1.0 - 1e-12))
     return float(edges[1 + best[[0, -1]]].mean())
-
-
-def _majority(border: Sequence[NDArray[np.bool_]], everywhere: Sequence[NDArray[np.bool_]]) -> int:
-    """Index of the level that most of the border has; of the whole picture if that is a tie; then the lightest."""
-    votes = [(int(on.sum()), int(over.sum()), k) for k, (on, over) in enumerate(zip(border, everywhere, strict=True))]
-    return max(votes)[-1]
 
 
 def _open(data: bytes, suffix: str) -> "Image":

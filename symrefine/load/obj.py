@@ -49,9 +49,13 @@ def read_obj(data: bytes) -> Content:
     if not faces and "l" in other:
         raise InputError(f"line {other['l']}: lines but no faces; expected faces, or vertices alone")
     table = _vertices(vertices)
+    of_points = normals if not faces else []  # those of a cloud belong to the points in their order
+    if of_points and len(normals) != len(vertices):
+        told = count(len(normals), "normal")
+        raise InputError(f"{told} (vn) for {len(vertices)} points (v); expected as many")
     return Content(
         points=table[:, :3],
-        normals=_normals(normals, len(vertices)) if normals and not faces else None,
+        normals=parse_table(of_points, columns=(3,), layout="vn x y z") if of_points else None,
         faces=polygons(corners for _, corners in faces) if faces else None,
         point_fields={"color": table[:, 3:]} if table.shape[1] == 6 else {},
         face_fields={"material": np.array(materials)} if any(materials) else {},
@@ -83,13 +87,6 @@ def _vertices(lines: list[Line]) -> Array:
     if table.shape[1] == 4 and (bad := np.flatnonzero(table[:, 3] != 1.0)).size:
         raise InputError(f"line {lines[bad[0]][0]}: weight {table[bad[0], 3]} of a rational vertex; expected 1 or none")
     return table if table.shape[1] == 6 else table[:, :3]
-
-
-def _normals(lines: list[Line], points: int) -> Array:
-    """Normals of a cloud, which belong to the points in their order."""
-    if len(lines) != points:
-        raise InputError(f"{count(len(lines), 'normal')} (vn) for {points} points (v); expected as many")
-    return parse_table(lines, columns=(3,), layout="vn x y z")
 
 
 def _face(line: Line, vertices: int) -> list[int]:

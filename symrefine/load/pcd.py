@@ -50,27 +50,21 @@ def read_pcd(data: bytes, path: Path) -> Content:
     header = _parse_header(data)
     normals = set(_NORMAL) <= set(header.names)
     wanted = [*_COORDINATES, *(_NORMAL if normals else ())]
-    places, others = len(wanted), _others(header)
+    places = len(wanted)
+    single = [name for name, size in zip(header.names, header.counts, strict=True) if size == 1]
+    others = [name for name in single if name not in _NOT_FIELDS and header.names.count(name) == 1]
     if header.encoding == "ascii":
         table, lines = _read_text(data, header, [*wanted, *others])
     elif header.encoding == "binary":
         table, lines = _read_binary(data, header, [*wanted, *others]), None
     else:
-        table, lines = _read_compressed(data, path, header, wanted), None
+        table, lines, others = _read_compressed(data, path, header, wanted), None, []
     return Content(
         points=table[:, :3],
         normals=table[:, 3:6] if normals else None,
         point_fields={name: table[:, k] for k, name in enumerate(others, start=places)},
         point_lines=lines,
     )
-
-
-def _others(header: _Header) -> list[str]:
-    """Names of the fields that may label the points."""
-    if header.encoding == "binary_compressed":
-        return []
-    names = [name for name, size in zip(header.names, header.counts, strict=True) if size == 1]
-    return [name for name in names if name not in _NOT_FIELDS and header.names.count(name) == 1]
 
 
 def _parse_header(data: bytes) -> _Header:

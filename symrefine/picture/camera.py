@@ -49,7 +49,11 @@ def look_at(scene: Scene, *, aspect: float, fov_rad: float, fill: float = 0.92) 
         fov_rad: angle that the height of the image spans.
         fill: share of the image that may be used.
     """
-    back = _line_of_sight(scene)
+    # The direction from the shape to the eye is the best of a grid.
+    angles = np.radians(list(product(ELEVATIONS_DEG, range(0, 360, AZIMUTH_STEP_DEG))))
+    level = [(math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)) for e, a in angles]
+    candidates = np.array(level) @ scene.stage.frame
+    back = candidates[int(np.argmax(np.round(_merit(candidates, scene), 4)))]
     frame = _frame(back, scene.stage.frame[2])
     sheets = [] if scene.crowded else [q.corners for q in scene.planes]
     corners = np.concatenate([scene.stage.points, *sheets, *(a.ends for a in scene.axes)]) @ frame.T
@@ -68,15 +72,6 @@ def _frame(back: Array, up: Array) -> Array:
     back = unit(back)
     right = unit(np.cross(up, back))
     return np.stack([right, np.cross(back, right), back])
-
-
-def _line_of_sight(scene: Scene) -> Array:
-    """Direction from the shape to the eye: the best of a grid."""
-    angles = np.radians(list(product(ELEVATIONS_DEG, range(0, 360, AZIMUTH_STEP_DEG))))
-    level = [(math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)) for e, a in angles]
-    candidates = np.array(level) @ scene.stage.frame
-    best = int(np.argmax(np.round(_merit(candidates, scene), 4)))
-    return np.asarray(candidates[best])
 
 
 def _merit(candidates: Array, scene: Scene) -> Array:

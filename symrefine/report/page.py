@@ -9,7 +9,7 @@ from importlib.metadata import version
 from symrefine.detection.result import Detection
 from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.picture.measures import rms_series, series, turn_series_deg
-from symrefine.picture.rows import Row, found_rows, near_miss_rows
+from symrefine.picture.rows import found_rows, near_miss_rows
 from symrefine.picture.words import coordinates, fit, headline, meaning, percent, symbol, tuples_meaning
 from symrefine.report.charts import bar_chart, line_chart
 from symrefine.report.style import STYLE
@@ -80,7 +80,7 @@ def _facts(d: Detection, shape: Shape) -> str:
 def _found(d: Detection) -> str:
     rows = [
         (
-            _swatch(r),
+            f'<b class="swatch" style="background:rgb{r.colour}">{escape(r.name)}</b>',
             r.kind,
             _code(r.vector),
             *_misses(r.residual),
@@ -208,10 +208,6 @@ def _bar(share: float) -> str:
     """A bar of up to 1.25 times what is allowed, with a mark there."""
     width = 80.0 * min(max(share, 0.01), 1.25)
     return f'<span class="bar" title="{100 * share:.0f} % of what is allowed"><i style="width:{width:.1f}%"></i></span>'
-
-
-def _swatch(row: Row) -> str:
-    return f'<b class="swatch" style="background:rgb{row.colour}">{escape(row.name)}</b>'
 
 
 def _code(text: str) -> str:

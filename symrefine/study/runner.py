@@ -15,7 +15,6 @@ from symrefine.study.experiment import Row
 from symrefine.study.figures import check_figures, draw
 from symrefine.study.journal import Entry, Stamp, opened
 from symrefine.study.plan import Plan, matches, select
-from symrefine.study.schema import Figure
 from symrefine.study.summary import Measure, check_columns
 from symrefine.study.tables import check_tables, csv_text, markdown
 from symrefine.study.versions import code_version, library_versions
@@ -49,11 +48,6 @@ class Outcome:
     failed: int
 
 
-def no_progress(_text: str, _total: int, _done: int) -> AbstractContextManager[Callable[[], None]]:
-    """Nobody looks on."""
-    return nullcontext(lambda: None)
-
-
 def run_study(
     plan: Plan,
     folder: Path,
@@ -61,7 +55,7 @@ def run_study(
     workers: int = 1,
     limit: int | None = None,
     replace: bool = False,
-    progress: Progress = no_progress,
+    progress: Progress = lambda *_: nullcontext(lambda: None),
 ) -> Outcome:
     """Run what is not done yet and write what the config asks for.
 
@@ -175,7 +169,10 @@ def _figures(
     for figure in plan.study.figures:
         path = folder / f"{_slug(figure.title)}.png"
         source = iterations if figure.kind == "convergence" else rows
-        _check_trace(figure, source)
+        known = {name: None for row in source for name in row}
+        for key in ("x", "y") if figure.kind == "convergence" and source else ():
+            if (name := getattr(figure, key)) not in known:
+                raise figure.node.at(key).error(f"no iteration has {name!r}; there are {' '.join(known)}")
         with replacing(path) as draft:
             draw(figure, source, plan.experiment, draft)
         written[figure.title] = path
@@ -200,13 +197,6 @@ def _picked(plan: Plan, cases: Sequence[Any], wheres: Sequence[Node]) -> list[An
     """The cases that one of the selections picks."""
     picks = [select(where, plan.experiment) for where in wheres]
     return [case for case in cases if any(matches(asdict(case), picked) for picked in picks)]
-
-
-def _check_trace(figure: Figure, rows: Sequence[Row]) -> None:
-    known = {name: None for row in rows for name in row}
-    for key in ("x", "y") if figure.kind == "convergence" and rows else ():
-        if getattr(figure, key) not in known:
-            raise figure.node.at(key).error(f"no iteration has {getattr(figure, key)!r}; there are {' '.join(known)}")
 
 
 def _record(plan: Plan, folder: Path, chosen: Sequence[Any], progress: Progress) -> None:

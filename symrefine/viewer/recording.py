@@ -55,8 +55,10 @@ def record(detection: Detection, shape: Shape, path: Path | str) -> None:
     """
     scene = make_scene(detection, shape)
     with whole(Path(path)) as draft, _errors_of_the_system():
+        # The viewer keeps one layout for each application, so each object is one; rerun allows few characters there.
+        application = "symrefine-" + re.sub(r"[^A-Za-z0-9]+", "-", Path(shape.source).stem)[:60].strip("-")
         identity = _identity(detection, shape)
-        stream = rr.RecordingStream(_application(shape), recording_id=identity, send_properties=False)
+        stream = rr.RecordingStream(application, recording_id=identity, send_properties=False)
         stream.set_log_time_enabled(False)
         stream.set_log_tick_enabled(False)
         stream.save(draft, default_blueprint=blueprint(detection, scene, display_scale(scene)))
@@ -92,11 +94,6 @@ def _log(stream: Any, detection: Detection, shape: Shape, scene: Scene) -> None:
 def display_scale(scene: Scene) -> float:
     """The power of ten that makes the diagonal a number from 1 to 10."""
     return float(10.0 ** -math.floor(math.log10(scene.stage.diagonal)))
-
-
-def _application(shape: Shape) -> str:
-    """The viewer keeps one layout for each application, so each object is one; rerun allows few characters there."""
-    return "symrefine-" + re.sub(r"[^A-Za-z0-9]+", "-", Path(shape.source).stem)[:60].strip("-")
 
 
 def _identity(detection: Detection, shape: Shape) -> str:
