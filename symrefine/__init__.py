@@ -9,48 +9,37 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from symrefine.align.story import Alignment, align
-    from symrefine.detection.result import Detection
-    from symrefine.detection.story import detect
-    from symrefine.errors import DegenerateShapeError, InputError, SymrefineError
-    from symrefine.geometry import Axis, Plane
-    from symrefine.groups import PointGroup, point_group
-    from symrefine.load import load
-    from symrefine.ntuples.derive import derive
-    from symrefine.shape import Shape
+    from symrefine.align.story import Alignment as Alignment
+    from symrefine.align.story import align as align
+    from symrefine.detection.result import Detection as Detection
+    from symrefine.detection.story import detect as detect
+    from symrefine.errors import DegenerateShapeError as DegenerateShapeError
+    from symrefine.errors import InputError as InputError
+    from symrefine.errors import SymrefineError as SymrefineError
+    from symrefine.geometry import Axis as Axis
+    from symrefine.geometry import Plane as Plane
+    from symrefine.groups import PointGroup as PointGroup
+    from symrefine.groups import point_group as point_group
+    from symrefine.load import load as load
+    from symrefine.ntuples.derive import derive as derive
+    from symrefine.shape import Shape as Shape
 
     __version__: str
 
-__all__ = [
-    "load",
-    "detect",
-    "align",
-    "derive",
-    "Shape",
-    "Plane",
-    "Axis",
-    "PointGroup",
-    "point_group",
-    "Detection",
-    "Alignment",
-    "SymrefineError",
-    "InputError",
-    "DegenerateShapeError",
-    "__version__",
-]
-
+# Where each public name comes from.
 _HOMES = {
-    "symrefine.align.story": ("Alignment", "align"),
-    "symrefine.detection.result": ("Detection",),
-    "symrefine.detection.story": ("detect",),
-    "symrefine.errors": ("DegenerateShapeError", "InputError", "SymrefineError"),
-    "symrefine.geometry": ("Axis", "Plane"),
-    "symrefine.groups": ("PointGroup", "point_group"),
     "symrefine.load": ("load",),
+    "symrefine.detection.story": ("detect",),
+    "symrefine.align.story": ("align", "Alignment"),
     "symrefine.ntuples.derive": ("derive",),
     "symrefine.shape": ("Shape",),
+    "symrefine.geometry": ("Plane", "Axis"),
+    "symrefine.groups": ("PointGroup", "point_group"),
+    "symrefine.detection.result": ("Detection",),
+    "symrefine.errors": ("SymrefineError", "InputError", "DegenerateShapeError"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
+__all__ = ["__version__"] + list(_HOME)
 
 
 class _FrontPage(ModuleType):

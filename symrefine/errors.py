@@ -1,5 +1,8 @@
 """What can go wrong, as types: the shell turns each into one line and exit status 2."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class SymrefineError(Exception):
     """Base of every error the package raises on purpose; its text is one clear line."""
@@ -11,3 +14,16 @@ class InputError(SymrefineError, ValueError):
 
 class DegenerateShapeError(SymrefineError, ValueError):
     """The data are valid but do not determine the quantity asked for."""
+
+
+@contextmanager
+def about(what: str) -> Iterator[None]:
+    """Put before every `InputError` raised inside what it is about: a file, or a part of one.
+
+    Raises:
+        InputError: with `what` in front.
+    """
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{what}: {error}") from None

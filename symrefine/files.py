@@ -3,11 +3,13 @@
 A file that grows row by row has one writer at a time.
 """
 
+import json
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from symrefine.errors import InputError
 
@@ -56,11 +58,42 @@ def whole(path: Path) -> Iterator[Path]:
         InputError: the file cannot be written, before or while it is.
     """
     check_target(path)
+    with naming(str(path)), replacing(path) as draft:
+        yield draft
+
+
+@contextmanager
+def naming(name: str) -> Iterator[None]:
+    """Name the file that could not be written: the system names none, or its draft.
+
+    Raises:
+        InputError: the disk is full, or the like.
+    """
     try:
-        with replacing(path) as draft:
-            yield draft
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+        yield
+    except BrokenPipeError:
+        raise
+    except (OSError, InputError) as error:
+        reason = error if isinstance(error, OSError) else error.__cause__
+        if not isinstance(reason, OSError):
+            raise
+        raise InputError(f"{name}: cannot be written: {reason.strerror or reason}") from reason
+
+
+def json_text(data: Mapping[str, Any]) -> str:
+    """Strict JSON in ASCII: a line for each entry, and for each object in a list of objects.
+
+    Raises:
+        ValueError: NaN or infinity, which JSON does not know.
+    """
+    entries = [f"  {json.dumps(key)}: {_entry(value)}" for key, value in data.items()]
+    return "{\n" + ",\n".join(entries) + "\n}\n"
+
+
+def _entry(value: Any) -> str:
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return "[\n" + ",\n".join(f"    {json.dumps(v, allow_nan=False)}" for v in value) + "\n  ]"
+    return json.dumps(value, allow_nan=False)
 
 
 def is_only_writer(descriptor: int) -> bool:

@@ -4,7 +4,7 @@ Conventions: a plane is `n.x = d` with |n| = 1, and (n, d) ~ (-n, -d); an axis i
 direction u ~ -u; `T_a_b` maps b to a.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import Any
 
@@ -35,10 +35,26 @@ def read_only(values: ArrayLike) -> Array:
     return array
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReadOnly:
+    """Base of dataclasses that nobody can write to: every field declared as `Array` holds a private, read-only copy."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if field.type == Array:
+                object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
+
+
 def unit(vector: ArrayLike) -> Array:
     """`vector / |vector|` along the last axis."""
     v = np.asarray(vector, dtype=np.float64)
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+
+def toward_positive(direction: Array) -> float:
+    """The sign, +1.0 or -1.0, that makes the first component of at least a tenth of the largest positive."""
+    size = np.abs(direction)
+    return float(np.copysign(1.0, direction[int(np.argmax(size >= 0.1 * size.max()))]))
 
 
 def _length(vector: ArrayLike, name: str) -> float:

@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 
 import symrefine
-from symrefine.cli import batch, invoke, journal, values
+from symrefine.cli import batch, invoke, values
 from symrefine.cli.tables import batch_table, detection_lines, headline
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
-from symrefine.files import whole
+from symrefine.files import naming, whole
 from symrefine.geometry import random_orthogonal
+from symrefine.journal import Journal
 from symrefine.ntuples import notation
 from symrefine.ntuples.affine import derive_affine
 from symrefine.ntuples.derive import derive
@@ -143,7 +144,7 @@ def test_stdout_holds_the_json_alone_and_equal_runs_give_equal_bytes(data: Path,
 def test_the_table_says_it_in_words_and_without_colour(run: Run, data: Path) -> None:
     status, out, err = run("detect", data / "box.ply")
     assert (status, err) == (0, "")
-    assert "D2h, 3 mirror planes, 3 rotation axes, inversion centre; tolerance 2 %" in out
+    assert "D2h, three mirror planes at right angles; tolerance 2 %" in out
     assert "mirror planes: normal" in out
     assert "% of the diagonal" in out
     assert "\x1b" not in out
@@ -319,8 +320,12 @@ def test_a_full_disk_is_told() -> None:
 def test_a_full_disk_is_told_with_the_file(run: Run, data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told = "symrefine: /dev/full: cannot be written: No space left on device\n"
     assert run("derive", "--dim", 3, "--orders", 3, "--json", "/dev/full") == (2, "", told)
-    with pytest.raises(InputError, match=r"^/dev/full: cannot be written: No space left on device$"):
-        journal.append(Path("/dev/full"), {"file": "a.ply"})
+    with (
+        Path("/dev/full").open("ab", buffering=0) as full,
+        pytest.raises(InputError, match=r"^/dev/full: cannot be written: No space left on device$"),
+        naming("/dev/full"),
+    ):
+        Journal(rows=[], torn=False, descriptor=full.fileno()).append({"file": "a.ply"})
 
     def fail(*_: object) -> None:
         with whole(data / "draft.html"):
@@ -371,12 +376,12 @@ except AttributeError as error:
         ({"point_group": "Cinfv"}, "Cinfv, surface of revolution"),
         ({"point_group": "Cs", "planes": [{"confidence": 0.5}], "axes": []}, "Cs, one mirror plane"),
         ({"point_group": "Ci", "planes": [], "axes": [], "confidence": 0.75},
-         "Ci, an inversion centre; tolerance 2 %, confidence 0.75"),
+         "Ci, an inversion centre, no mirror plane; tolerance 2 %, confidence 0.75"),
         ({"point_group": "C1", "tolerance": 0.005}, "C1, no symmetry; tolerance 0.5 %, confidence "),
         ({"point_group": "C1", "undetermined": "40 points are too few"}, "undetermined: 40 points are too few"),
         ({"point_group": "S4", "planes": [], "inversion": False, "confidence": 0.25,
           "axes": [{"improper": False, "confidence": 0.25}, {"improper": True, "confidence": 0.25}]},
-         "S4, 1 rotation axis, 1 rotoreflection axis; tolerance 2 %, confidence 0.25"),
+         "S4, a four-fold rotoreflection axis, no mirror plane; tolerance 2 %, confidence 0.25"),
     ],
 )  # fmt: skip
 def test_headlines(record: dict[str, Any], changes: dict[str, Any], part: str) -> None:
@@ -580,7 +585,7 @@ def test_batch_goes_on_and_resumes(run: Run, shelf: Path, tmp_path: Path, monkey
 def test_two_batches_cannot_write_to_one_file(run: Run, shelf: Path, tmp_path: Path) -> None:
     pytest.importorskip("fcntl")
     out = tmp_path / "rows.jsonl"
-    with journal.locked(out):
+    with batch.opened(out):
         assert_refused(run("batch", shelf, "--out", out), str(out), "another `symrefine batch` is writing")
         assert out.read_bytes() == b""
     assert run("batch", shelf, "--out", out)[0] == 1
@@ -592,8 +597,8 @@ def test_a_batch_that_was_killed_leaves_no_lock(run: Run, shelf: Path, tmp_path:
     out = tmp_path / "rows.jsonl"
     hold = f"""
 from pathlib import Path
-from symrefine.cli import journal
-with journal.locked(Path({str(out)!r})):
+from symrefine.cli import batch
+with batch.opened(Path({str(out)!r})):
     print("held", flush=True)
     input()
 """

@@ -393,7 +393,7 @@ def square(kind: str) -> bytes:
 @pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
 def test_only_the_coordinates_of_a_ply_file_change(tmp_path: Path, kind: str) -> None:
     data = square(kind)
-    changed = moved(data, ".ply", MATRIX, "square")
+    changed = moved(data, ".ply", MATRIX)
     assert changed is not None
     before, after = tmp_path / "a.ply", tmp_path / "b.ply"
     before.write_bytes(data)
@@ -401,7 +401,7 @@ def test_only_the_coordinates_of_a_ply_file_change(tmp_path: Path, kind: str) ->
     expected = load(before).points @ MATRIX[:3, :3].T + MATRIX[:3, 3]
     np.testing.assert_allclose(load(after).points, expected, rtol=1e-6)
     np.testing.assert_array_equal(load(after).faces, load(before).faces)
-    back = moved(changed, ".ply", np.linalg.inv(MATRIX), "square")
+    back = moved(changed, ".ply", np.linalg.inv(MATRIX))
     assert back is not None
     assert back.split(b"end_header")[0] == data.split(b"end_header")[0]
     if kind == "ascii":
@@ -413,7 +413,7 @@ def test_only_the_coordinates_of_a_ply_file_change(tmp_path: Path, kind: str) ->
 
 
 def test_only_the_coordinates_of_an_obj_file_change(tmp_path: Path) -> None:
-    changed = moved(OBJ.encode(), ".obj", MATRIX, "square")
+    changed = moved(OBJ.encode(), ".obj", MATRIX)
     assert changed is not None
     before, after = OBJ.splitlines(), changed.decode().splitlines()
     same = [k for k, line in enumerate(before) if line.split()[0] not in ("v", "vn")]

@@ -14,10 +14,10 @@ from scipy.spatial import cKDTree
 from symrefine.detection.result import Alternative, Detection, FoundAxis, FoundPlane
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
-from symrefine.export.bop import bop_entry, bop_limits, diameter, read_models_info, write_bop
-from symrefine.export.files import check_target, json_text, replacing
-from symrefine.export.records import detection_record, number, toward_positive
-from symrefine.geometry import Array, Axis, Plane, random_orthogonal, rotation
+from symrefine.export.bop import bop_entry, bop_limits, bop_text, diameter, read_models_info
+from symrefine.export.records import detection_record, number
+from symrefine.files import check_target, json_text, replacing
+from symrefine.geometry import Array, Axis, Plane, random_orthogonal, rotation, toward_positive
 from symrefine.groups import PointGroup, point_group
 from symrefine.shape import Shape
 from symrefine.surface.misses import Deviation
@@ -164,10 +164,9 @@ def test_diameter_is_exact() -> None:
 
 def test_entries_of_other_objects_stay(tmp_path: Path) -> None:
     path = tmp_path / "models_info.json"
-    write_bop(path, 3, {"diameter": 3.0})
+    path.write_text(bop_text(path, {3: {"diameter": 3.0}}))
     path.write_text(json.dumps(json.loads(path.read_text()) | {"12": {"diameter": 0.1, "align_axes": [1]}}))
-    write_bop(path, 1, {"diameter": 1.0})
-    write_bop(path, 3, {"diameter": 4.0})
+    path.write_text(bop_text(path, {1: {"diameter": 1.0}, 3: {"diameter": 4.0}}))
     assert list(read_models_info(path).items()) == [
         ("3", {"diameter": 4.0}),
         ("12", {"diameter": 0.1, "align_axes": [1]}),
@@ -181,7 +180,7 @@ def test_what_is_no_models_info_is_left_alone(tmp_path: Path, content: str) -> N
     path = tmp_path / "models_info.json"
     path.write_text(content)
     with pytest.raises(InputError, match=r"models_info\.json: is there already"):
-        write_bop(path, 1, {"diameter": 1.0})
+        bop_text(path, {1: {"diameter": 1.0}})
     assert path.read_text() == content
 
 

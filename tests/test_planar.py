@@ -16,7 +16,7 @@ from experiments.studies.planar_cases import run as run_study
 from experiments.studies.planar_images import Case, check, examine, run
 from symrefine.cli import invoke
 from symrefine.errors import DegenerateShapeError, InputError
-from symrefine.export.planar import planar_record
+from symrefine.export.records import planar_record
 from symrefine.geometry import Array
 from symrefine.plane import PLANAR_ORDERS, PlanarDetection, detect_planar
 from symrefine.plane.outline import smallest_diagonal

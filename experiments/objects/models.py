@@ -28,7 +28,7 @@ from urllib.request import Request, urlopen
 
 from experiments.objects.legacy_vtk import vtk_to_off
 from symrefine.errors import InputError
-from symrefine.export.files import replacing
+from symrefine.files import replacing
 from symrefine.load import load
 from symrefine.shape import Shape
 

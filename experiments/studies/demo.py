@@ -12,8 +12,8 @@ from experiments.objects.poses import Pose
 from experiments.objects.shapes import mirror_normals, sample, table
 from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
-from symrefine.export.files import json_text
 from symrefine.export.records import detection_record
+from symrefine.files import json_text
 from symrefine.geometry import Array, Plane, line_angle_rad
 from symrefine.load import load
 from symrefine.picture.words import count, headline

@@ -25,7 +25,7 @@ from experiments.studies.measure import judge
 from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
-from symrefine.export.files import replacing
+from symrefine.files import replacing
 from symrefine.geometry import Array, Plane, line_angle_rad
 from symrefine.groups import PointGroup
 from symrefine.picture.camera import look_at

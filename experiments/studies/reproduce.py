@@ -236,7 +236,7 @@ def between_markers(text: str, content: str, source: str) -> str:
 
 def write(path: Path, text: str) -> None:
     """Write a text file, whole or not at all."""
-    from symrefine.export.files import replacing
+    from symrefine.files import replacing
 
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as draft:

@@ -71,7 +71,7 @@ def _loaded(image: Image.Image, quality: int) -> Shape:
         image.save(file, "JPEG", quality=quality)
     else:
         image.save(file, "PNG")
-    content = read_image(file.getvalue(), "icon", ".jpg" if quality else ".png", threshold=None, invert=False)
+    content = read_image(file.getvalue(), ".jpg" if quality else ".png", threshold=None, invert=False)
     return Shape(points=content.points, weights=content.weights)
 
 

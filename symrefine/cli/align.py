@@ -2,10 +2,11 @@
 
 import argparse
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from symrefine.cli.outputs import STDOUT, check_outputs, console, say, text_writer, waiting, write_all
+from symrefine.cli.outputs import check_outputs, json_writer, tell, waiting, write_all
 from symrefine.cli.values import add_detection_options
 
 NAME = "align"
@@ -31,14 +32,14 @@ def run(args: argparse.Namespace) -> int:
     check_outputs({"--json": args.json}, [Path(args.source), Path(args.target)])
     with waiting("aligning"):
         record = _record(args)
-    from symrefine.export.files import json_text
+    write_all(writers := json_writer(args.json, record))
 
-    if args.json == STDOUT:
-        say(json_text(record))
-        return 0
-    if args.json is not None:
-        write_all({args.json: text_writer(json_text(record))})
-    _print(record, args.json)
+    def lines() -> Iterator[str]:
+        from symrefine.cli.tables import alignment_lines
+
+        return alignment_lines(record)
+
+    tell(args.json, record, lines, writers)
     return 0
 
 
@@ -54,13 +55,3 @@ def _record(args: argparse.Namespace) -> dict[str, Any]:
     alignment = align(source, target, allow_reflection=not args.rotations_only, **options)
     chosen = options | {"measure": args.measure, "rotations_only": args.rotations_only}
     return alignment_record(alignment, source, target, options=chosen, load_s=load_s)
-
-
-def _print(record: dict[str, Any], written: str | None) -> None:
-    from symrefine.cli.tables import alignment_lines
-
-    out = console()
-    for line in alignment_lines(record):
-        out.print(line, soft_wrap=True)
-    if written is not None:
-        out.print(f"wrote {written}", soft_wrap=True)

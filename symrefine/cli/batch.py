@@ -3,14 +3,15 @@
 import argparse
 import re
 from collections.abc import Iterator
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from symrefine.cli import journal
+from symrefine import journal
 from symrefine.cli.outputs import check_beside, check_outputs, console, note, progress, text_writer, write_all
 from symrefine.cli.values import add_class_options, add_detection_options, count, positive
 from symrefine.errors import InputError, SymrefineError
+from symrefine.files import naming
 
 if TYPE_CHECKING:
     from symrefine.detection.result import Detection
@@ -58,19 +59,27 @@ def run(args: argparse.Namespace) -> int:
     scale = _check_bop(args, files)
     options = {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed}
     options |= {name: given for name in ("labels", "weights") if (given := getattr(args, name)) is not None}
-    with journal.locked(Path(args.out)) if args.out else nullcontext():
-        rows = journal.finished(Path(args.out), Path(args.dir), files, options) if args.out else {}
-        rows = {name: row for name, row in rows.items() if _serves_bop(row, scale)}
+    from symrefine.study.work import in_processes
+
+    with opened(Path(args.out)) if args.out else nullcontext() as out:
+        latest = {row["file"]: row for row in out.rows if row["file"] in files} if out else {}
+        rows = {name: row for name, row in latest.items() if _holds(row, args.dir, options, scale)}
         jobs = [(args.dir, name, options, scale) for name in files if name not in rows]
         with progress("detecting", len(files), len(rows)) as advance:
-            for row in _rows(jobs, args.workers):
-                if args.out:
-                    journal.append(Path(args.out), row)
+            for row in in_processes(examine_file, jobs, args.workers):
+                if out:
+                    with naming(args.out):
+                        out.append(row)
                 rows[row["file"]] = row
                 advance()
-    _print([rows[name] for name in files], len(files) - len(jobs))
+    from symrefine.cli.tables import batch_table
+
+    screen, kept, failed = console(), len(files) - len(jobs), sum(row["error"] is not None for row in rows.values())
+    screen.print(batch_table([rows[name] for name in files]))
+    parts = [f"{len(files)} files", f"{kept} done before" if kept else "", f"{failed} failed" if failed else ""]
+    screen.print(", ".join(part for part in parts if part))
     left_out = _write_bop(args.bop, rows) if args.bop else 0
-    return int(left_out > 0 or any(row["error"] is not None for row in rows.values()))
+    return int(left_out > 0 or failed > 0)
 
 
 def _check_bop(args: argparse.Namespace, files: list[str]) -> float | None:
@@ -95,14 +104,45 @@ def _check_bop(args: argparse.Namespace, files: list[str]) -> float | None:
     return float(args.bop_scale or 1.0)
 
 
-def _serves_bop(row: Row, scale: float | None) -> bool:
-    """Whether a row done before holds the entry of BOP, if one is wanted and can be had."""
+@contextmanager
+def opened(path: Path) -> Iterator[journal.Journal]:
+    """The journal of a batch, which is told if its last row was incomplete.
+
+    Raises:
+        InputError: another batch is writing to it, or it holds something else than rows of a batch.
+    """
+    busy = f"{path}: another `symrefine batch` is writing to it"
+    with journal.opened(path, ("file",), busy=busy, rows_of="`symrefine batch`", other="another file") as found:
+        if found.torn:
+            note(f"{path}: the last row is incomplete; it is removed and done again")
+        yield found
+
+
+def _holds(row: Row, folder: str, options: dict[str, Any], scale: float | None) -> bool:
+    """Whether a row done before still tells of its file, with the entry of BOP if one is wanted and can be had."""
+    now = _head(Path(folder, row["file"]), row["file"], options)
+    if now["sha256"] is None or any(row.get(key) != now[key] for key in ("sha256", "version", "options")):
+        return False
     return scale is None or row["error"] is not None or row.get("bop", {}).get("scale") == scale
+
+
+def _head(path: Path, name: str, options: dict[str, Any]) -> Row:
+    """What names a row: the file, its content, the options, the version; `error` is set if the file cannot be read."""
+    from hashlib import file_digest
+    from importlib.metadata import version
+
+    row: Row = {"file": name, "sha256": None, "error": None, "version": version("symrefine"), "options": options}
+    try:
+        with path.open("rb") as stream:
+            row["sha256"] = file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        row["error"] = f"{path}: cannot be read: {error.strerror}"
+    return row
 
 
 def _write_bop(name: str, rows: dict[str, Row]) -> int:
     """Write the entries of all rows that have one; tells of the others, and how many they are."""
-    from symrefine.export.bop import bop_texts
+    from symrefine.export.bop import bop_text
 
     entries, left_out = {}, 0
     for file, row in sorted(rows.items()):
@@ -113,7 +153,7 @@ def _write_bop(name: str, rows: dict[str, Row]) -> int:
             entries[int(_BOP_NAME.fullmatch(Path(file).stem)[1])] = found["entry"]  # type: ignore[index]
         else:
             left_out += 1
-    write_all({name: text_writer(bop_texts(Path(name), dict(sorted(entries.items()))))})
+    write_all({name: text_writer(bop_text(Path(name), dict(sorted(entries.items()))))})
     console().print(f"wrote {name}: {len(entries)} of {len(rows)} objects", soft_wrap=True)
     return left_out
 
@@ -132,23 +172,13 @@ def _files(folder: Path, *, recursive: bool) -> list[str]:
     return shown
 
 
-def _rows(jobs: list[Job], workers: int) -> Iterator[Row]:
-    """A row for each job, as soon as it is done."""
-    if workers == 1 or len(jobs) < 2:
-        yield from map(examine_file, jobs)
-        return
-    from symrefine.study.work import in_processes
-
-    yield from in_processes(examine_file, jobs, workers)
-
-
 def examine_file(job: Job) -> Row:
     """The row of one file: its record, or what was wrong with it."""
     from symrefine.cli.detect import examine
 
     folder, name, options, scale = job
     path = Path(folder, name)
-    row = journal.head(path, name, options)
+    row = _head(path, name, options)
     if row["error"] is not None:
         return row
     try:
@@ -175,13 +205,3 @@ def _bop(found: "Detection | PlanarDetection", shape: "Shape", scale: float) -> 
         return {"scale": scale, "note": str(error)}
     limits = bop_limits(detection)
     return {"scale": scale, "entry": entry, "note": f"{shape.source}: {limits}" if limits else None}
-
-
-def _print(rows: list[Row], kept: int) -> None:
-    from symrefine.cli.tables import batch_table
-
-    failed = sum(row["error"] is not None for row in rows)
-    out = console()
-    out.print(batch_table(rows))
-    parts = [f"{len(rows)} files", f"{kept} done before" if kept else "", f"{failed} failed" if failed else ""]
-    out.print(", ".join(part for part in parts if part))

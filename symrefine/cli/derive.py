@@ -34,27 +34,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Derive and write in the form asked for."""
-    _check_forms(args)
+    chosen = [f"--{name}" for name in ("latex", "python") if getattr(args, name)]
+    chosen += ["--json -"] if args.json == STDOUT else []
+    if len(chosen) > 1:
+        raise InputError(f"{' and '.join(chosen)} both write to stdout; choose one")
     check_outputs({"--json": args.json}, [])
     from symrefine.ntuples import notation
 
     with waiting("deriving"):
         basis = _basis(args)
-    if args.json == STDOUT:
-        say(notation.to_json(basis))
-        return 0
-    if args.json is not None:
+    if args.json not in (None, STDOUT):
         write_all({args.json: text_writer(notation.to_json(basis))})
     write = notation.to_latex if args.latex else notation.to_python if args.python else notation.to_text
-    say(write(basis))
+    say((notation.to_json if args.json == STDOUT else write)(basis))
     return 0
-
-
-def _check_forms(args: argparse.Namespace) -> None:
-    chosen = [f"--{name}" for name in ("latex", "python") if getattr(args, name)]
-    chosen += ["--json -"] if args.json == STDOUT else []
-    if len(chosen) > 1:
-        raise InputError(f"{' and '.join(chosen)} both write to stdout; choose one")
 
 
 def _basis(args: argparse.Namespace) -> "NTupleBasis":

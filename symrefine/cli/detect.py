@@ -1,19 +1,19 @@
 """`symrefine detect`: one file in, its symmetries out."""
 
 import argparse
-import sys
 import time
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from symrefine.cli.outputs import (
-    STDOUT,
     Writer,
     check_beside,
     check_outputs,
+    json_writer,
     note,
-    say,
+    tell,
     text_writer,
     waiting,
     write_all,
@@ -72,23 +72,30 @@ def run(args: argparse.Namespace) -> int:
     check_outputs(outputs, [Path(args.path)])
     check_beside("--bop", args.bop, {"--bop-id": args.bop_id, "--bop-scale": args.bop_scale})
     if args.bop is not None:
-        _check_bop(Path(args.bop))
+        from symrefine.export.bop import read_models_info
+
+        read_models_info(Path(args.bop))
     with waiting("detecting"):
         shape, detection, record = examine(
             args.path, args.measure, args.tolerance, args.seed, labels=args.labels, weights=args.weights,
             threshold=args.threshold, invert=args.invert,
         )  # fmt: skip
-        writers = _writers(args, shape, detection, record)
+        writers = json_writer(args.json, record) | _writers(args, shape, detection)
         write_all(writers)
     if args.bop is not None:
-        _note_limits(detection)
-    if args.json == STDOUT:
-        from symrefine.export.files import json_text
+        from symrefine.export.bop import bop_limits
 
-        say(json_text(record))
-    else:
-        _print(record, list(writers))
+        if limits := bop_limits(detection):
+            note(limits)
+    tell(args.json, record, partial(_lines, record), writers)
     return UNDETERMINED if args.strict and record["undetermined"] else 0
+
+
+def _lines(record: dict[str, Any]) -> Iterable[Any]:
+    from symrefine.cli.tables import detection_lines, hyperplane_lines, planar_lines
+
+    lines = planar_lines if "lines" in record else hyperplane_lines if "hyperplanes" in record else detection_lines
+    return lines(record)
 
 
 def examine(
@@ -119,7 +126,7 @@ def examine(
             f"{path}: points have {shape.dim} coordinates; labels are for objects in space, leave them out"
         )
     if shape.dim == 2:
-        from symrefine.export.planar import planar_record
+        from symrefine.export.records import planar_record
         from symrefine.plane import detect_planar
 
         flat = detect_planar(shape, tolerance=tolerance, seed=seed)
@@ -127,7 +134,7 @@ def examine(
             options |= {"threshold": threshold, "invert": invert}
         return shape, flat, planar_record(flat, shape, options=options, load_s=load_s)
     if shape.dim > 3:
-        from symrefine.export.spaces import subspace_record
+        from symrefine.export.records import subspace_record
         from symrefine.ndim import detect_nd
 
         start = time.perf_counter()
@@ -141,41 +148,23 @@ def examine(
     return shape, detection, detection_record(detection, shape, options=options, load_s=load_s)
 
 
-def _check_bop(path: Path) -> None:
-    from symrefine.export.bop import read_models_info
+def _writers(args: argparse.Namespace, shape: "Shape", detection: "Detection") -> dict[str, Writer]:
+    """Writers of what is for objects in space only.
 
-    read_models_info(path)
-
-
-def _writers(
-    args: argparse.Namespace,
-    shape: "Shape",
-    detection: Any,
-    record: dict[str, Any],
-) -> dict[str, Writer]:
+    Raises:
+        InputError: it is asked for, and the points have two coordinates, or four and more.
+    """
     writers: dict[str, Writer] = {}
-    if args.json not in (None, STDOUT):
-        from symrefine.export.files import json_text
-
-        writers[args.json] = text_writer(json_text(record))
-    if shape.dim != 3:
-        _refuse_spatial(args, shape.dim)
-        return writers
-    return writers | _spatial_writers(args, shape, detection)
-
-
-def _refuse_spatial(args: argparse.Namespace, dim: int) -> None:
-    where = "lies in the plane" if dim == 2 else f"has {dim} coordinates"
-    options = {"--bop": args.bop, "--recording": args.recording, "--report": args.report}
-    for option, name in options.items():
-        if name is not None:
+    for option, name in {"--bop": args.bop, "--recording": args.recording, "--report": args.report}.items():
+        if name is not None and shape.dim != 3:
+            where = "lies in the plane" if shape.dim == 2 else f"has {shape.dim} coordinates"
             raise InputError(f"{option} {name}: is for objects in space; {args.path} {where}, use --json")
-
-
-def _spatial_writers(args: argparse.Namespace, shape: "Shape", detection: "Detection") -> dict[str, Writer]:
-    writers: dict[str, Writer] = {}
     if args.bop is not None:
-        writers[args.bop] = _bop_writer(args, shape, detection)
+        from symrefine.export.bop import bop_entry, bop_text
+
+        entry = bop_entry(detection, shape, scale=args.bop_scale or 1.0)
+        number = 1 if args.bop_id is None else args.bop_id
+        writers[args.bop] = text_writer(bop_text(Path(args.bop), {number: entry}))
     if args.recording is not None:
         from symrefine.viewer import record as write_recording
 
@@ -185,32 +174,3 @@ def _spatial_writers(args: argparse.Namespace, shape: "Shape", detection: "Detec
 
         writers[args.report] = partial(write_html, detection, shape)
     return writers
-
-
-def _bop_writer(args: argparse.Namespace, shape: "Shape", detection: "Detection") -> Writer:
-    from symrefine.export.bop import bop_entry, bop_text
-
-    entry = bop_entry(detection, shape, scale=args.bop_scale or 1.0)
-    number = 1 if args.bop_id is None else args.bop_id
-    return text_writer(bop_text(Path(args.bop), number, entry))
-
-
-def _note_limits(detection: "Detection") -> None:
-    from symrefine.export.bop import bop_limits
-
-    limits = bop_limits(detection)
-    if limits:
-        note(limits)
-
-
-def _print(record: dict[str, Any], written: list[str]) -> None:
-    from symrefine.cli.outputs import console
-    from symrefine.cli.tables import detection_lines, hyperplane_lines, planar_lines
-
-    out = console()
-    lines = planar_lines if "lines" in record else hyperplane_lines if "hyperplanes" in record else detection_lines
-    for line in lines(record):
-        out.print(line, soft_wrap=isinstance(line, str))
-    for name in written:
-        out.print(f"wrote {name}", soft_wrap=True)
-    sys.stdout.flush()

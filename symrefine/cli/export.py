@@ -3,13 +3,13 @@
 import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from symrefine.cli.outputs import check_outputs, console, note, waiting, write_all
+from symrefine.cli.outputs import bytes_writer, check_outputs, note, tell, waiting, write_all
 from symrefine.cli.values import add_detection_options, count, natural, positive
 from symrefine.errors import InputError
+from symrefine.files import check_target
 
 if TYPE_CHECKING:
     from symrefine.detection.result import Detection
@@ -44,12 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--to", required=True, choices=tuple(_OPTIONS), help="what to write")
     parser.add_argument("--out", required=True, metavar="OUT", help="file, or folder for " + ", ".join(_FOLDERS))
     parser.add_argument("--id", type=natural, metavar="N", help="number of the object in models_info.json (default: 1)")
-    parser.add_argument(
-        "--scale",
-        type=positive,
-        metavar="X",
-        help="millimetres in one unit of PATH: 1000 for metres (default: 1)",
-    )
+    scaled = "millimetres in one unit of PATH: 1000 for metres (default: 1)"
+    parser.add_argument("--scale", type=positive, metavar="X", help=scaled)
     parser.add_argument("--improper", action="store_true", default=None, help="npz: mirrors and the like too")
     parser.add_argument("--steps", type=count, metavar="N", help="npz: turns for a continuous axis (default: 72)")
     parser.add_argument(
@@ -68,11 +64,8 @@ def run(args: argparse.Namespace) -> int:
         package = _package(args, shape, detection)
         _check_files(args, package)
         with _folder(args):
-            write_all({str(path): partial(_write, data=data) for path, data in package.files.items()})
-    out = console()
-    out.print(f"{args.path}: {detection.point_group}", soft_wrap=True)
-    for path in package.files:
-        out.print(f"wrote {path}", soft_wrap=True)
+            write_all({str(path): bytes_writer(data) for path, data in package.files.items()})
+    tell(None, {}, lambda: [f"{args.path}: {detection.point_group}"], map(str, package.files))
     for text in package.notes:
         note(text)
     return 0
@@ -98,7 +91,11 @@ def _check(args: argparse.Namespace) -> None:
             users = ", ".join(name for name, options in _OPTIONS.items() if option in options)
             raise InputError(f"--{option}: does not apply to --to {args.to}; it is for {users}")
     if args.to in _FOLDERS:
-        _check_folder(Path(args.out))
+        out = Path(args.out)
+        if out.exists() and not out.is_dir():
+            raise InputError(f"--out {out}: is a file; expected a folder")
+        if not out.parent.is_dir():
+            raise InputError(f"--out {out}: cannot be made: there is no directory {out.parent}")
         return
     outputs = {"--out": args.out, "--transform": str(_transform(args)) if args.to == "canonical" else None}
     check_outputs(outputs, [Path(args.path)])
@@ -121,17 +118,8 @@ def _check_names(args: argparse.Namespace) -> None:
             raise InputError(f"--transform {args.transform}: expected a name that ends in .json or .npz")
 
 
-def _check_folder(out: Path) -> None:
-    if out.exists() and not out.is_dir():
-        raise InputError(f"--out {out}: is a file; expected a folder")
-    if not out.parent.is_dir():
-        raise InputError(f"--out {out}: cannot be made: there is no directory {out.parent}")
-
-
 def _check_files(args: argparse.Namespace, package: "Package") -> None:
     """Refuse to write over the input, or over what cannot be written."""
-    from symrefine.export.files import check_target
-
     for path in package.files:
         if path.resolve() == Path(args.path).resolve():
             raise InputError(f"--out {args.out}: {path} is the input itself; name another folder")
@@ -172,7 +160,3 @@ def _folder(args: argparse.Namespace) -> Iterator[None]:
         if fresh:
             out.rmdir()
         raise
-
-
-def _write(path: Path, data: bytes) -> None:
-    path.write_bytes(data)

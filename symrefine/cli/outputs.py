@@ -2,12 +2,13 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from symrefine.errors import InputError
+from symrefine.files import check_target, json_text, naming, replacing
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 STDOUT = "-"
 
 # A writer fills the file it is given.
-Writer = Callable[[Path], None]
+Writer = Callable[[Path], object]
 
 
 def check_outputs(outputs: dict[str, str | None], inputs: list[Path]) -> None:
@@ -24,8 +25,6 @@ def check_outputs(outputs: dict[str, str | None], inputs: list[Path]) -> None:
     Args:
         outputs: option to path, None where the option is not given; only `--json` may be "-", for stdout.
     """
-    from symrefine.export.files import check_target
-
     taken = {path.resolve(): "the input" for path in inputs}
     for option, name in outputs.items():
         if name is None or (option == "--json" and name == STDOUT):
@@ -54,39 +53,38 @@ def check_beside(option: str, name: str | None, details: dict[str, object]) -> N
 
 def write_all(writers: dict[str, Writer]) -> None:
     """Write every file under another name first; only when all are complete does each take its place."""
-    from symrefine.export.files import replacing
-
     with ExitStack() as stack:
         for name, write in writers.items():
             stack.enter_context(naming(name))
             write(stack.enter_context(replacing(Path(name))))
 
 
-@contextmanager
-def naming(name: str) -> Iterator[None]:
-    """Name the file that could not be written: the system names none, or its draft.
-
-    Raises:
-        InputError: the disk is full, or the like.
-    """
-    try:
-        yield
-    except BrokenPipeError:
-        raise
-    except (OSError, InputError) as error:
-        reason = error if isinstance(error, OSError) else error.__cause__
-        if not isinstance(reason, OSError):
-            raise
-        raise InputError(f"{name}: cannot be written: {reason.strerror or reason}") from None
-
-
 def text_writer(text: str) -> Writer:
     """A writer of text in UTF-8, lines ending as they are."""
-    return lambda path: _write_text(path, text)
+    return bytes_writer(text.encode("utf-8"))
 
 
-def _write_text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="")
+def bytes_writer(data: bytes) -> Writer:
+    """A writer of bytes."""
+    return lambda path: path.write_bytes(data)
+
+
+def json_writer(name: str | None, record: Mapping[str, Any]) -> dict[str, Writer]:
+    """The writer of a record as JSON, if a file is asked for."""
+    return {} if name in (None, STDOUT) else {str(name): text_writer(json_text(record))}
+
+
+def tell(
+    json_to: str | None, record: Mapping[str, Any], lines: Callable[[], Iterable[Any]], written: Iterable[str]
+) -> None:
+    """Print a record: as JSON if stdout is asked for, else as lines and tables, and the names of the files written."""
+    if json_to == STDOUT:
+        say(json_text(record))
+        return
+    out = console()
+    for line in (*lines(), *(f"wrote {name}" for name in written)):
+        out.print(line, soft_wrap=isinstance(line, str))
+    sys.stdout.flush()
 
 
 def say(text: str) -> None:

@@ -3,8 +3,9 @@
 import argparse
 from pathlib import Path
 
-from symrefine.cli.outputs import console, naming, note, progress, say
+from symrefine.cli.outputs import console, note, progress, say
 from symrefine.cli.values import count
+from symrefine.files import naming
 
 NAME = "run"
 HELP = "run the experiment of a YAML config and write its rows, tables and figures"

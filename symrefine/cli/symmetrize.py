@@ -1,11 +1,12 @@
 """`symrefine symmetrize`: the nearest exactly symmetric mesh or cloud."""
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from symrefine.cli.export import detected
-from symrefine.cli.outputs import STDOUT, check_outputs, console, note, say, text_writer, waiting, write_all
+from symrefine.cli.outputs import bytes_writer, check_outputs, json_writer, note, tell, waiting, write_all
 from symrefine.cli.values import add_detection_options
 from symrefine.errors import InputError
 
@@ -50,16 +51,9 @@ def run(args: argparse.Namespace) -> int:
         made = _symmetrize(args, shape, detection)
         data = model_bytes(Path(args.out), made.shape)
         record = _record(args, shape, detection, made)
-        from symrefine.export.files import json_text
-
-        writers = {args.out: lambda path: _write(path, data)}
-        if args.json not in (None, STDOUT):
-            writers[args.json] = text_writer(json_text(record))
+        writers = {args.out: bytes_writer(data)} | json_writer(args.json, record)
         write_all(writers)
-    if args.json == STDOUT:
-        say(json_text(record))
-    else:
-        _print(record, list(writers))
+    tell(args.json, record, partial(_lines, record), writers)
     if shape.labels is not None:
         note("labels are not written")
     if not detection.group.is_finite and args.group is None:
@@ -89,17 +83,16 @@ def _nearest_miss(detection: "Detection") -> str:
 
 
 def _record(args: argparse.Namespace, shape: "Shape", detection: "Detection", made: "Symmetrized") -> dict[str, Any]:
-    from symrefine.export.records import number
+    from symrefine.export.records import number, numbers
 
-    scale = made.diagonal
     return {
         "schema": "symrefine.symmetrized/1",
         "source": shape.source,
         "options": {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed, "group": args.group},
         "found": detection.point_group,
         "point_group": made.group.name,
-        "center": [number(v, scale) for v in made.center],
-        "frame": [[number(v, 1.0) for v in row] for row in made.group.frame],
+        "center": numbers(made.center, made.diagonal),
+        "frame": [numbers(row, 1.0) for row in made.group.frame],
         "method": made.method,
         "paired": number(made.paired),
         "points": len(made.shape.points),
@@ -110,18 +103,10 @@ def _record(args: argparse.Namespace, shape: "Shape", detection: "Detection", ma
     }
 
 
-def _print(record: dict[str, Any], written: list[str]) -> None:
-    out = console()
-    out.print(f"{record['source']}: {record['found']}; made exact: {record['point_group']}", soft_wrap=True)
-    out.print(f"{_METHODS[record['method']]} ({record['paired']:.1%} paired)", soft_wrap=True)
-    out.print(
-        f"moved by {record['largest']:.3%} of the diagonal at most, {record['rms']:.3%} RMS; "
-        f"the result misses itself by {record['residual']:.1e} of the diagonal",
-        soft_wrap=True,
-    )
-    for name in written:
-        out.print(f"wrote {name}", soft_wrap=True)
-
-
-def _write(path: Path, data: bytes) -> None:
-    path.write_bytes(data)
+def _lines(record: dict[str, Any]) -> list[str]:
+    moved = f"moved by {record['largest']:.3%} of the diagonal at most, {record['rms']:.3%} RMS"
+    return [
+        f"{record['source']}: {record['found']}; made exact: {record['point_group']}",
+        f"{_METHODS[record['method']]} ({record['paired']:.1%} paired)",
+        f"{moved}; the result misses itself by {record['residual']:.1e} of the diagonal",
+    ]

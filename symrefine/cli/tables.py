@@ -7,64 +7,52 @@ from typing import Any
 
 from rich.table import Table
 
+from symrefine.groups import point_group
+from symrefine.picture.words import kind_name, meaning, tuples_meaning
+
 Record = dict[str, Any]
 
 _RESIDUALS = ("mean", "p95", "max")
 _WORDS = ("kind", "group")
-_NAMED = {
-    "Cs": "one mirror plane",
-    "Ci": "an inversion centre",
-    "Cinfv": "surface of revolution",
-    "Dinfh": "surface of revolution, mirror-symmetric along its axis",
-    "Kh": "sphere",
-}
-_TUPLES = {
-    "none": "span space: no mirror plane and no axis is possible",
-    "plane": "lie in one plane, within their noise: a mirror plane at most",
-    "axis": "lie on one line, within their noise: where to look first",
-    "vanish": "all vanish, within their noise: every direction is looked at",
-}
 _DOUBLETS = {
     "none": "span the plane: no exact mirror line and no turn",
     "line": "lie on one line: a mirror line at most",
     "centre": "all vanish: turns, with or without mirror lines",
 }
-_KINDS = {"axis": "rotation", "improper": "rotoreflection"}
+_REFINED = "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows"
 
 
 def detection_lines(record: Record) -> Iterator[Table | str]:
     """Everything a table can say about one detection."""
     yield f"{record['source']}: {headline(record)}"
-    yield f"n-tuples {_TUPLES[record['ntuples']['kind']]}"
-    centre = ", ".join(_length(x, record) for x in record["center"])
-    yield f"centre ({centre}), diagonal {_length(record['diagonal'], record)} in units of the file"
+    yield f"n-tuples {tuples_meaning(record['ntuples']['kind'])}"
+    yield _place(record)
     if record["classes"]:
         yield f"labels: {_count(record['classes']['count'], 'class', 'classes')}"
-    if record["planes"]:
-        yield ""
-        yield _planes(record)
-    if record["axes"]:
-        yield ""
-        yield _axes(record)
-    if record["inversion_residual"]:
-        yield ""
-        yield _inversion(record)
-    if record["near_misses"]:
-        yield ""
-        yield _near_misses(record)
+    yield from _apart(*_spatial(record))
     yield ""
     if record["planes"] or record["axes"] or record["inversion"] or record["near_misses"]:
         yield "Offsets in units of the file, misses in % of the diagonal; axes go through the centre."
     if record["near_misses"]:
-        yield (
-            "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows, or, "
-            "below 1, by more than what was meant so mostly does."
-        )
+        yield f"{_REFINED}, or, below 1, by more than what was meant so mostly does."
     if record["alternatives"]:
         yield f"It may be meant otherwise: {otherwise(record)}."
     if record["staircase"]:
         yield f"Group by tolerance: {staircase(record)}"
-    yield f"{_count(record['iterations'], 'iteration')}, {sum(record['timings'].values()):.2f} s"
+    yield f"{_count(record['iterations'], 'iteration')}, {_seconds(record)} s"
+
+
+def _place(record: Record) -> str:
+    centre = ", ".join(_length(x, record) for x in record["center"])
+    return f"centre ({centre}), diagonal {_length(record['diagonal'], record)} in units of the file"
+
+
+def _apart(*tables: Table) -> Iterator[Table | str]:
+    """The tables that have rows, each after an empty line."""
+    for table in tables:
+        if table.row_count:
+            yield ""
+            yield table
 
 
 def staircase(record: Record) -> str:
@@ -82,8 +70,16 @@ def headline(record: Record) -> str:
     name = record["point_group"]
     if record["undetermined"]:
         return f"undetermined: {record['undetermined']}"
-    meaning = "no symmetry" if name == "C1" else _NAMED.get(name) or _elements(record)
-    return f"{name}, {meaning}; tolerance {100 * record['tolerance']:g} %, confidence {record['confidence']:.2f}"
+    means = _planar_meaning(record) if "lines" in record else meaning(point_group(name))
+    return f"{name}, {means}; tolerance {100 * record['tolerance']:g} %, confidence {record['confidence']:.2f}"
+
+
+def _planar_meaning(record: Record) -> str:
+    rotation = record["rotation"]
+    if record["point_group"] in ("C1", "O(2)"):
+        return "no symmetry" if record["point_group"] == "C1" else "round"
+    lines = _count(len(record["lines"]), "mirror line") if record["lines"] else "no mirror line"
+    return lines + (f", {_turns(rotation['order'])}" if rotation else "")
 
 
 def otherwise(record: Record) -> str:
@@ -95,85 +91,38 @@ def otherwise(record: Record) -> str:
     )
 
 
-def _elements(record: Record) -> str:
-    turns = [a for a in record["axes"] if not a["improper"]]
-    parts = [
-        _count(len(record["planes"]), "mirror plane"),
-        _count(len(turns), "rotation axis", "rotation axes"),
-        _count(len(record["axes"]) - len(turns), "rotoreflection axis", "rotoreflection axes"),
-        "inversion centre" if record["inversion"] else "",
-    ]
-    return ", ".join(p for p in parts if p and not p.startswith("0 "))
-
-
 def planar_lines(record: Record) -> Iterator[Table | str]:
     """Everything a table can say about one detection in the plane."""
-    yield f"{record['source']}: {planar_headline(record)}"
+    yield f"{record['source']}: {headline(record)}"
     if record["alternatives"]:
-        yield f"it may also be {_alternatives(record)}"
+        yield f"It may be meant otherwise: {otherwise(record)}."
     yield f"n-tuples {_DOUBLETS[record['ntuples']['kind']]}"
-    centre = ", ".join(_length(x, record) for x in record["center"])
-    yield f"centre ({centre}), diagonal {_length(record['diagonal'], record)} in units of the file"
-    found, near = record["lines"], record["near_misses"]
-    if found or record["rotation"]:
-        yield ""
-        yield _planar_elements(record)
-    if near:
-        yield ""
-        yield _planar_near_misses(record)
+    yield _place(record)
+    yield from _apart(*_planar(record))
     if record["ntuples"]["kind"] != "centre":
-        yield ""
-        yield _ratios(record)
+        yield from _apart(_ratios(record))
     yield ""
     yield "Offsets in units of the file (of a picture: pixels, y up), misses in % of the diagonal."
-    if near:
-        yield "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows."
-    yield f"{sum(record['timings'].values()):.2f} s"
+    if record["near_misses"]:
+        yield f"{_REFINED}."
+    yield f"{_seconds(record)} s"
 
 
-def planar_headline(record: Record) -> str:
-    """The group of the plane and what it means, or why there is none."""
-    name, rotation = record["point_group"], record["rotation"]
-    tolerance = f"tolerance {100 * record['tolerance']:g} %"
-    if record["undetermined"]:
-        return f"undetermined: {record['undetermined']}"
-    if name == "C1":
-        return f"C1, no symmetry at {tolerance}; confidence {record['confidence']:.2f}"
-    lines = _count(len(record["lines"]), "mirror line") if record["lines"] else "no mirror line"
-    turns = f", turns of order {rotation['order']}" if rotation else ""
-    meaning = "round" if name == "O(2)" else lines + turns
-    return f"{name}, {meaning}; {tolerance}, confidence {record['confidence']:.2f}"
-
-
-def _alternatives(record: Record) -> str:
-    """Other groups with their probabilities, and what one has to forgive to believe them."""
-    told = [
-        f"{a['point_group']} ({a['probability']:.2f}, needs a tolerance of {100 * a['forgiven']:.2g} %)"
-        for a in record["alternatives"]
-    ]
-    return ", ".join(told)
-
-
-def _planar_elements(record: Record) -> Table:
-    table = _table("mirror lines: normal", "offset", "kind", *_RESIDUALS, "confidence")
-    for line in record["lines"]:
-        offset = _length(line["offset"], record)
-        table.add_row(_direction(line["normal"]), offset, "mirror", *_misses(line), f"{line['confidence']:.2f}")
+def _planar(record: Record) -> Iterator[Table]:
+    """Mirror lines with the turns, and near misses, of a detection in the plane."""
     rotation = record["rotation"]
-    if rotation:
-        kind = "all turns" if rotation["order"] == "inf" else f"turns of order {rotation['order']}"
-        table.add_row("", "", kind, *_misses(rotation), f"{rotation['confidence']:.2f}")
-    return table
+    lines = [((*_mirror(line, record), "mirror"), line) for line in record["lines"]]
+    turns = [(("", "", _turns(rotation["order"])), rotation)] if rotation else []
+    yield _elements(("mirror lines: normal", "offset", "kind"), "confidence", lines + turns)
+    near = [
+        ((*_mirror(m, record), "mirror") if m["kind"] == "line" else ("", "", _turns(m["order"])), m)
+        for m in record["near_misses"]
+    ]
+    yield _elements(("near misses: normal", "offset", "kind"), "x limit", near)
 
 
-def _planar_near_misses(record: Record) -> Table:
-    table = _table("near misses: normal", "offset", "kind", *_RESIDUALS, "x limit")
-    for m in record["near_misses"]:
-        mirror = m["kind"] == "line"
-        where = (_direction(m["normal"]), _length(m["offset"], record)) if mirror else ("", "")
-        kind = "mirror" if mirror else "all turns" if m["order"] == "inf" else f"turns of order {m['order']}"
-        table.add_row(*where, kind, *_misses(m), f"{m['excess']:.2f}")
-    return table
+def _turns(order: int | str) -> str:
+    return "all turns" if order == "inf" else f"turns of order {order}"
 
 
 def _ratios(record: Record) -> Table:
@@ -198,21 +147,20 @@ def hyperplane_lines(record: Record) -> Iterator[Table | str]:
     if record["incomplete"]:
         yield f"there may be more: {record['incomplete']}"
     yield f"n-tuples of rank {record['ntuples']['rank']}; turns are not looked for in {dim} dimensions"
-    for title, candidates in (("hyperplanes: normal", found), ("turned down: normal", record["rejected"])):
-        if candidates:
-            yield ""
-            yield _hyperplanes(title, candidates, record)
+    titled = {"hyperplanes: normal": found, "turned down: normal": record["rejected"]}
+    yield from _apart(*(_hyperplanes(title, candidates, record) for title, candidates in titled.items()))
     yield ""
     yield "Offsets in units of the file, asymmetry and noise in % of the moments, largest miss in % of the diameter."
-    yield f"{sum(record['timings'].values()):.2f} s"
+    yield f"{_seconds(record)} s"
 
 
 def _hyperplanes(title: str, candidates: Sequence[Record], record: Record) -> Table:
     table = _table(title, "offset", "asymmetry", "noise", "largest miss")
     for h in candidates:
-        offset = _length(h["offset"], {"diagonal": record["diameter"]})
         miss = "" if h["miss"] is None else _percent(h["miss"])
-        table.add_row(_direction(h["normal"]), offset, _percent(h["asymmetry"]), _percent(h["noise"]), miss)
+        table.add_row(
+            *_mirror(h, {"diagonal": record["diameter"]}), _percent(h["asymmetry"]), _percent(h["noise"]), miss
+        )
     return table
 
 
@@ -238,7 +186,7 @@ def alignment_lines(record: Record) -> Iterator[str]:
         yield f"{distance}, {_known(record)}"
         observable = record["observable"]
         yield f"determined: {'everything' if observable == 'full' else observable}"
-    yield f"{sum(record['timings'].values()):.2f} s"
+    yield f"{_seconds(record)} s"
 
 
 def misfit(record: Record) -> str:
@@ -268,10 +216,11 @@ def batch_table(rows: Sequence[Record]) -> Table:
             continue
         if "hyperplanes" in row:
             told = "undetermined" if row["undetermined"] else f"{row['dimension']}-D"
-            seconds = f"{sum(row['timings'].values()):.2f}"
-            table.add_row(row["file"], told, str(len(row["hyperplanes"])), "", "", "", seconds)
+            table.add_row(row["file"], told, str(len(row["hyperplanes"])), "", "", "", _seconds(row))
             continue
-        mirrors, turns = _mirrors_and_turns(row)
+        # Planes and axes of a detection in space, lines and turns of one in the plane.
+        mirrors = row["lines"] if "lines" in row else row["planes"]
+        turns = ([row["rotation"]] if row["rotation"] else []) if "lines" in row else row["axes"]
         elements = mirrors + turns + _inversions(row)
         table.add_row(
             row["file"],
@@ -280,16 +229,9 @@ def batch_table(rows: Sequence[Record]) -> Table:
             str(len(turns)),
             _percent(max(e["residual"]["p95"] for e in elements)) if elements else "",
             f"{min(e['confidence'] for e in elements):.2f}" if elements else "",
-            f"{sum(row['timings'].values()):.2f}",
+            _seconds(row),
         )
     return table
-
-
-def _mirrors_and_turns(row: Record) -> tuple[list[Record], list[Record]]:
-    """Planes and axes of a detection in space, lines and turns of one in the plane."""
-    if "lines" in row:
-        return row["lines"], [row["rotation"]] if row["rotation"] else []
-    return row["planes"], row["axes"]
 
 
 def _inversions(record: Record) -> list[Record]:
@@ -299,44 +241,39 @@ def _inversions(record: Record) -> list[Record]:
     return [{"residual": record["inversion_residual"], "confidence": record["inversion_confidence"]}]
 
 
-def _planes(record: Record) -> Table:
-    table = _table("mirror planes: normal", "offset", *_RESIDUALS, "confidence")
-    for p in record["planes"]:
-        offset = _length(p["offset"], record)
-        table.add_row(_direction(p["normal"]), offset, *_misses(p), f"{p['confidence']:.2f}")
-    return table
+def _spatial(record: Record) -> Iterator[Table]:
+    """Planes, axes, the inversion and near misses of a detection in space."""
+    planes = [(_mirror(p, record), p) for p in record["planes"]]
+    yield _elements(("mirror planes: normal", "offset"), "confidence", planes)
+    turns = [_turn("improper" if a["improper"] else "axis", a["order"]) for a in record["axes"]]
+    axes = [((_direction(a["direction"]), turn), a) for a, turn in zip(record["axes"], turns, strict=True)]
+    yield _elements(("axes: direction", "kind"), "confidence", axes)
+    yield _elements(("inversion",), "confidence", [(("about the centre",), found) for found in _inversions(record)])
+    near = [(_near(m, record), m) for m in record["near_misses"]]
+    yield _elements(("near misses: direction", "offset", "kind"), "x limit", near)
 
 
-def _axes(record: Record) -> Table:
-    table = _table("axes: direction", "kind", *_RESIDUALS, "confidence")
-    for a in record["axes"]:
-        kind = _turn("improper" if a["improper"] else "axis", a["order"])
-        table.add_row(_direction(a["direction"]), kind, *_misses(a), f"{a['confidence']:.2f}")
-    return table
+def _near(miss: Record, record: Record) -> tuple[str, ...]:
+    """Where a candidate that was turned down stands, and what it is."""
+    if miss["kind"] == "inversion":
+        return "about the centre", "", "inversion"
+    if miss["kind"] != "plane":
+        return _direction(miss["direction"]), "", _turn(miss["kind"], miss["order"])
+    offset = sum(n * x for n, x in zip(miss["direction"], miss["point"], strict=True))
+    return *_mirror({"normal": miss["direction"], "offset": offset}, record), "mirror"
 
 
-def _inversion(record: Record) -> Table:
-    table = _table("inversion", *_RESIDUALS, "confidence")
-    for found in _inversions(record):
-        table.add_row("about the centre", *_misses(found), f"{found['confidence']:.2f}")
-    return table
+def _mirror(mirror: Record, record: Record) -> tuple[str, str]:
+    return _direction(mirror["normal"]), _length(mirror["offset"], record)
 
 
-def _near_misses(record: Record) -> Table:
-    table = _table("near misses: direction", "offset", "kind", *_RESIDUALS, "x limit")
-    for m in record["near_misses"]:
-        mirror = m["kind"] == "plane"
-        offset = sum(n * x for n, x in zip(m["direction"], m["point"], strict=True))
-        where = _length(offset, record) if mirror else ""
-        inverted = m["kind"] == "inversion"
-        kind = "mirror" if mirror else "inversion" if inverted else _turn(m["kind"], m["order"])
-        table.add_row(
-            "about the centre" if inverted else _direction(m["direction"]),
-            where,
-            kind,
-            *_misses(m),
-            f"{m['excess']:.2f}",
-        )
+def _elements(heads: Sequence[str], last: str, rows: Sequence[tuple[Sequence[str], Record]]) -> Table:
+    """A line for each element: what it is, what it misses by, and how sure it is or how far beyond the limit."""
+    table = _table(*heads, *_RESIDUALS, last)
+    score = "excess" if last == "x limit" else "confidence"
+    for named, element in rows:
+        misses = [_percent(element["residual"][name]) for name in _RESIDUALS]
+        table.add_row(*named, *misses, f"{element[score]:.2f}")
     return table
 
 
@@ -347,10 +284,6 @@ def _table(first: str, *others: str) -> Table:
         title = f"{name} %" if name in (*_RESIDUALS, "worst p95") else name
         table.add_column(title, overflow="fold", justify="left" if name in _WORDS else "right")
     return table
-
-
-def _misses(element: Record) -> list[str]:
-    return [_percent(element["residual"][name]) for name in _RESIDUALS]
 
 
 def _percent(fraction: float) -> str:
@@ -371,7 +304,11 @@ def _length(value: float, record: Record) -> str:
 
 
 def _turn(kind: str, order: int | str) -> str:
-    return "revolution" if order == "inf" else f"{_KINDS[kind]} {order}"
+    return "revolution" if order == "inf" else f"{kind_name(kind)} {order}"
+
+
+def _seconds(record: Record) -> str:
+    return f"{sum(record['timings'].values()):.2f}"
 
 
 def _count(number: int, noun: str, plural: str = "") -> str:

@@ -74,18 +74,16 @@ def positive(text: str) -> float:
     return value
 
 
-def natural(text: str) -> int:
-    """An integer from 0."""
-    if not (text.isascii() and text.isdigit()):
-        raise argparse.ArgumentTypeError(f"{text!r} is not an integer from 0")
+def natural(text: str, first: int = 0) -> int:
+    """An integer from `first`."""
+    if not (text.isascii() and text.isdigit() and int(text) >= first):
+        raise argparse.ArgumentTypeError(f"{text!r} is not an integer from {first}")
     return int(text)
 
 
 def count(text: str) -> int:
     """An integer from 1."""
-    if not (text.isascii() and text.isdigit() and int(text)):
-        raise argparse.ArgumentTypeError(f"{text!r} is not an integer from 1")
-    return int(text)
+    return natural(text, 1)
 
 
 def orders(text: str) -> tuple[int, ...]:

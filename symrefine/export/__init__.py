@@ -1,1 +1,1 @@
-"""Results for other programs: `records` (JSON), `bop` (`models_info.json`), `files` (whole or absent)."""
+"""Results for other programs: `records` (JSON), `bop` (`models_info.json`), `packages` (whole folders)."""

@@ -22,9 +22,8 @@ from scipy.spatial.distance import cdist
 
 from symrefine.detection.result import Detection
 from symrefine.errors import InputError
-from symrefine.export.files import check_target, json_text, replacing
-from symrefine.export.records import toward_positive
-from symrefine.geometry import Array, Isometry, frame_with_z, rotation, unit
+from symrefine.files import json_text
+from symrefine.geometry import Array, Isometry, frame_with_z, rotation, toward_positive, unit
 from symrefine.groups import PointGroup
 from symrefine.shape import Shape
 from symrefine.symmetrize import exact_place
@@ -49,10 +48,19 @@ def bop_entry(detection: Detection, shape: Shape, *, scale: float = 1.0) -> Entr
     """
     if not (math.isfinite(scale) and scale > 0.0):
         raise InputError(f"scale is {scale}; expected millimetres in one unit of the file, such as 1 or 1000")
+    group, center = decided(detection, shape)
+    return placed_entry(group, center * scale, shape.points * scale)
+
+
+def decided(detection: Detection, shape: Shape) -> tuple[PointGroup, Array]:
+    """The group and the point [3] where its operations meet, as exactly as the shape has them.
+
+    Raises:
+        InputError: the detection was undecided.
+    """
     if detection.undetermined:
         raise InputError(f"{shape.source}: no symmetries to export: {detection.undetermined}")
-    group, center = exact_place(shape, detection.group, detection.center)
-    return placed_entry(group, center * scale, shape.points * scale)
+    return exact_place(shape, detection.group, detection.center)
 
 
 def placed_entry(group: PointGroup, center: Array, points: Array) -> Entry:
@@ -84,17 +92,8 @@ def bop_limits(detection: Detection) -> str:
     return "BOP cannot express a sphere: three continuous axes through its centre stand for all the others"
 
 
-def bop_text(path: Path, number: int, entry: Entry) -> str:
-    """Content of `path` with the entry of object `number` put in or replaced, all others as they are.
-
-    Raises:
-        InputError: the number is negative, or the file is not a `models_info.json`.
-    """
-    return bop_texts(path, {number: entry})
-
-
-def bop_texts(path: Path, entries: Mapping[int, Entry]) -> str:
-    """Content of `path` with the entries of several objects put in or replaced, all others as they are.
+def bop_text(path: Path, entries: Mapping[int, Entry]) -> str:
+    """Content of `path` with the entries of objects, by their number, put in or replaced, all others as they are.
 
     Raises:
         InputError: a number is negative, or the file is not a `models_info.json`.
@@ -103,18 +102,6 @@ def bop_texts(path: Path, entries: Mapping[int, Entry]) -> str:
         if number < 0:
             raise InputError(f"object id is {number}; expected an integer from 0")
     return json_text(read_models_info(path) | {str(number): entry for number, entry in entries.items()})
-
-
-def write_bop(path: Path, number: int, entry: Entry) -> None:
-    """Put the entry of object `number` into the file `path`, which need not exist yet.
-
-    Raises:
-        InputError: the number is negative, or the file is not a `models_info.json` or cannot be written.
-    """
-    check_target(path)
-    text = bop_text(path, number, entry)
-    with replacing(path) as draft:
-        draft.write_text(text, encoding="utf-8")
 
 
 def read_models_info(path: Path) -> dict[str, Entry]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symrefine.errors import InputError
-from symrefine.geometry import Array, frame_with_z, read_only, rotation
+from symrefine.geometry import Array, ReadOnly, frame_with_z, rotation
 from symrefine.groups import PointGroup
 from symrefine.groups.standard import GOLDEN
 from symrefine.moments.quadrature import mesh_nodes
@@ -30,7 +30,7 @@ _DEGREE = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Canonical:
+class Canonical(ReadOnly):
     """A canonical pose: `canonical = rotation (x - center)` for x in the units of the file.
 
     Attributes:
@@ -42,10 +42,6 @@ class Canonical:
     rotation: Array
     center: Array
     group: PointGroup
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", read_only(self.rotation))
-        object.__setattr__(self, "center", read_only(self.center))
 
     def matrix(self, scale: float = 1.0) -> Array:
         """The transform [4, 4] from the file to the canonical pose, `scale` units there for one of the file."""
@@ -73,7 +69,8 @@ def canonical_pose(group: PointGroup, center: Array, shape: Shape) -> Canonical:
     if shape.dim != 3:
         raise InputError(f"{shape.source}: a canonical pose is for 3-D shapes; these points have {shape.dim}")
     nodes, weights = _masses(shape)
-    standard = _best(_choices(group, nodes, weights), nodes, weights, _fold(group))
+    fold = int(group.symbol.fold) if group.is_finite and group.symbol.fold else 1
+    standard = _best(_choices(group, nodes, weights), nodes, weights, fold)
     tilt = _FIVE_UP if group.symbol.family in ("I", "Ih") else np.eye(3)
     turn = tilt @ standard
     placed = PointGroup(name=group.name, frame=tilt.T)
@@ -90,10 +87,6 @@ def _free(group: PointGroup) -> Array:
     if family == "Ch" and fold == 1:
         return np.array([1.0, 1.0, 0.0])
     return _Z if family in ("C", "Cv") else np.zeros(3)
-
-
-def _fold(group: PointGroup) -> int:
-    return int(group.symbol.fold) if group.is_finite and group.symbol.fold else 1
 
 
 def _masses(shape: Shape) -> tuple[Array, Array]:

@@ -10,21 +10,21 @@ model nothing translates, and the axis is z.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from symrefine.export.bop import Entry, placed_entry
-from symrefine.export.files import json_text
 from symrefine.export.operations import STEPS, motions, motions_bytes, reflections_left_out
-from symrefine.geometry import Array
+from symrefine.files import json_text
+from symrefine.geometry import Array, rotation
 from symrefine.groups import PointGroup
 
 Consumer = Literal["foundationpose", "megapose", "dope", "isaac"]
 
 _ORIGIN = np.zeros(3)
-_SIGNS = (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)), ("z", (0.0, 0.0, 1.0)))
+_SPHERE = "a sphere is read as turns about x, y and z, not their products"
 # A product of turns belongs to the group if it is this near one of its operations.
 _MEMBER_RAD = 1e-6
 
@@ -36,10 +36,10 @@ class Reading:
     `models_info` is an entry for that file, `name` and `content` a file that stands by itself (empty if there is none).
     """
 
-    models_info: Entry | None
-    name: str
-    content: bytes
-    notes: tuple[str, ...]
+    models_info: Entry | None = None
+    name: str = ""
+    content: bytes = b""
+    notes: tuple[str, ...] = ()
 
 
 def reading(consumer: Consumer, group: PointGroup, points: Array) -> Reading:
@@ -48,15 +48,13 @@ def reading(consumer: Consumer, group: PointGroup, points: Array) -> Reading:
     Args:
         points: [N, 3] vertices in the canonical pose, in millimetres.
     """
-    found = _READINGS[consumer](group, points)
-    notes = (*reflections_left_out(group), *found.notes)
-    return Reading(models_info=found.models_info, name=found.name, content=found.content, notes=notes)
+    found = CONSUMERS[consumer][0](group, points)
+    return replace(found, notes=(*reflections_left_out(group), *found.notes))
 
 
 def _megapose(group: PointGroup, points: Array) -> Reading:
     """`models_info.json` as it is: each discrete symmetry is multiplied with 64 turns about each continuous axis."""
-    notes = ("a sphere is read as turns about x, y and z, not their products",) if _is_sphere(group) else ()
-    return Reading(models_info=placed_entry(group, _ORIGIN, points), name="", content=b"", notes=notes)
+    return Reading(models_info=placed_entry(group, _ORIGIN, points), notes=(_SPHERE,) * _is_sphere(group))
 
 
 def _foundationpose(group: PointGroup, points: Array) -> Reading:
@@ -64,17 +62,15 @@ def _foundationpose(group: PointGroup, points: Array) -> Reading:
     entry = placed_entry(group, _ORIGIN, points)
     notes: tuple[str, ...] = ()
     proper = group.proper_subgroup()
+    rest = motions(proper, _ORIGIN)[1:]
     if _is_sphere(group):
-        rest = motions(proper, _ORIGIN)[1:]
         entry |= {"symmetries_continuous": entry["symmetries_continuous"][2:]}
         notes = ("a sphere is read as turns about z and the 60 rotations of an icosahedron, not their products",)
     elif not proper.is_finite:
-        rest = motions(proper, _ORIGIN)[STEPS:]
+        rest = rest[STEPS - 1 :]
         notes = (f"a continuous axis is read as turns by {360 // STEPS} degrees",)
-    else:
-        rest = motions(proper, _ORIGIN)[1:]
     if len(rest):
-        entry |= {"symmetries_discrete": [_exact(m).reshape(-1).tolist() for m in rest]}
+        entry |= {"symmetries_discrete": [m.reshape(-1).tolist() for m in np.where(np.abs(rest) < 1e-12, 0.0, rest)]}
     content = motions_bytes(group, _ORIGIN)
     return Reading(models_info=entry, name="symmetry_tfs.npz", content=content, notes=notes)
 
@@ -83,65 +79,47 @@ def _dope(group: PointGroup, points: Array) -> Reading:
     """`model_info.json`: symmetries as in BOP, and `align_axes`, by which one of all equal poses is chosen."""
     entry = placed_entry(group, _ORIGIN, points)
     kept = {key: value for key, value in entry.items() if key.startswith("symmetries")}
+    # Which axis of the object is brought near which of the camera: y to the view, then z (if turned over) down.
+    near = [{"object": [0, 1, 0], "camera": [0, 0, 1]}, {"object": [0, 0, 1], "camera": [0, 1, 0]}]
     if kept:
-        kept |= {"align_axes": _align_axes(group)}
-    notes = ("a sphere is read as turns about x, y and z, not their products",) if _is_sphere(group) else ()
-    return Reading(models_info=None, name="model_info.json", content=json_text(kept or {}).encode(), notes=notes)
-
-
-def _align_axes(group: PointGroup) -> list[dict[str, list[int]]]:
-    """Which axis of the object is brought near which of the camera: y to the view, then z (if turned over) down."""
-    across = {"object": [0, 1, 0], "camera": [0, 0, 1]}
-    return (
-        [across] if group.symbol.family.startswith(("C", "S")) else [across, {"object": [0, 0, 1], "camera": [0, 1, 0]}]
-    )
+        kept |= {"align_axes": near[:1] if group.symbol.family.startswith(("C", "S")) else near}
+    notes = (_SPHERE,) * _is_sphere(group)
+    return Reading(name="model_info.json", content=json_text(kept).encode(), notes=notes)
 
 
 def _isaac(group: PointGroup, _: Array) -> Reading:
     """ROS parameters: all products Rz Ry Rx of the listed angles about x, y and z count as symmetries."""
-    proper = group.proper_subgroup()
-    names, count = _isaac_strings(proper)
+    names, notes = _isaac_strings(group.proper_subgroup())
     quoted = ", ".join(f'"{name}"' for name in names)
     text = f"/**:\n  ros__parameters:\n    symmetry_axes: [{quoted}]\n" if names else "/**:\n  ros__parameters: {}\n"
-    return Reading(
-        models_info=None, name="symmetry_axes.yaml", content=text.encode(), notes=_isaac_notes(proper, count)
-    )
+    return Reading(name="symmetry_axes.yaml", content=text.encode(), notes=notes)
 
 
-def _isaac_notes(proper: PointGroup, count: int) -> tuple[str, ...]:
+def _isaac_strings(proper: PointGroup) -> tuple[list[str], tuple[str, ...]]:
+    """Strings whose products are all in the group, as many as can be, and what they do not say of it."""
     if _is_sphere(proper):
-        return ("a sphere is read as products of turns by 30 degrees about z, y and x",)
+        note = "a sphere is read as products of turns by 30 degrees about z, y and x"
+        return [f"{axis}_full" for axis in "xyz"], (note,)
     if not proper.is_finite:
-        return ("a continuous axis is read as turns by 30 degrees",)
-    if count < proper.order:
-        left = int(proper.order) - count
-        return (f"{left} of {int(proper.order)} rotations left out: no product of turns about x, y and z gives them",)
-    return ()
-
-
-def _isaac_strings(proper: PointGroup) -> tuple[list[str], int]:
-    """Strings whose products are all in the group, and how many different rotations these products are."""
-    if _is_sphere(proper):
-        return [f"{axis}_full" for axis in "xyz"], 0
-    if not proper.is_finite:
-        return (["x_180"] if proper.symbol.family == "D" else []) + ["z_full"], 0
-    angles = {axis: _angles(proper, np.array(direction)) for axis, direction in _SIGNS}
-    best = max(_allowed(angles), key=lambda chosen: _products_inside(proper, chosen))
+        half = ["x_180"] if proper.symbol.family == "D" else []
+        return [*half, "z_full"], ("a continuous axis is read as turns by 30 degrees",)
+    angles = {axis: _angles(proper, direction) for axis, direction in zip("xyz", np.eye(3), strict=True)}
+    # All angles about some of the axes, none about the others.
+    allowed = [
+        {axis: angles[axis] if axis in kept else [] for axis in angles} for kept in ("z", "xz", "xyz", "x", "y", "")
+    ]
+    best = max(allowed, key=lambda chosen: _products_inside(proper, chosen))
     names = [f"{axis}_{angle:.9g}" for axis, degrees in best.items() for angle in degrees]
-    return names, _products_inside(proper, best)
+    order = int(proper.order)
+    left = order - _products_inside(proper, best)
+    note = f"{left} of {order} rotations left out: no product of turns about x, y and z gives them"
+    return names, (note,) * (left > 0)
 
 
 def _angles(proper: PointGroup, axis: Array) -> list[float]:
     """Angles in degrees, other than 0, by which the group turns about an axis."""
     order = max((n for u, n in proper.rotation_axes() if abs(float(u @ axis)) > 1.0 - 1e-9), default=1)
     return [360.0 * k / order for k in range(1, int(order))]
-
-
-def _allowed(angles: dict[str, list[float]]) -> list[dict[str, list[float]]]:
-    """All angles about some of the axes, none about the others."""
-    return [
-        {axis: angles[axis] if axis in kept else [] for axis in angles} for kept in ("z", "xz", "xyz", "x", "y", "")
-    ]
 
 
 def _products_inside(proper: PointGroup, chosen: dict[str, list[float]]) -> int:
@@ -154,38 +132,21 @@ def _products_inside(proper: PointGroup, chosen: dict[str, list[float]]) -> int:
 
 def isaac_products(x_deg: list[float], y_deg: list[float], z_deg: list[float]) -> Array:
     """Products Rz Ry Rx [n, 3, 3] over the angles about each axis, 0 among them."""
-    turns = [[_about(k, math.radians(a)) for a in (0.0, *degrees)] for k, degrees in enumerate((x_deg, y_deg, z_deg))]
+    turns = [
+        [rotation(axis, math.radians(a)) for a in (0.0, *degrees)]
+        for axis, degrees in zip(np.eye(3), (x_deg, y_deg, z_deg), strict=True)
+    ]
     return np.array([c @ b @ a for a in turns[0] for b in turns[1] for c in turns[2]])
-
-
-def _about(axis: int, angle_rad: float) -> Array:
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    turn = np.eye(3)
-    turn[i, i] = turn[j, j] = math.cos(angle_rad)
-    turn[j, i] = math.sin(angle_rad)
-    turn[i, j] = -turn[j, i]
-    return turn
 
 
 def _is_sphere(group: PointGroup) -> bool:
     return group.symbol.family in ("K", "Kh")
 
 
-def _exact(matrix: Array) -> Array:
-    """A matrix without the rounding of what is 0."""
-    return np.where(np.abs(matrix) < 1e-12, 0.0, matrix)
-
-
-_READINGS: dict[str, Callable[[PointGroup, Array], Reading]] = {
-    "foundationpose": _foundationpose,
-    "megapose": _megapose,
-    "dope": _dope,
-    "isaac": _isaac,
-}
-# What their models are written as, and in how many units a metre.
-MODELS: dict[str, tuple[str, float]] = {
-    "foundationpose": (".ply", 1000.0),
-    "megapose": (".ply", 1000.0),
-    "dope": (".obj", 1.0),
-    "isaac": (".obj", 1.0),
+# How each reads, what its models are written as, and in how many units a metre.
+CONSUMERS: dict[str, tuple[Callable[[PointGroup, Array], Reading], str, float]] = {
+    "foundationpose": (_foundationpose, ".ply", 1000.0),
+    "megapose": (_megapose, ".ply", 1000.0),
+    "dope": (_dope, ".obj", 1.0),
+    "isaac": (_isaac, ".obj", 1.0),
 }

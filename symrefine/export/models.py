@@ -7,8 +7,10 @@ materials, polygons, comments, the order of everything. `model_bytes` writes wha
 import io
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
@@ -47,7 +49,7 @@ def model_bytes(path: Path, shape: Shape) -> bytes:
     return _WRITERS[path.suffix.lower()](shape)
 
 
-def moved(data: bytes, suffix: str, matrix: Array, source: str) -> bytes | None:
+def moved(data: bytes, suffix: str, matrix: Array) -> bytes | None:
     """A PLY or OBJ file with its positions moved by `matrix` [4, 4] and its normals turned, all else as it was.
 
     Returns:
@@ -55,7 +57,7 @@ def moved(data: bytes, suffix: str, matrix: Array, source: str) -> bytes | None:
     """
     if suffix == ".obj":
         return None if b"\\\n" in data or b"\\\r" in data else _moved_obj(data, matrix)
-    return _moved_ply(data, matrix, source) if suffix == ".ply" else None
+    return _moved_ply(data, matrix) if suffix == ".ply" else None
 
 
 def _directions(matrix: Array) -> Array:
@@ -77,8 +79,8 @@ def _moved_obj(data: bytes, matrix: Array) -> bytes:
     return b"\n".join(lines)
 
 
-def _moved_ply(data: bytes, matrix: Array, source: str) -> bytes | None:
-    header = parse_header(data, source)
+def _moved_ply(data: bytes, matrix: Array) -> bytes | None:
+    header = parse_header(data)
     vertex = header.elements[0] if header.elements else Element(name="", count=0)
     whole = [p.name for p in vertex.properties if p.name in (*_POSITION, *_NORMAL) and not p.type.startswith("f")]
     if vertex.name != "vertex" or vertex.has_lists or whole:
@@ -172,8 +174,13 @@ def _npy(shape: Shape) -> bytes:
 def _npz(shape: Shape) -> bytes:
     arrays = {"points": shape.points, "normals": shape.normals, "faces": shape.faces}
     arrays |= {"weights": shape.weights} if shape.faces is None else {}
+    return npz_bytes(**{name: array for name, array in arrays.items() if array is not None})
+
+
+def npz_bytes(**arrays: NDArray[Any]) -> bytes:
+    """A .npz file of arrays by name."""
     stream = io.BytesIO()
-    np.savez(stream, **{name: array for name, array in arrays.items() if array is not None})  # type: ignore[arg-type]
+    np.savez(stream, **arrays)  # type: ignore[arg-type]
     return stream.getvalue()
 
 

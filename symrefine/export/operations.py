@@ -1,9 +1,8 @@
 """Symmetry operations as N x 4 x 4 matrices, for readers that take nothing else (CaTGrasp's `symmetry_tfs`)."""
 
-import io
-
 import numpy as np
 
+from symrefine.export.models import npz_bytes
 from symrefine.geometry import Array
 from symrefine.groups import PointGroup
 
@@ -43,7 +42,5 @@ def reflections_left_out(group: PointGroup) -> list[str]:
 def motions_bytes(group: PointGroup, center: Array, *, improper: bool = False, steps: int = STEPS) -> bytes:
     """A .npz file: `symmetry_tfs` [N, 4, 4] in the units of the centre, `determinant` [N], `point_group`."""
     found = motions(group, center, improper=improper, steps=steps)
-    stream = io.BytesIO()
     determinants = np.rint(np.linalg.det(found[:, :3, :3]))
-    np.savez(stream, symmetry_tfs=found, determinant=determinants, point_group=np.array(group.name))
-    return stream.getvalue()
+    return npz_bytes(symmetry_tfs=found, determinant=determinants, point_group=np.array(group.name))

@@ -1,6 +1,5 @@
 """Everything that one export writes: names and contents of files, and what they cannot express."""
 
-import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,14 +9,13 @@ import numpy as np
 
 from symrefine.detection.result import Detection
 from symrefine.errors import InputError
-from symrefine.export.bop import bop_entry, bop_limits, bop_text
+from symrefine.export.bop import bop_entry, bop_limits, bop_text, decided
 from symrefine.export.canonical import Canonical, canonical_pose
-from symrefine.export.consumers import MODELS, Consumer, reading
-from symrefine.export.files import json_text
-from symrefine.export.models import check_suffix, model_bytes, moved
+from symrefine.export.consumers import CONSUMERS, Consumer, reading
+from symrefine.export.models import check_suffix, model_bytes, moved, npz_bytes
 from symrefine.export.operations import motions_bytes, motions_limits, reflections_left_out
+from symrefine.files import json_text
 from symrefine.shape import Shape
-from symrefine.symmetrize import exact_place
 
 SCHEMA = "symrefine.canonical/1"
 
@@ -32,7 +30,7 @@ class Package:
 
 def bop_package(out: Path, detection: Detection, shape: Shape, *, number: int, scale: float) -> Package:
     """`models_info.json` with the entry of one object put in, in the frame of the model file."""
-    text = bop_text(out, number, bop_entry(detection, shape, scale=scale))
+    text = bop_text(out, {number: bop_entry(detection, shape, scale=scale)})
     limits = bop_limits(detection)
     notes = (*reflections_left_out(detection.group), *((limits,) if limits else ()))
     return Package(files={out: text.encode("ascii")}, notes=notes)
@@ -40,8 +38,7 @@ def bop_package(out: Path, detection: Detection, shape: Shape, *, number: int, s
 
 def npz_package(out: Path, detection: Detection, shape: Shape, *, improper: bool, steps: int) -> Package:
     """All operations as matrices in the frame and the units of the file."""
-    _check_decided(detection, shape)
-    content = motions_bytes(*exact_place(shape, detection.group, detection.center), improper=improper, steps=steps)
+    content = motions_bytes(*decided(detection, shape), improper=improper, steps=steps)
     notes = motions_limits(detection.group, improper=improper, steps=steps)
     return Package(files={out: content}, notes=tuple(notes))
 
@@ -52,10 +49,10 @@ def canonical_package(out: Path, detection: Detection, shape: Shape, *, transfor
     Raises:
         InputError: no symmetry, so nothing to put on an axis; or a format that does not hold the shape.
     """
-    _check_decided(detection, shape)
-    if detection.group.name == "C1":
+    group, center = decided(detection, shape)
+    if group.name == "C1":
         raise InputError(f"{shape.source}: is C1: there is no axis and no mirror to put on the axes")
-    pose = canonical_pose(*exact_place(shape, detection.group, detection.center), shape)
+    pose = canonical_pose(group, center, shape)
     model, notes = _model(out, shape, pose, 1.0)
     return Package(files={out: model, transform: transform_bytes(transform, pose, shape.source)}, notes=tuple(notes))
 
@@ -68,9 +65,8 @@ def consumer_package(
     Args:
         scale: millimetres in one unit of the shape.
     """
-    _check_decided(detection, shape)
-    pose = canonical_pose(*exact_place(shape, detection.group, detection.center), shape)
-    suffix, per_metre = MODELS[consumer]
+    pose = canonical_pose(*decided(detection, shape), shape)
+    _, suffix, per_metre = CONSUMERS[consumer]
     found = reading(consumer, pose.group, pose.apply(shape.points, scale))
     stem = f"obj_{number:06d}" if found.models_info is not None else "model"
     unit = scale * per_metre / 1000.0
@@ -79,7 +75,7 @@ def consumer_package(
     files = {folder / (stem + suffix): model, place: transform_bytes(place, pose, shape.source, unit)}
     if found.models_info is not None:
         info = folder / "models_info.json"
-        files[info] = bop_text(info, number, found.models_info).encode("ascii")
+        files[info] = bop_text(info, {number: found.models_info}).encode("ascii")
     if found.name:
         files[folder / (found.name if found.models_info is None else f"{stem}_{found.name}")] = found.content
     return Package(files=files, notes=(*found.notes, *notes))
@@ -89,24 +85,17 @@ def transform_bytes(path: Path, pose: Canonical, source: str, scale: float = 1.0
     """The transform [4, 4] from the file to the canonical model as JSON, or as .npz if the path says so."""
     matrix = pose.matrix(scale)
     if path.suffix.lower() == ".npz":
-        stream = io.BytesIO()
-        np.savez(stream, transform=matrix, inverse=np.linalg.inv(matrix), point_group=np.array(pose.group.name))
-        return stream.getvalue()
+        return npz_bytes(transform=matrix, inverse=np.linalg.inv(matrix), point_group=np.array(pose.group.name))
     data: dict[str, Any] = {"schema": SCHEMA, "source": source, "point_group": pose.group.name, "scale": scale}
     data |= {"transform": matrix.tolist(), "inverse": np.linalg.inv(matrix).tolist()}
     return json_text(data).encode("ascii")
-
-
-def _check_decided(detection: Detection, shape: Shape) -> None:
-    if detection.undetermined:
-        raise InputError(f"{shape.source}: no symmetries to export: {detection.undetermined}")
 
 
 def _model(path: Path, shape: Shape, pose: Canonical, scale: float) -> tuple[bytes, list[str]]:
     """The file of the shape with its coordinates moved, or else the shape written anew."""
     source, suffix = Path(shape.source), path.suffix.lower()
     if source.suffix.lower() == suffix and source.is_file():
-        kept = moved(source.read_bytes(), suffix, pose.matrix(scale), shape.source)
+        kept = moved(source.read_bytes(), suffix, pose.matrix(scale))
         if kept is not None:
             has_materials = suffix == ".obj" and b"\nmtllib" in b"\n" + kept
             return kept, ["materials and textures stay where they are: copy them beside the model"] * has_materials

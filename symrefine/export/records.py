@@ -2,20 +2,25 @@
 
 import math
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from importlib.metadata import version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symrefine.align.story import Alignment
-from symrefine.decide.alternatives import Alternative
-from symrefine.detection.result import Detection, FoundAxis, FoundPlane, NearMiss
-from symrefine.geometry import Array, Plane
+from symrefine.geometry import Array, Plane, toward_positive
 from symrefine.shape import Shape
 from symrefine.surface.misses import Deviation
 
+if TYPE_CHECKING:
+    from symrefine.align.story import Alignment
+    from symrefine.detection.result import Detection
+    from symrefine.ndim import Hyperplane, SubspaceDetection
+    from symrefine.plane import PlanarDetection
+
 SCHEMA = "symrefine.detection/1"
+PLANAR_SCHEMA = "symrefine.detection2d/1"
+SUBSPACE_SCHEMA = "symrefine.detection_nd/1"
 ALIGNMENT_SCHEMA = "symrefine.alignment/1"
 
 Record = dict[str, Any]
@@ -25,7 +30,7 @@ _DIGITS = 12
 
 
 def detection_record(
-    detection: Detection, shape: Shape, *, options: Mapping[str, Any], load_s: float | None = None
+    detection: "Detection", shape: Shape, *, options: Mapping[str, Any], load_s: float | None = None
 ) -> Record:
     """What `symrefine detect --json` writes; equal input, options and version give equal records but for `timings`.
 
@@ -39,41 +44,125 @@ def detection_record(
         their first large component is positive. An infinite number is "inf".
     """
     d, scale = detection, detection.diagonal
-    timings = ({} if load_s is None else {"load": load_s}) | dict(d.timings)
     return {
-        **opening(SCHEMA, shape, options),
+        **_opening(SCHEMA, shape, options),
         "classes": _classes(shape),
-        "point_group": d.point_group,
-        "confidence": number(d.confidence),
-        "alternatives": alternatives(d.alternatives),
-        "center": numbers(d.center, scale),
-        "diagonal": number(d.diagonal),
-        "tolerance": number(d.tolerance),
-        "planes": [_plane(p, scale) for p in d.planes],
-        "axes": [_axis(a, scale) for a in d.axes],
-        "inversion": bool(d.inversion),
-        "inversion_residual": None if d.inversion_residual is None else residual(d.inversion_residual),
-        "inversion_confidence": None if d.inversion_confidence is None else number(d.inversion_confidence),
-        "staircase": [
-            {
-                "tolerance": number(s.tolerance),
-                "point_group": s.point_group,
-            }
-            for s in d.staircase
+        **_answer(d),
+        "planes": [
+            _placed(p.plane, scale) | _held(p) | {"sigma": _sigma(p.sigma_rad, "offset", p.sigma)} for p in d.planes
         ],
-        "near_misses": [_near_miss(m, scale) for m in d.near_misses],
+        "axes": [
+            {
+                "direction": _direction(a.axis.direction),
+                "point": numbers(a.axis.point, scale),
+                "order": _order(a.order),
+                "improper": bool(a.improper),
+                **_held(a),
+                "sigma": _sigma(a.sigma_rad, "position", a.sigma),
+            }
+            for a in d.axes
+        ],
+        "inversion": bool(d.inversion),
+        "inversion_residual": None if d.inversion_residual is None else _residual(d.inversion_residual),
+        "inversion_confidence": None if d.inversion_confidence is None else number(d.inversion_confidence),
+        "staircase": [{"tolerance": number(s.tolerance), "point_group": s.point_group} for s in d.staircase],
+        # `excess` is the miss over what the tolerance allows, the worst of its statistics.
+        "near_misses": [
+            {
+                "kind": m.kind,
+                "direction": _direction(m.direction),
+                "point": numbers(m.point, scale),
+                "order": _order(m.order),
+                "residual": _residual(m.residual),
+                "excess": number(m.excess),
+            }
+            for m in d.near_misses
+        ],
         "iterations": int(d.iterations),
         "undetermined": d.undetermined or None,
-        "ntuples": {
-            "kind": d.tuples.kind,
-            "singular_values": numbers(d.tuples.singular_values, 1.0),
-            "significance": numbers(d.tuples.significance, 1.0),
-        },
-        "timings": seconds(timings),
+        "ntuples": {"kind": d.tuples.kind} | _sizes(d.tuples),
+        "timings": _seconds(d.timings, load_s),
     }
 
 
-def opening(schema: str, shape: Shape, options: Mapping[str, Any]) -> Record:
+def planar_record(
+    detection: "PlanarDetection", shape: Shape, *, options: Mapping[str, Any], load_s: float | None = None
+) -> Record:
+    """What `symrefine detect --json` writes for a picture or 2-D points, in the spirit of `detection_record`.
+
+    Returns:
+        Lengths in input units (pixels), misses as fractions of `diagonal`; a mirror line is `normal.x = offset`.
+    """
+    d, scale, turns = detection, detection.diagonal, detection.rotation
+    nowhere = {"normal": None, "offset": None}
+    return {
+        **_opening(PLANAR_SCHEMA, shape, options),
+        **_answer(d),
+        "lines": [_placed(found.line, scale) | _held(found) for found in d.lines],
+        "rotation": None if turns is None else {"order": _order(turns.order), **_held(turns)},
+        # `excess` is the smallest tolerance at which it would hold, over the tolerance asked for.
+        "near_misses": [
+            {
+                "kind": "rotation" if m.line is None else "line",
+                **(nowhere if m.line is None else _placed(m.line, scale)),
+                "center": numbers(m.center, scale),
+                "order": _order(m.order),
+                "residual": _residual(m.residual),
+                "excess": number(m.excess),
+            }
+            for m in d.near_misses
+        ],
+        "undetermined": d.undetermined or None,
+        "ntuples": {
+            "kind": d.doublets.kind,
+            "angle_rad": number(d.doublets.angle_rad),
+            **_sizes(d.doublets),
+            # `ratio` is None where the doublets vanish: noise over noise.
+            "vectors": [
+                {
+                    "orders": list(v.orders),
+                    "singular_values": numbers(v.singular_values, 1.0),
+                    "ratio": None if v.vanish else number(v.ratio),
+                }
+                for v in d.doublets.vectors
+            ],
+        },
+        "timings": _seconds(d.timings, load_s),
+    }
+
+
+def subspace_record(
+    detection: "SubspaceDetection", shape: Shape, *, options: Mapping[str, Any], timings: Mapping[str, float]
+) -> Record:
+    """What `symrefine detect --json` writes for points of 4 to 8 coordinates.
+
+    Returns:
+        Lengths in input units; a hyperplane is `normal.x = offset`; `asymmetry` and `noise` are fractions of moments,
+        `miss` is a fraction of `diameter`; `incomplete` says why hyperplanes may be missing from the list;
+        `reflection_group_order` is that of the group that the listed reflections generate, None if it is not known.
+    """
+    d = detection
+
+    def hyperplane(found: "Hyperplane") -> Record:
+        figures = {name: number(getattr(found, name), 1.0) for name in ("asymmetry", "noise", "miss")}
+        return _placed(found.plane, d.diameter) | figures
+
+    return {
+        **_opening(SUBSPACE_SCHEMA, shape, options),
+        "dimension": shape.dim,
+        "center": numbers(d.center, d.diameter),
+        "diameter": number(d.diameter),
+        "hyperplanes": [hyperplane(h) for h in d.hyperplanes],
+        "rejected": [hyperplane(h) for h in d.rejected],
+        "undetermined": d.undetermined or None,
+        "incomplete": d.incomplete or None,
+        "reflection_group_order": d.reflection_group_order,
+        "ntuples": {"rank": d.fixed.rank} | _sizes(d.fixed),
+        "timings": _seconds(timings),
+    }
+
+
+def _opening(schema: str, shape: Shape, options: Mapping[str, Any]) -> Record:
     """How every record of a detection begins: what it is, of what, by which version, and what was asked."""
     return {
         "schema": schema,
@@ -84,8 +173,23 @@ def opening(schema: str, shape: Shape, options: Mapping[str, Any]) -> Record:
     }
 
 
+def _answer(d: "Detection | PlanarDetection") -> Record:
+    """The group, how sure it is, what else it could be (`forgiven` of the diagonal), and where it stands."""
+    return {
+        "point_group": d.point_group,
+        "confidence": number(d.confidence),
+        "alternatives": [
+            {"point_group": a.point_group, "probability": number(a.probability), "forgiven": number(a.forgiven)}
+            for a in d.alternatives
+        ],
+        "center": numbers(d.center, d.diagonal),
+        "diagonal": number(d.diagonal),
+        "tolerance": number(d.tolerance),
+    }
+
+
 def alignment_record(
-    alignment: Alignment, source: Shape, target: Shape, *, options: Mapping[str, Any], load_s: float | None = None
+    alignment: "Alignment", source: Shape, target: Shape, *, options: Mapping[str, Any], load_s: float | None = None
 ) -> Record:
     """What `symrefine align --json` writes: `target ~ scale * matrix @ source + translation`, and its equivalents.
 
@@ -95,7 +199,6 @@ def alignment_record(
     """
     a = alignment
     size = float(np.abs(target.points).max())
-    timings = ({} if load_s is None else {"load": load_s}) | dict(a.timings)
     start = time.perf_counter()
     record = {
         "schema": ALIGNMENT_SCHEMA,
@@ -120,8 +223,8 @@ def alignment_record(
             for m, t in zip(a.coset.matrices, a.coset.translations, strict=True)
         ],
     }
-    timings["equivalents"] = time.perf_counter() - start
-    return record | {"timings": seconds(timings)}
+    equivalents_s = time.perf_counter() - start
+    return record | {"timings": _seconds(dict(a.timings) | {"equivalents": equivalents_s}, load_s)}
 
 
 def _classes(shape: Shape) -> Record | None:
@@ -130,12 +233,6 @@ def _classes(shape: Shape) -> Record | None:
         return None
     sizes = np.unique(shape.labels, return_counts=True)[1].tolist()
     return {"count": len(sizes), "sizes": sizes}
-
-
-def toward_positive(direction: Array) -> float:
-    """The sign, +1.0 or -1.0, that makes the first component of at least a tenth of the largest positive."""
-    size = np.abs(direction)
-    return math.copysign(1.0, direction[int(np.argmax(size >= 0.1 * size.max()))])
 
 
 def number(value: float, scale: float = 0.0) -> float | str | None:
@@ -157,12 +254,13 @@ def _matrix(rows: Array) -> list[list[float | str | None]]:
     return [numbers(row, 1.0) for row in rows]
 
 
-def seconds(timings: Mapping[str, float]) -> dict[str, float]:
-    """Seconds by stage, to the microsecond."""
-    return {stage: round(spent, 6) for stage, spent in timings.items()}
+def _seconds(timings: Mapping[str, float], load_s: float | None = None) -> dict[str, float]:
+    """Seconds by stage, to the microsecond, those of reading first."""
+    stages = ({} if load_s is None else {"load": load_s}) | dict(timings)
+    return {stage: round(spent, 6) for stage, spent in stages.items()}
 
 
-def placed(plane: Plane, scale: float) -> Record:
+def _placed(plane: Plane, scale: float) -> Record:
     """Where a mirror stands: `normal . x = offset`, the normal with the sign that all records give it."""
     sign = toward_positive(plane.normal)
     return {"normal": _direction(plane.normal), "offset": number(sign * plane.offset, scale)}
@@ -172,57 +270,24 @@ def _direction(direction: Array) -> list[float | str | None]:
     return numbers(toward_positive(direction) * direction, 1.0)
 
 
-def _plane(found: FoundPlane, scale: float) -> Record:
-    return {
-        **placed(found.plane, scale),
-        "residual": residual(found.residual),
-        "confidence": number(found.confidence),
-        "sigma": {"direction_rad": number(found.sigma_rad), "offset": number(found.sigma)},
-    }
+def _held(found: Any) -> Record:
+    """How well what was found holds."""
+    return {"residual": _residual(found.residual), "confidence": number(found.confidence)}
 
 
-def _axis(found: FoundAxis, scale: float) -> Record:
-    return {
-        "direction": _direction(found.axis.direction),
-        "point": numbers(found.axis.point, scale),
-        "order": order(found.order),
-        "improper": bool(found.improper),
-        "residual": residual(found.residual),
-        "confidence": number(found.confidence),
-        "sigma": {"direction_rad": number(found.sigma_rad), "position": number(found.sigma)},
-    }
+def _sigma(direction_rad: float, place: str, length: float) -> Record:
+    return {"direction_rad": number(direction_rad), place: number(length)}
 
 
-def alternatives(found: Sequence[Alternative]) -> list[Record]:
-    """Other groups with their probability, and what would have to be forgiven: a fraction of the diagonal."""
-    return [
-        {
-            "point_group": a.point_group,
-            "probability": number(a.probability),
-            "forgiven": number(a.forgiven),
-        }
-        for a in found
-    ]
+def _sizes(tuples: Any) -> Record:
+    return {name: numbers(getattr(tuples, name), 1.0) for name in ("singular_values", "significance")}
 
 
-def _near_miss(miss: NearMiss, scale: float) -> Record:
-    """`excess` is the miss over what the tolerance allows, the worst of its statistics."""
-    return {
-        "kind": miss.kind,
-        "direction": _direction(miss.direction),
-        "point": numbers(miss.point, scale),
-        "order": order(miss.order),
-        "residual": residual(miss.residual),
-        "excess": number(miss.excess),
-    }
-
-
-def order(value: float) -> int | str:
+def _order(value: float) -> int | str:
     """An order of rotation as JSON can hold it."""
     return "inf" if math.isinf(value) else round(value)
 
 
-def residual(deviation: Deviation) -> Record:
+def _residual(deviation: Deviation) -> Record:
     """The distribution of a miss, fractions of the diagonal."""
-    names = ("mean", "p95", "p99", "max")
-    return {name: number(getattr(deviation, name), 1.0) for name in names}
+    return {name: number(getattr(deviation, name), 1.0) for name in ("mean", "p95", "p99", "max")}

@@ -13,14 +13,14 @@ leave out; compressed PCD by open3d, after a check of sizes. Images are read by 
 from collections.abc import Callable, Collection
 from os import PathLike
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from symrefine.errors import InputError
+from symrefine.errors import InputError, about
 from symrefine.load.content import Content, check_distinct, check_finite
 from symrefine.load.gltf import read_glb, read_gltf
 from symrefine.load.image import FORMATS, Threshold, read_image
 from symrefine.load.labels import point_classes, point_weights
-from symrefine.load.mesh import mesh_shape
+from symrefine.load.mesh import mesh_arrays
 from symrefine.load.obj import read_obj
 from symrefine.load.off import read_off
 from symrefine.load.pcd import read_pcd
@@ -31,25 +31,26 @@ from symrefine.shape import Shape
 
 __all__ = ["IMAGES", "READERS", "load"]
 
-# A reader gets the bytes of a file and its path, which messages begin with; that of a table of any columns also the
-# names of those that it shall take beside coordinates.
-Reader = Callable[[bytes, str], Content]
-NamingReader = Callable[[bytes, str, Collection[str]], Content]
+# A reader gets the bytes of a file, its path where others lie beside it or another program reads it, and of a table of
+# any columns the names of those that it shall take beside coordinates. It says what is wrong, not in which file.
+Reader = Callable[[bytes, Path, Collection[str]], Content]
 
-_NAMING: dict[str, NamingReader] = {".csv": read_table, ".npz": read_npz, ".txt": read_table}
-_PLAIN: dict[str, Reader] = {
-    ".glb": read_glb,
-    ".gltf": read_gltf,
-    ".npy": read_npy,
-    ".obj": read_obj,
-    ".off": read_off,
-    ".pcd": read_pcd,
-    ".ply": read_ply,
-    ".stl": read_stl,
-    ".xyz": read_xyz,
+_READERS: dict[str, Reader] = {
+    ".csv": lambda data, _, named: read_table(data, named),
+    ".glb": lambda data, path, _: read_glb(data, path),
+    ".gltf": lambda data, path, _: read_gltf(data, path),
+    ".npy": lambda data, *_: read_npy(data),
+    ".npz": lambda data, _, named: read_npz(data, named),
+    ".obj": lambda data, *_: read_obj(data),
+    ".off": lambda data, *_: read_off(data),
+    ".pcd": lambda data, path, _: read_pcd(data, path),
+    ".ply": lambda data, *_: read_ply(data),
+    ".stl": lambda data, *_: read_stl(data),
+    ".txt": lambda data, _, named: read_table(data, named),
+    ".xyz": lambda data, *_: read_xyz(data),
 }
 # Suffixes of meshes and clouds.
-READERS = tuple(sorted({*_NAMING, *_PLAIN}))
+READERS = tuple(_READERS)
 # Suffixes of pictures: apart from the others, because the textures of meshes lie beside these in one directory.
 IMAGES = frozenset(FORMATS)
 
@@ -94,56 +95,59 @@ def load(
     """
     if measure not in (None, "surface", "solid"):
         raise InputError(f"measure is {measure!r}; expected 'surface', 'solid' or None")
-    source = str(path)
-    suffix = Path(path).suffix.lower()
-    if suffix in IMAGES and not Path(path).is_dir():
-        if labels is not None or weights is not None:
-            raise InputError(f"{source}: is a picture: labels and weights apply to meshes and clouds only")
-        content = read_image(_read(Path(path), source), source, suffix, threshold=threshold, invert=invert)
-    else:
-        _check_suffix(Path(path), source)
-        if threshold is not None or invert:
-            raise InputError(f"{source}: is no picture: threshold and invert apply to {' '.join(sorted(IMAGES))} only")
+    if threshold not in (None, "otsu") and not (isinstance(threshold, int | float) and 0.0 < threshold < 1.0):
+        raise InputError(f"threshold is {threshold}; expected a grey value between 0 (black) and 1 (white), or 'otsu'")
+    source, file = str(path), Path(path)
+    with about(source):
         named = [name for name in (labels, weights) if name is not None]
-        content = _content(_read(Path(path), source), source, suffix, named)
-    check_finite(content, source)
-    check_distinct(content, source)
+        content = _content(file, named, threshold=threshold, invert=invert)
+        check_finite(content)
+        check_distinct(content)
+        arrays = _arrays(content, measure, labels, weights, source)
+    return Shape(source=source, **arrays)
+
+
+def _content(file: Path, named: Collection[str], *, threshold: Threshold | None, invert: bool) -> Content:
+    suffix = file.suffix.lower()
+    if file.is_dir():
+        raise InputError("is a directory; expected a file")
+    if suffix in IMAGES:
+        if named:
+            raise InputError("is a picture: labels and weights apply to meshes and clouds only")
+        return read_image(_read(file), suffix, threshold=threshold, invert=invert)
+    images = " ".join(sorted(IMAGES))
+    if suffix not in READERS:
+        raise InputError(f"unknown suffix {file.suffix!r}; known are {' '.join(READERS)}, and images {images}")
+    if threshold is not None or invert:
+        raise InputError(f"is no picture: threshold and invert apply to {images} only")
+    return _READERS[suffix](_read(file), file, named)
+
+
+def _read(file: Path) -> bytes:
+    try:
+        data = file.read_bytes()
+    except FileNotFoundError:
+        raise InputError("no such file") from None
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}") from None
+    if not data:
+        raise InputError("is empty (0 bytes)")
+    return data
+
+
+def _arrays(
+    content: Content, measure: str | None, labels: str | None, weights: str | None, source: str
+) -> dict[str, Any]:
+    """What becomes of a content, by the names that `Shape` has for it."""
     if content.faces is not None:
         if weights is not None:
-            raise InputError(f"{source}: has faces, which weigh what their areas do; weights are for clouds")
-        return mesh_shape(content, content.faces, measure or "surface", source, labels=labels)
+            raise InputError("has faces, which weigh what their areas do; weights are for clouds")
+        return {"measure": measure or "surface"} | mesh_arrays(content, content.faces, labels, source)
     if measure is not None:
-        raise InputError(f"{source}: has no faces, so measure {measure!r} does not apply; leave it out for clouds")
-    return Shape(
-        points=content.points,
-        normals=content.normals,
-        weights=content.weights if weights is None else point_weights(content, weights, source),
-        labels=content.labels if labels is None else point_classes(content, labels, source),
-        source=source,
-    )
-
-
-def _check_suffix(path: Path, source: str) -> None:
-    if path.is_dir():
-        raise InputError(f"{source}: is a directory; expected a file")
-    if path.suffix.lower() not in READERS:
-        known, images = " ".join(READERS), " ".join(sorted(IMAGES))
-        raise InputError(f"{source}: unknown suffix {path.suffix!r}; known are {known}, and images {images}")
-
-
-def _content(data: bytes, source: str, suffix: str, named: Collection[str]) -> Content:
-    if suffix in _NAMING:
-        return _NAMING[suffix](data, source, named)
-    return _PLAIN[suffix](data, source)
-
-
-def _read(path: Path, source: str) -> bytes:
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{source}: no such file") from None
-    except OSError as error:
-        raise InputError(f"{source}: cannot be read: {error.strerror}") from None
-    if not data:
-        raise InputError(f"{source}: is empty (0 bytes)")
-    return data
+        raise InputError(f"has no faces, so measure {measure!r} does not apply; leave it out for clouds")
+    return {
+        "points": content.points,
+        "normals": content.normals,
+        "weights": content.weights if weights is None else point_weights(content, weights),
+        "labels": content.labels if labels is None else point_classes(content, labels),
+    }

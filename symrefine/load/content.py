@@ -95,33 +95,28 @@ def as_float64(values: NDArray[Any]) -> Array:
         return values.astype(np.float64)
 
 
-def check_finite(content: Content, source: str) -> None:
+def check_finite(content: Content) -> None:
     """Refuse coordinates that are NaN, infinite or so large that areas overflow, naming the first such point."""
     bad = np.flatnonzero(~(np.abs(content.points) <= LARGEST).all(axis=1))
     if bad.size:
         raise InputError(
-            f"{source}: {content.point_name(int(bad[0]))} is {content.points[bad[0]].tolist()} "
+            f"{content.point_name(int(bad[0]))} is {content.points[bad[0]].tolist()} "
             f"({bad.size} such of {len(content.points)}); coordinates must be finite and at most {LARGEST:g}: "
             "remove these points"
         )
 
 
-def check_distinct(content: Content, source: str) -> None:
+def check_distinct(content: Content) -> None:
     """Refuse files without two distinct points, or with points so close together that areas underflow."""
     points = content.points
-    if len(points) == 0:
-        raise InputError(f"{source}: no points; a shape needs at least two distinct points")
-    if len(points) == 1:
-        raise InputError(f"{source}: only one point, {points[0].tolist()}; a shape needs at least two distinct points")
-    if (points == points[0]).all():
-        raise InputError(
-            f"{source}: all {len(points)} points are {points[0].tolist()}; a shape needs at least two distinct points"
-        )
+    if len(points) < 2 or (points == points[0]).all():
+        told = f"all {len(points)} points are {points[0].tolist()}" if len(points) > 1 else "no points"
+        told = f"only one point, {points[0].tolist()}" if len(points) == 1 else told
+        raise InputError(f"{told}; a shape needs at least two distinct points")
     spread = float(np.ptp(points, axis=0).max())
     if spread < SMALLEST:
         raise InputError(
-            f"{source}: coordinates differ by {spread:.3g} at most; a shape needs {SMALLEST:g}: give them in a smaller "
-            "unit"
+            f"coordinates differ by {spread:.3g} at most; a shape needs {SMALLEST:g}: give them in a smaller unit"
         )
 
 

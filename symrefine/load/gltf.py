@@ -23,94 +23,94 @@ _HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_")
 Json = dict[str, Any]
 
 
-def read_glb(data: bytes, source: str) -> Content:
+def read_glb(data: bytes, path: Path) -> Content:
     """Content of a .glb file: the default scene, every node in its place."""
     if not data.startswith(_MAGIC):
-        raise InputError(f"{source}: not a GLB file: begins with {data[:8]!a}; expected {_MAGIC!a}")
+        raise InputError(f"not a GLB file: begins with {data[:8]!a}; expected {_MAGIC!a}")
     if len(data) < 20:
-        raise InputError(f"{source}: cut off in the header after {len(data)} bytes")
+        raise InputError(f"cut off in the header after {len(data)} bytes")
     version, length, json_length = (int.from_bytes(data[k : k + 4], "little") for k in (4, 8, 12))
     if version != 2:
-        raise InputError(f"{source}: glTF version {version}; expected 2")
+        raise InputError(f"glTF version {version}; expected 2")
     if length != len(data):
-        raise InputError(f"{source}: the header gives {length} bytes, the file has {len(data)}: cut off or added to")
+        raise InputError(f"the header gives {length} bytes, the file has {len(data)}: cut off or added to")
     if data[16:20] != _JSON or 20 + json_length > length:
-        raise InputError(f"{source}: the first chunk is no whole JSON text; the file is damaged")
-    return _read(data, data[20 : 20 + json_length], "glb", source)
+        raise InputError("the first chunk is no whole JSON text; the file is damaged")
+    return _read(data, data[20 : 20 + json_length], "glb", path)
 
 
-def read_gltf(data: bytes, source: str) -> Content:
+def read_gltf(data: bytes, path: Path) -> Content:
     """Content of a .gltf file: the default scene, every node in its place; buffers are found beside it."""
-    return _read(data, data, "gltf", source)
+    return _read(data, data, "gltf", path)
 
 
-def _read(data: bytes, text: bytes, kind: str, source: str) -> Content:
-    _check_tree(_parse(text, source), source)
+def _read(data: bytes, text: bytes, kind: str, path: Path) -> Content:
+    _check_tree(_parse(text))
     import trimesh  # here, for it takes half a second
 
     try:
         scene = trimesh.load_scene(
-            io.BytesIO(data), file_type=kind, resolver=trimesh.resolvers.FilePathResolver(str(Path(source).absolute())),
+            io.BytesIO(data), file_type=kind, resolver=trimesh.resolvers.FilePathResolver(str(path.absolute())),
             process=False, skip_materials=True,
         )  # fmt: skip
     except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
         reason = str(error) or "its parts contradict one another"
-        raise InputError(f"{source}: glTF cannot be read: {type(error).__name__}: {shorten(reason, 80)}") from None
-    return _flatten(scene, source)
+        raise InputError(f"glTF cannot be read: {type(error).__name__}: {shorten(reason, 80)}") from None
+    return _flatten(scene)
 
 
-def _parse(text: bytes, source: str) -> Json:
+def _parse(text: bytes) -> Json:
     try:
         tree = json.loads(text.decode("utf-8"))
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise InputError(f"{source}: not a glTF file: its JSON text is not valid: {error}") from None
+        raise InputError(f"not a glTF file: its JSON text is not valid: {error}") from None
     if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
-        raise InputError(f"{source}: not a glTF file: its JSON text has no object 'asset'")
+        raise InputError("not a glTF file: its JSON text has no object 'asset'")
     return tree
 
 
-def _check_tree(tree: Json, source: str) -> None:
+def _check_tree(tree: Json) -> None:
     """Refuse what trimesh leaves out or fills with zeros without a word."""
     names = tree.get("extensionsRequired", [])
     required = [name for name in names if not str(name).startswith(_HARMLESS)] if isinstance(names, list) else ["?"]
     if required:
-        raise InputError(f"{source}: requires {', '.join(map(str, required))}; save it without extensions")
-    if not _objects(tree, "scenes", source):
-        raise InputError(f"{source}: has no scene, so nothing is in its place; save it with a scene")
-    for number, node in enumerate(_objects(tree, "nodes", source)):
+        raise InputError(f"requires {', '.join(map(str, required))}; save it without extensions")
+    if not _objects(tree, "scenes"):
+        raise InputError("has no scene, so nothing is in its place; save it with a scene")
+    for number, node in enumerate(_objects(tree, "nodes")):
         if "camera" in node and ("mesh" in node or "children" in node):
-            raise InputError(f"{source}: node {number} has a camera besides a mesh or children; remove the camera")
-    for number, accessor in enumerate(_objects(tree, "accessors", source)):
+            raise InputError(f"node {number} has a camera besides a mesh or children; remove the camera")
+    for number, accessor in enumerate(_objects(tree, "accessors")):
         if "sparse" in accessor:
-            raise InputError(f"{source}: accessor {number} is sparse, which is not supported; save it in full")
-    primitives = [p for mesh in _objects(tree, "meshes", source) for p in _objects(mesh, "primitives", source)]
+            raise InputError(f"accessor {number} is sparse, which is not supported; save it in full")
+    primitives = [p for mesh in _objects(tree, "meshes") for p in _objects(mesh, "primitives")]
     for primitive in primitives:
-        _check_primitive(primitive, tree, source)
+        _check_primitive(primitive, tree)
 
 
-def _check_primitive(primitive: Json, tree: Json, source: str) -> None:
+def _check_primitive(primitive: Json, tree: Json) -> None:
     mode = primitive.get("mode", _TRIANGLES)
     if mode not in (_POINTS, *_LINES, _TRIANGLES, _STRIP):
         what = "a triangle fan" if mode == _FAN else f"of mode {mode}"
-        raise InputError(f"{source}: a primitive is {what}; expected points, lines, triangles or triangle strips")
+        raise InputError(f"a primitive is {what}; expected points, lines, triangles or triangle strips")
     attributes = primitive.get("attributes")
     position = attributes.get("POSITION") if isinstance(attributes, dict) else None
-    accessors = _objects(tree, "accessors", source)
+    accessors = _objects(tree, "accessors")
     if not isinstance(position, int) or not 0 <= position < len(accessors):
-        raise InputError(f"{source}: a primitive has POSITION {position}; expected one of {len(accessors)} accessors")
+        raise InputError(f"a primitive has POSITION {position}; expected one of {len(accessors)} accessors")
     accessor = accessors[position]
     if accessor.get("componentType") != _FLOAT or accessor.get("type") != "VEC3" or "bufferView" not in accessor:
-        raise InputError(f"{source}: accessor {position} holds positions, but not as three stored floats each")
+        raise InputError(f"accessor {position} holds positions, but not as three stored floats each")
 
 
-def _objects(owner: Json, key: str, source: str) -> list[Json]:
+def _objects(owner: Json, key: str) -> list[Json]:
     objects = owner.get(key, [])
     if not isinstance(objects, list) or not all(isinstance(item, dict) for item in objects):
-        raise InputError(f"{source}: '{key}' of the glTF text is no list of objects; the file is damaged")
+        raise InputError(f"'{key}' of the glTF text is no list of objects; the file is damaged")
     return objects
 
 
-def _flatten(scene: Any, source: str) -> Content:
+def _flatten(scene: Any) -> Content:
     """All triangles of a scene, or all points if it has no triangles, in the frame of the scene.
 
     The field `color` is that of the vertices, where all parts have it; textures and materials are not read.
@@ -135,14 +135,21 @@ def _flatten(scene: Any, source: str) -> Content:
             clouds.append(points)
     if meshes and clouds:
         raise InputError(
-            f"{source}: holds {count(len(meshes), 'mesh part')} and {count(len(clouds), 'cloud')}; expected one kind"
+            f"holds {count(len(meshes), 'mesh part')} and {count(len(clouds), 'cloud')}; expected one kind"
         )
     if lines and not meshes:
-        raise InputError(f"{source}: holds lines but no triangles; expected triangles, or points alone")
+        raise InputError("holds lines but no triangles; expected triangles, or points alone")
     fields = {"color": np.concatenate(colours)} if colours and len(colours) == len(meshes) + len(clouds) else {}
     if not meshes:
         return Content(points=np.concatenate(clouds) if clouds else np.empty((0, 3)), point_fields=fields)
-    return _join(meshes, fields)
+    shifts = np.cumsum([0] + [len(points) for points, _ in meshes[:-1]])
+    joined = np.concatenate([faces + shift for (_, faces), shift in zip(meshes, shifts, strict=True)])
+    return Content(
+        points=np.concatenate([points for points, _ in meshes]),
+        faces=Polygons(corners=joined.ravel(), counts=np.full(len(joined), 3)),
+        point_fields=fields,
+        split=True,
+    )
 
 
 def _colours(part: Any) -> list[Values]:
@@ -151,14 +158,3 @@ def _colours(part: Any) -> list[Values]:
         return []
     colours = np.asarray(part.visual.vertex_colors)  # those of clouds may be empty
     return [colours[:, :3]] if colours.ndim == 2 and len(colours) == len(part.vertices) else []
-
-
-def _join(meshes: list[tuple[Array, Index]], fields: dict[str, Values]) -> Content:
-    shifts = np.cumsum([0] + [len(points) for points, _ in meshes[:-1]])
-    faces = np.concatenate([faces + shift for (_, faces), shift in zip(meshes, shifts, strict=True)])
-    return Content(
-        points=np.concatenate([points for points, _ in meshes]),
-        faces=Polygons(corners=faces.ravel(), counts=np.full(len(faces), 3)),
-        point_fields=fields,
-        split=True,
-    )

@@ -8,7 +8,6 @@ smoothed away, unless the picture is binary.
 
 import io
 import warnings
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -36,31 +35,27 @@ _NOISE = 5.0
 _GRAIN, _SHARP, _SOFT, _SEEN = 0.02, 0.3, 5.0, 400
 
 
-def read_image(data: bytes, source: str, suffix: str, *, threshold: Threshold | None, invert: bool) -> Content:
+def read_image(data: bytes, suffix: str, *, threshold: Threshold | None, invert: bool) -> Content:
     """Pixels of the object in a picture, with their weights; what weighs nothing is left out.
 
     Args:
         data: bytes of the file.
-        source: file, for messages.
         suffix: one of `FORMATS`, which the content has to agree with.
         threshold: make the picture binary: the grey value that parts dark from light, or "otsu" to choose it.
         invert: exchange object and background.
 
     Raises:
-        InputError: damaged, animated, too large, of one grey value only, or a threshold outside (0, 1).
+        InputError: damaged, animated, too large, of one grey value only.
     """
-    named = threshold is None or threshold == "otsu"
-    if not named and not (isinstance(threshold, int | float) and 0.0 < threshold < 1.0):
-        raise InputError(f"threshold is {threshold}; expected a grey value between 0 (black) and 1 (white), or 'otsu'")
-    grey = _grey(_open(data, source, suffix))
+    grey = _grey(_open(data, suffix))
     if np.ptp(grey) == 0.0:
         size = f"{grey.shape[1]} x {grey.shape[0]} pixels"
-        raise InputError(f"{source}: all {size} have the same grey value {grey.flat[0]:.3g}: there is no object")
+        raise InputError(f"all {size} have the same grey value {grey.flat[0]:.3g}: there is no object")
     weights = pixel_weights(without_grain(grey), threshold=threshold, invert=invert)
     if np.ptp(weights) == 0.0:
         low, high = float(grey.min()), float(grey.max())
         raise InputError(
-            f"{source}: nothing stands out: grey values run from {low:.3g} to {high:.3g}"
+            f"nothing stands out: grey values run from {low:.3g} to {high:.3g}"
             + (f"; choose a threshold between them, not {threshold}" if threshold is not None else "")
         )
     row, column = np.nonzero(weights)
@@ -84,8 +79,9 @@ def pixel_weights(grey: Array, *, threshold: Threshold | None = None, invert: bo
     border = np.concatenate([grey[0], grey[-1], grey[1:-1, 0], grey[1:-1, -1]])
     levels = np.unique(grey)
     if len(levels) <= 2:
-        background = _majority([border == level for level in levels], [grey == level for level in levels])
-        return ((grey != levels[background]) != invert).astype(np.float64)
+        # The level that most of the border has; of the whole picture if that is a tie; then the lightest.
+        votes = [(int((border == level).sum()), int((grey == level).sum()), k) for k, level in enumerate(levels)]
+        return ((grey != levels[max(votes)[-1]]) != invert).astype(np.float64)
     level = float(np.median(border))
     scatter = 1.4826 * float(np.median(np.abs(border - level)))
     contrast = np.abs(grey - level)
@@ -98,7 +94,7 @@ def without_grain(grey: Array) -> Array:
 
     The grain is what pixels differ by from the mean of their four neighbours, in the median: edges do not count.
     """
-    if min(grey.shape) < 3 or grey.size < _SEEN or _is_binary(grey):
+    if min(grey.shape) < 3 or grey.size < _SEEN or len(np.unique(grey)) <= 2:
         return grey
     beside = 0.25 * (grey[:-2, 1:-1] + grey[2:, 1:-1] + grey[1:-1, :-2] + grey[1:-1, 2:])
     grain = 1.4826 * float(np.median(np.abs(grey[1:-1, 1:-1] - beside))) / np.sqrt(1.25)
@@ -110,11 +106,6 @@ def without_grain(grey: Array) -> Array:
     from scipy.ndimage import gaussian_filter
 
     return np.asarray(gaussian_filter(grey, min(width, _SOFT), mode="nearest"))
-
-
-def _is_binary(grey: Array) -> bool:
-    low, high = float(grey.min()), float(grey.max())
-    return bool(((grey == low) | (grey == high)).all())
 
 
 def otsu(grey: Array) -> float:
@@ -131,13 +122,7 @@ def otsu(grey: Array) -> float:
     return float(edges[1 + best[[0, -1]]].mean())
 
 
-def _majority(border: Sequence[NDArray[np.bool_]], everywhere: Sequence[NDArray[np.bool_]]) -> int:
-    """Index of the level that most of the border has; of the whole picture if that is a tie; then the lightest."""
-    votes = [(int(on.sum()), int(over.sum()), k) for k, (on, over) in enumerate(zip(border, everywhere, strict=True))]
-    return max(votes)[-1]
-
-
-def _open(data: bytes, source: str, suffix: str) -> "Image":
+def _open(data: bytes, suffix: str) -> "Image":
     """The picture as a viewer shows it, complete and undamaged."""
     from PIL import Image, ImageOps, UnidentifiedImageError
 
@@ -148,26 +133,26 @@ def _open(data: bytes, source: str, suffix: str) -> "Image":
             if kind == "PNG":
                 Image.open(io.BytesIO(data), formats=[kind]).verify()  # the checksums of all chunks
             image = Image.open(io.BytesIO(data), formats=[kind])
-            _check(image, source)
+            _check(image)
             image.load()
             return ImageOps.exif_transpose(image)
     except InputError:
         raise
     except Image.DecompressionBombError:
-        raise InputError(f"{source}: more pixels than {LARGEST:,}; scale it down") from None
+        raise InputError(f"more pixels than {LARGEST:,}; scale it down") from None
     except UnidentifiedImageError:
-        raise InputError(f"{source}: not a {kind} image: begins with {shorten(data[:8].decode('latin-1'))}") from None
+        raise InputError(f"not a {kind} image: begins with {shorten(data[:8].decode('latin-1'))}") from None
     except Exception as error:  # noqa: BLE001 (Pillow leaks many types on damaged files; nothing else in the block)
-        raise InputError(f"{source}: not a whole {kind} image: {shorten(str(error), 80)}") from None
+        raise InputError(f"not a whole {kind} image: {shorten(str(error), 80)}") from None
 
 
-def _check(image: "Image", source: str) -> None:
+def _check(image: "Image") -> None:
     width, height = image.size
     if width * height > LARGEST:
-        raise InputError(f"{source}: {width} x {height} pixels; at most {LARGEST:,} pixels: scale it down")
+        raise InputError(f"{width} x {height} pixels; at most {LARGEST:,} pixels: scale it down")
     frames = getattr(image, "n_frames", 1)
     if frames > 1:
-        raise InputError(f"{source}: holds {frames} pictures, an animation or a series; save one of them by itself")
+        raise InputError(f"holds {frames} pictures, an animation or a series; save one of them by itself")
 
 
 def _grey(image: "Image") -> Array:

@@ -12,18 +12,18 @@ from symrefine.shape import Index
 _LARGEST = 2.0**53
 
 
-def point_classes(content: Content, name: str, source: str) -> Index:
+def point_classes(content: Content, name: str) -> Index:
     """Classes [N] of the points of a cloud by a field of that name.
 
     Raises:
         InputError: no such field, or values that are neither whole numbers, texts nor colours.
     """
-    key = _key(content, name, "labels", source)
+    key = _key(content, name, "labels")
     weights = np.ones(len(content.points)) if content.weights is None else content.weights
-    return _classes(content, key, False, weights, source)
+    return _classes(content, key, False, weights)
 
 
-def triangle_classes(content: Content, name: str, owner: Index, corners: Index, source: str) -> Index:
+def triangle_classes(content: Content, name: str, owner: Index, corners: Index) -> Index:
     """Classes [T] of the triangles of a mesh by a field of its faces, or else of its vertices.
 
     A triangle takes the class of two corners or more; where all three differ, that of the first.
@@ -35,19 +35,19 @@ def triangle_classes(content: Content, name: str, owner: Index, corners: Index, 
     Raises:
         InputError: as for `point_classes`.
     """
-    key = _key(content, name, "labels", source)
+    key = _key(content, name, "labels")
     a, b, c = (content.points[corners[:, k]] for k in range(3))
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     if key in content.face_fields:
         covered = _sums(owner, areas, len(content.face_fields[key]))
-        return _classes(content, key, True, covered, source)[owner]
+        return _classes(content, key, True, covered)[owner]
     covered = _sums(corners.ravel(), np.repeat(areas, 3), len(content.points))
-    first, second, third = _classes(content, key, False, covered, source)[corners].T
+    first, second, third = _classes(content, key, False, covered)[corners].T
     chosen: Index = np.where(second == third, second, first)
     return chosen
 
 
-def point_weights(content: Content, name: str, source: str) -> Array:
+def point_weights(content: Content, name: str) -> Array:
     """Weights [N] of the points of a cloud by a field of that name; `Shape` judges the numbers.
 
     Raises:
@@ -55,29 +55,29 @@ def point_weights(content: Content, name: str, source: str) -> Array:
     """
     if name == "weights" and content.weights is not None:
         return content.weights
-    key = _key(content, name, "weights", source)
+    key = _key(content, name, "weights")
     values = content.point_fields.get(key)
     if values is None or values.ndim != 1 or values.dtype.kind not in "iuf":
-        raise InputError(f"{source}: {key} cannot weigh points; expected one number for each point")
+        raise InputError(f"{key} cannot weigh points; expected one number for each point")
     return values.astype(np.float64)
 
 
-def _key(content: Content, name: str, what: str, source: str) -> str:
+def _key(content: Content, name: str, what: str) -> str:
     """Name of the field as the file has it; titles of tables are in lower case."""
     offered = sorted({*content.point_fields, *content.face_fields})
     for key in (name, name.lower()):
         if key in offered:
             return key
     told = f"the file offers {', '.join(offered)}" if offered else "the file offers none"
-    raise InputError(f"{source}: no {what} {name!r}; {told}")
+    raise InputError(f"no {what} {name!r}; {told}")
 
 
-def _classes(content: Content, key: str, of_faces: bool, weights: Array, source: str) -> Index:
+def _classes(content: Content, key: str, of_faces: bool, weights: Array) -> Index:
     values = (content.face_fields if of_faces else content.point_fields)[key]
     if values.dtype.kind not in "US" and (row := _unfit(values)) is not None:
         where = content.face_name(row) if of_faces else content.point_name(row)
         right = "whole numbers" if values.ndim == 1 else "finite colours from 0 on"
-        raise InputError(f"{source}: {key} of {where} is {values[row].tolist()}; labels are {right}")
+        raise InputError(f"{key} of {where} is {values[row].tolist()}; labels are {right}")
     if values.ndim == 2:
         return colour_classes(values, weights)
     if values.dtype.kind in "US":

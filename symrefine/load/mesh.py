@@ -1,6 +1,7 @@
 """Faces as a file holds them, made into a triangle mesh in which every vertex counts and every triangle has area."""
 
 import logging
+from typing import Any
 
 import numpy as np
 
@@ -9,31 +10,32 @@ from symrefine.geometry import Array
 from symrefine.load.content import Content, Polygons
 from symrefine.load.labels import triangle_classes
 from symrefine.load.polygons import negligible, triangulate
-from symrefine.shape import Index, Measure, Shape
+from symrefine.shape import Index
 
 _LOG = logging.getLogger(__name__)
 
 
-def mesh_shape(content: Content, faces: Polygons, measure: Measure, source: str, *, labels: str | None = None) -> Shape:
-    """Triangle mesh of a file with faces.
+def mesh_arrays(content: Content, faces: Polygons, labels: str | None, source: str) -> dict[str, Any]:
+    """Points [V, 3], triangles [T, 3] and their classes [T], or None, of a file with faces, by the names `Shape` has.
 
     Polygons are triangulated; vertices that the format repeats are merged; triangles without area and vertices
     without a face carry no mass and go, so that they influence nothing.
 
     Args:
         labels: name of a field of the faces or the vertices that becomes the classes of the triangles.
+        source: name of the file, for the log.
 
     Raises:
         InputError: indices out of range, crossing outlines, no area at all, no such field.
     """
-    _check_range(content, faces, source)
-    triangles, owner = triangulate(content, faces, source)
+    _check_range(content, faces)
+    triangles, owner = triangulate(content, faces)
     corners = triangles
     points, triangles = _merged(content.points, triangles) if content.split else (content.points, triangles)
     flat = negligible(points, triangles)
     if flat.all():
         raise InputError(
-            f"{source}: no face has an area (first: {content.face_name(int(owner[0]))}, corners "
+            f"no face has an area (first: {content.face_name(int(owner[0]))}, corners "
             f"{points[triangles[0]].tolist()}); a mesh needs faces that are not collapsed to a line or a point"
         )
     used, compact = np.unique(triangles[~flat], return_inverse=True)
@@ -41,19 +43,17 @@ def mesh_shape(content: Content, faces: Polygons, measure: Measure, source: str,
         "%s: %d vertices, %d triangles; left out %d triangles without area and %d vertices without a face",
         source, len(used), int((~flat).sum()), int(flat.sum()), len(points) - len(used),
     )  # fmt: skip
-    classes = None
-    if labels is not None:
-        classes = triangle_classes(content, labels, owner[~flat], corners[~flat], source)
-    return Shape(points=points[used], faces=compact.reshape(-1, 3), labels=classes, measure=measure, source=source)
+    classes = None if labels is None else triangle_classes(content, labels, owner[~flat], corners[~flat])
+    return {"points": points[used], "faces": compact.reshape(-1, 3), "labels": classes}
 
 
-def _check_range(content: Content, faces: Polygons, source: str) -> None:
+def _check_range(content: Content, faces: Polygons) -> None:
     bad = np.flatnonzero((faces.corners < 0) | (faces.corners >= len(content.points)))
     if bad.size:
         row = int(np.searchsorted(faces.starts, bad[0], side="right")) - 1
         first = content.first_index
         raise InputError(
-            f"{source}: {content.face_name(row)} refers to vertex {faces.corners[bad[0]] + first}; the file has "
+            f"{content.face_name(row)} refers to vertex {faces.corners[bad[0]] + first}; the file has "
             f"{len(content.points)} vertices, numbered {first} to {len(content.points) - 1 + first}"
         )
 

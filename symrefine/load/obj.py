@@ -16,7 +16,7 @@ _IGNORED = frozenset("vt o g s usemap mtllib lod".split())
 _CORNERS = re.compile(r"(\s+[+-]?[0-9]{1,18}(/[+-]?[0-9]*){0,2})+")
 
 
-def read_obj(data: bytes, source: str) -> Content:
+def read_obj(data: bytes) -> Content:
     """Content of an OBJ file.
 
     Fields are `color`, behind the coordinates of the points, and `material`, the name after `usemtl` for each face.
@@ -28,14 +28,14 @@ def read_obj(data: bytes, source: str) -> Content:
     materials: list[str] = []
     material = ""
     other: dict[str, int] = {}
-    for number, text in _statements(numbered_lines(data, source, comment="#")):
+    for number, text in _statements(numbered_lines(data, comment="#")):
         keyword, _, rest = text.replace("\t", " ").partition(" ")
         if keyword == "v":
             vertices.append((number, rest))
         elif keyword == "vn":
             normals.append((number, rest))
         elif keyword == "f":
-            faces.append((number, _face((number, rest), len(vertices), source)))
+            faces.append((number, _face((number, rest), len(vertices))))
             materials.append(material)
         elif keyword == "usemtl":
             material = rest.strip()
@@ -43,15 +43,19 @@ def read_obj(data: bytes, source: str) -> Content:
             other.setdefault(keyword, number)
         elif keyword not in _IGNORED:
             raise InputError(
-                f"{source}: line {number}: {shorten(keyword)} is no statement of a polygonal OBJ file; expected "
+                f"line {number}: {shorten(keyword)} is no statement of a polygonal OBJ file; expected "
                 f"v vn f l p usemtl {' '.join(sorted(_IGNORED))}"
             )
     if not faces and "l" in other:
-        raise InputError(f"{source}: line {other['l']}: lines but no faces; expected faces, or vertices alone")
-    table = _vertices(vertices, source)
+        raise InputError(f"line {other['l']}: lines but no faces; expected faces, or vertices alone")
+    table = _vertices(vertices)
+    of_points = normals if not faces else []  # those of a cloud belong to the points in their order
+    if of_points and len(normals) != len(vertices):
+        told = count(len(normals), "normal")
+        raise InputError(f"{told} (vn) for {len(vertices)} points (v); expected as many")
     return Content(
         points=table[:, :3],
-        normals=_normals(normals, len(vertices), source) if normals and not faces else None,
+        normals=parse_table(of_points, columns=(3,), layout="vn x y z") if of_points else None,
         faces=polygons(corners for _, corners in faces) if faces else None,
         point_fields={"color": table[:, 3:]} if table.shape[1] == 6 else {},
         face_fields={"material": np.array(materials)} if any(materials) else {},
@@ -75,39 +79,29 @@ def _statements(lines: Iterable[Line]) -> Iterator[Line]:
         yield begun, held
 
 
-def _vertices(lines: list[Line], source: str) -> Array:
+def _vertices(lines: list[Line]) -> Array:
     """[N, 3], or [N, 6] with a colour."""
     table = parse_table(
-        lines, source, columns=(3, 4, 6), layout="v x y z, a weight of 1 or a colour of three numbers behind it"
+        lines, columns=(3, 4, 6), layout="v x y z, a weight of 1 or a colour of three numbers behind it"
     )
     if table.shape[1] == 4 and (bad := np.flatnonzero(table[:, 3] != 1.0)).size:
-        raise InputError(
-            f"{source}: line {lines[bad[0]][0]}: weight {table[bad[0], 3]} of a rational vertex; expected 1 or none"
-        )
+        raise InputError(f"line {lines[bad[0]][0]}: weight {table[bad[0], 3]} of a rational vertex; expected 1 or none")
     return table if table.shape[1] == 6 else table[:, :3]
 
 
-def _normals(lines: list[Line], points: int, source: str) -> Array:
-    """Normals of a cloud, which belong to the points in their order."""
-    if len(lines) != points:
-        raise InputError(f"{source}: {count(len(lines), 'normal')} (vn) for {points} points (v); expected as many")
-    return parse_table(lines, source, columns=(3,), layout="vn x y z")
-
-
-def _face(line: Line, vertices: int, source: str) -> list[int]:
+def _face(line: Line, vertices: int) -> list[int]:
     """Corners of a face, counted from 0; negative numbers in the file count back from the latest vertex."""
     number, text = line
     fields = text.split()
     if not _CORNERS.fullmatch(" " + text):
         field = next((field for field in fields if not _CORNERS.fullmatch(" " + field)), "")
-        raise InputError(f"{source}: line {number}: {shorten(field)} is no corner; expected v, v/vt or v/vt/vn")
+        raise InputError(f"line {number}: {shorten(field)} is no corner; expected v, v/vt or v/vt/vn")
     corners = [int(field.partition("/")[0]) for field in fields]
     if min(corners) > 0:
         return [index - 1 for index in corners]
     bad = next((index for index in corners if index == 0 or index < -vertices), None)
     if bad is not None:
         raise InputError(
-            f"{source}: line {number}: a face refers to vertex {bad}; vertices count from 1, or back from -1 to "
-            f"-{vertices} here"
+            f"line {number}: a face refers to vertex {bad}; vertices count from 1, or back from -1 to -{vertices} here"
         )
     return [index - 1 if index > 0 else vertices + index for index in corners]

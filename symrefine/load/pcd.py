@@ -4,10 +4,8 @@ import ctypes
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
@@ -43,22 +41,24 @@ class _Header:
         )
 
 
-def read_pcd(data: bytes, source: str) -> Content:
+def read_pcd(data: bytes, path: Path) -> Content:
     """Content of a PCD file; the viewpoint is where the sensor stood and moves no point.
 
     Fields are those of one value a point beside places, normals and colours (which PCD packs into one number); of
     compressed files, none.
     """
-    header = _parse_header(data, source)
+    header = _parse_header(data)
     normals = set(_NORMAL) <= set(header.names)
     wanted = [*_COORDINATES, *(_NORMAL if normals else ())]
-    places, others = len(wanted), _others(header)
+    places = len(wanted)
+    single = [name for name, size in zip(header.names, header.counts, strict=True) if size == 1]
+    others = [name for name in single if name not in _NOT_FIELDS and header.names.count(name) == 1]
     if header.encoding == "ascii":
-        table, lines = _read_text(data, header, [*wanted, *others], source)
+        table, lines = _read_text(data, header, [*wanted, *others])
     elif header.encoding == "binary":
-        table, lines = _read_binary(data, header, [*wanted, *others], source), None
+        table, lines = _read_binary(data, header, [*wanted, *others]), None
     else:
-        table, lines = _read_compressed(data, header, wanted, source), None
+        table, lines, others = _read_compressed(data, path, header, wanted), None, []
     return Content(
         points=table[:, :3],
         normals=table[:, 3:6] if normals else None,
@@ -67,15 +67,7 @@ def read_pcd(data: bytes, source: str) -> Content:
     )
 
 
-def _others(header: _Header) -> list[str]:
-    """Names of the fields that may label the points."""
-    if header.encoding == "binary_compressed":
-        return []
-    names = [name for name, size in zip(header.names, header.counts, strict=True) if size == 1]
-    return [name for name in names if name not in _NOT_FIELDS and header.names.count(name) == 1]
-
-
-def _parse_header(data: bytes, source: str) -> _Header:
+def _parse_header(data: bytes) -> _Header:
     entries: dict[str, list[str]] = {}
     size = lines = 0
     for line in data.splitlines(keepends=True):
@@ -84,79 +76,75 @@ def _parse_header(data: bytes, source: str) -> _Header:
         words = text.split()
         if words and words[0] not in _KEYS:
             raise InputError(
-                f"{source}: line {lines}: {shorten(text.strip())}; the header of a PCD file has lines FIELDS SIZE TYPE "
+                f"line {lines}: {shorten(text.strip())}; the header of a PCD file has lines FIELDS SIZE TYPE "
                 "COUNT WIDTH HEIGHT POINTS and ends with DATA"
             )
         if words:
             entries[words[0]] = words[1:]
         if "DATA" in entries:
-            return _interpret(entries, size, lines, source)
-    raise InputError(f"{source}: the header has no line DATA; the file is cut off or not a PCD file")
+            return _interpret(entries, size, lines)
+    raise InputError("the header has no line DATA; the file is cut off or not a PCD file")
 
 
-def _interpret(entries: dict[str, list[str]], size: int, lines: int, source: str) -> _Header:
+def _interpret(entries: dict[str, list[str]], size: int, lines: int) -> _Header:
     names = entries.get("FIELDS", [])
     types = [kind + width for kind, width in zip(entries.get("TYPE", []), entries.get("SIZE", []), strict=False)]
     counts = entries.get("COUNT", ["1"] * len(names))
     if not 0 < len(names) == len(entries.get("SIZE", [])) == len(entries.get("TYPE", [])) == len(counts):
-        raise InputError(f"{source}: FIELDS, SIZE, TYPE and COUNT of the header differ in length or are missing")
+        raise InputError("FIELDS, SIZE, TYPE and COUNT of the header differ in length or are missing")
     if not set(types) <= _TYPES:
-        raise InputError(f"{source}: TYPE and SIZE give {' '.join(types)}; expected of {' '.join(sorted(_TYPES))}")
+        raise InputError(f"TYPE and SIZE give {' '.join(types)}; expected of {' '.join(sorted(_TYPES))}")
     if any(names.count(name) != 1 or counts[names.index(name)] != "1" for name in _COORDINATES):
-        raise InputError(f"{source}: FIELDS are {' '.join(names)}; expected one x, one y and one z, each of COUNT 1")
+        raise InputError(f"FIELDS are {' '.join(names)}; expected one x, one y and one z, each of COUNT 1")
     encoding = " ".join(entries["DATA"])
     if encoding not in _ENCODINGS:
-        raise InputError(f"{source}: line {lines}: DATA {shorten(encoding)}; expected one of {', '.join(_ENCODINGS)}")
+        raise InputError(f"line {lines}: DATA {shorten(encoding)}; expected one of {', '.join(_ENCODINGS)}")
     return _Header(
-        names=names, types=types, counts=_whole(counts, "COUNT", source), points=_points(entries, source),
+        names=names, types=types, counts=_whole(counts, "COUNT"), points=_points(entries),
         encoding=encoding, size=size, lines=lines,
     )  # fmt: skip
 
 
-def _points(entries: dict[str, list[str]], source: str) -> int:
+def _points(entries: dict[str, list[str]]) -> int:
     """Number of points, which the header gives twice."""
     given = {key: entries.get(key, []) for key in ("WIDTH", "HEIGHT", "POINTS")}
     if any(len(words) != 1 for words in given.values()):
-        raise InputError(f"{source}: the header needs WIDTH, HEIGHT and POINTS, each with one number")
-    width, height, points = (_whole(words, key, source)[0] for key, words in given.items())
+        raise InputError("the header needs WIDTH, HEIGHT and POINTS, each with one number")
+    width, height, points = (_whole(words, key)[0] for key, words in given.items())
     if width * height != points:
-        raise InputError(f"{source}: the header gives POINTS {points}, but WIDTH {width} times HEIGHT {height}")
+        raise InputError(f"the header gives POINTS {points}, but WIDTH {width} times HEIGHT {height}")
     return points
 
 
-def _whole(words: list[str], key: str, source: str) -> list[int]:
+def _whole(words: list[str], key: str) -> list[int]:
     if not all(NATURAL.fullmatch(word) for word in words):
-        raise InputError(f"{source}: {key} {shorten(' '.join(words))} in the header; expected whole numbers")
+        raise InputError(f"{key} {shorten(' '.join(words))} in the header; expected whole numbers")
     return [int(word) for word in words]
 
 
-def _read_text(data: bytes, header: _Header, wanted: list[str], source: str) -> tuple[Array, list[int]]:
-    lines = [(number + header.lines, text) for number, text in numbered_lines(data[header.size :], source)]
+def _read_text(data: bytes, header: _Header, wanted: list[str]) -> tuple[Array, list[int]]:
+    lines = [(number + header.lines, text) for number, text in numbered_lines(data[header.size :])]
     layout = f"one line for each point: {' '.join(header.names)}"
-    table = parse_table(lines, source, columns=(sum(header.counts),), layout=layout)
+    table = parse_table(lines, columns=(sum(header.counts),), layout=layout)
     if len(table) != header.points:
-        raise InputError(f"{source}: the header gives POINTS {header.points}, {len(table)} lines of points follow it")
+        raise InputError(f"the header gives POINTS {header.points}, {len(table)} lines of points follow it")
     starts = [0, *itertools.accumulate(header.counts)]
     columns = [starts[header.names.index(name)] for name in wanted]
     return table[:, columns], [number for number, _ in lines]
 
 
-def _read_binary(data: bytes, header: _Header, wanted: list[str], source: str) -> Array:
+def _read_binary(data: bytes, header: _Header, wanted: list[str]) -> Array:
     record = header.record
     if len(data) - header.size != header.points * record.itemsize:
         raise InputError(
-            f"{source}: the header gives {count(header.points, 'point')} of {record.itemsize} bytes, "
+            f"the header gives {count(header.points, 'point')} of {record.itemsize} bytes, "
             f"{header.points * record.itemsize} in all; {len(data) - header.size} follow it"
         )
     table = np.frombuffer(data, record, offset=header.size)
-    return _pick(table, header, wanted)
-
-
-def _pick(table: NDArray[Any], header: _Header, wanted: list[str]) -> Array:
     return np.stack([as_float64(table[str(header.names.index(name))][:, 0]) for name in wanted], axis=1)
 
 
-def _read_compressed(data: bytes, header: _Header, wanted: list[str], source: str) -> Array:
+def _read_compressed(data: bytes, path: Path, header: _Header, wanted: list[str]) -> Array:
     """Compressed data through open3d, after the checks of size that it leaves out."""
     full = header.points * header.record.itemsize
     packed = int.from_bytes(data[header.size : header.size + 4], "little")
@@ -164,15 +152,15 @@ def _read_compressed(data: bytes, header: _Header, wanted: list[str], source: st
     follow = len(data) - header.size - 8
     if follow != packed or unpacked != full:
         raise InputError(
-            f"{source}: compressed data of {packed} bytes for {unpacked} are announced; {max(follow, 0)} follow, and "
+            f"compressed data of {packed} bytes for {unpacked} are announced; {max(follow, 0)} follow, and "
             f"the header asks for {full}"
         )
     if any(header.types[header.names.index(name)] != "F4" for name in wanted):
-        raise InputError(f"{source}: compressed coordinates must be of TYPE F and SIZE 4; save it as binary or ascii")
-    return _open3d_points(source, header, len(wanted))
+        raise InputError("compressed coordinates must be of TYPE F and SIZE 4; save it as binary or ascii")
+    return _open3d_points(path, header, len(wanted))
 
 
-def _open3d_points(path: str, header: _Header, columns: int) -> Array:
+def _open3d_points(path: Path, header: _Header, columns: int) -> Array:
     # Here, for it takes a second; libusb first, for open3d needs it and bare machines lack it.
     import libusb_package
 
@@ -180,8 +168,8 @@ def _open3d_points(path: str, header: _Header, columns: int) -> Array:
     import open3d as o3d
 
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        cloud = o3d.io.read_point_cloud(Path(path), format="pcd")
+        cloud = o3d.io.read_point_cloud(path, format="pcd")
     arrays = [np.asarray(cloud.points), np.asarray(cloud.normals)][: columns // 3]
     if any(len(array) != header.points for array in arrays):
-        raise InputError(f"{path}: the compressed data cannot be unpacked to {count(header.points, 'point')}")
+        raise InputError(f"the compressed data cannot be unpacked to {count(header.points, 'point')}")
     return np.concatenate(arrays, axis=1)

@@ -15,24 +15,24 @@ _COLOUR = ("red", "green", "blue")
 _PLACE = frozenset({*_COORDINATES, *_NORMAL})
 
 
-def read_ply(data: bytes, source: str) -> Content:
+def read_ply(data: bytes) -> Content:
     """Content of a PLY file; edges and camera data are not part of a shape.
 
     Fields are the properties of vertices and faces that are no coordinates, normals or lists, and `color` for red,
     green and blue.
     """
-    header = parse_header(data, source)
+    header = parse_header(data)
     elements = {element.name: element for element in header.elements}
     vertex = elements.get("vertex", Element(name="vertex", count=0))
-    _check_elements(elements, vertex, source)
+    _check_elements(elements, vertex)
     face = elements.get("face")
-    corners = _corner_property(face, source) if face is not None and face.count else ""
-    rows = read_rows(data, header, source)
+    corners = _corner_property(face) if face is not None and face.count else ""
+    rows = read_rows(data, header)
     vertices = rows["vertex"]
     return Content(
         points=_stack(vertices, _COORDINATES),
         normals=_stack(vertices, _NORMAL) if not corners and set(_NORMAL) <= _scalars(vertex) else None,
-        faces=_polygons(rows["face"], corners, source) if corners else None,
+        faces=_polygons(rows["face"], corners) if corners else None,
         point_fields=_fields(vertex, vertices),
         face_fields=_fields(face, rows["face"]) if face is not None and corners else {},
         point_lines=vertices.lines,
@@ -40,30 +40,30 @@ def read_ply(data: bytes, source: str) -> Content:
     )
 
 
-def _check_elements(elements: dict[str, Element], vertex: Element, source: str) -> None:
+def _check_elements(elements: dict[str, Element], vertex: Element) -> None:
     missing = [name for name in _COORDINATES if name not in _scalars(vertex)]
     if missing:
         raise InputError(
-            f"{source}: the header declares no {' '.join(missing)} of element 'vertex' (elements: "
+            f"the header declares no {' '.join(missing)} of element 'vertex' (elements: "
             f"{', '.join(elements) or 'none'}); a PLY file needs vertices with x, y and z"
         )
     counts = {name: element.count for name, element in elements.items()}
     if counts.get("tristrips"):
-        raise InputError(f"{source}: holds triangle strips, which are not supported; save it with an element 'face'")
+        raise InputError("holds triangle strips, which are not supported; save it with an element 'face'")
     if counts.get("edge") and not counts.get("face"):
-        raise InputError(f"{source}: holds edges but no faces; expected faces, or vertices alone")
+        raise InputError("holds edges but no faces; expected faces, or vertices alone")
 
 
 def _scalars(element: Element) -> set[str]:
     return {p.name for p in element.properties if not p.length_type}
 
 
-def _corner_property(face: Element, source: str) -> str:
+def _corner_property(face: Element) -> str:
     for p in face.properties:
         if p.name in _CORNERS and p.length_type:
             return p.name
     names = ", ".join(p.name for p in face.properties)
-    raise InputError(f"{source}: element 'face' has properties {names}; expected a list {' or '.join(_CORNERS)}")
+    raise InputError(f"element 'face' has properties {names}; expected a list {' or '.join(_CORNERS)}")
 
 
 def _fields(element: Element, rows: Rows) -> dict[str, Values]:
@@ -89,7 +89,7 @@ def _stack(rows: Rows, names: tuple[str, ...]) -> Array:
     return np.stack([as_float64(rows.columns[name].values) for name in names], axis=1)
 
 
-def _polygons(rows: Rows, name: str, source: str) -> Polygons:
+def _polygons(rows: Rows, name: str) -> Polygons:
     column = rows.columns[name]
     counts = column.counts if column.counts is not None else np.empty(0, dtype=np.int64)
     corners = column.values
@@ -98,5 +98,5 @@ def _polygons(rows: Rows, name: str, source: str) -> Polygons:
     if (bad := np.flatnonzero(np.logical_not(whole))).size:
         row = int(np.searchsorted(np.cumsum(counts), bad[0], side="right"))
         at = f" (line {rows.lines[row]})" if rows.lines else ""
-        raise InputError(f"{source}: face {row}{at} refers to vertex {corners[bad[0]]}; expected whole numbers")
+        raise InputError(f"face {row}{at} refers to vertex {corners[bad[0]]}; expected whole numbers")
     return Polygons(corners=corners.astype(np.int64), counts=counts)

@@ -1,6 +1,7 @@
 """Rows of a PLY file: all of them, and nothing behind them."""
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,16 +34,16 @@ class Rows:
     lines: list[int] | None = None
 
 
-def read_rows(data: bytes, header: Header, source: str) -> dict[str, Rows]:
+def read_rows(data: bytes, header: Header) -> dict[str, Rows]:
     """Rows of every element of the header, by its name.
 
     Raises:
         InputError: fewer or more rows than declared, or rows that do not have the declared form.
     """
-    return _read_binary(data, header, source) if header.byte_order else _read_text(data, header, source)
+    return _read_binary(data, header) if header.byte_order else _read_text(data, header)
 
 
-def _read_binary(data: bytes, header: Header, source: str) -> dict[str, Rows]:
+def _read_binary(data: bytes, header: Header) -> dict[str, Rows]:
     offset = header.size
     rows = {}
     for element in header.elements:
@@ -51,12 +52,12 @@ def _read_binary(data: bytes, header: Header, source: str) -> dict[str, Rows]:
             rows[element.name] = _columns(table, element)
             offset += table.nbytes
         elif element.has_lists:
-            rows[element.name], offset = _unequal_rows(data, offset, element, header.byte_order, source)
+            rows[element.name], offset = _unequal_rows(data, offset, element, header.byte_order)
         else:
-            raise _cut_off(element, (len(data) - offset) // _record(element, header.byte_order, []).itemsize, source)
+            raise _cut_off(element, (len(data) - offset) // _record(element, header.byte_order, []).itemsize)
     if offset != len(data):
         raise InputError(
-            f"{source}: {count(len(data) - offset, 'byte')} behind {_declared(header)}; "
+            f"{count(len(data) - offset, 'byte')} behind {_declared(header)}; "
             "the counts in the header are wrong, or something was added to the file"
         )
     return rows
@@ -111,10 +112,11 @@ def _columns(table: NDArray[np.void], element: Element) -> Rows:
     )
 
 
-def _unequal_rows(data: bytes, offset: int, element: Element, byte_order: str, source: str) -> tuple[Rows, int]:
+def _unequal_rows(data: bytes, offset: int, element: Element, byte_order: str) -> tuple[Rows, int]:
     """Rows one by one, and where they end."""
-    builder = _Builder(element)
+    rows: list[list[tuple[float, ...]]] = []
     for row in range(element.count):
+        rows.append([])
         try:
             for p in element.properties:
                 size = 1
@@ -122,77 +124,58 @@ def _unequal_rows(data: bytes, offset: int, element: Element, byte_order: str, s
                     (size,) = struct.unpack_from(byte_order + _STRUCT[p.length_type], data, offset)
                     offset += struct.calcsize(byte_order + _STRUCT[p.length_type])
                     if size < 0:
-                        raise InputError(f"{source}: row {row} of element '{element.name}': list of length {size}")
+                        raise InputError(f"row {row} of element '{element.name}': list of length {size}")
                 layout = f"{byte_order}{size}{_STRUCT[p.type]}"
-                builder.add(p.name, struct.unpack_from(layout, data, offset))
+                rows[-1].append(struct.unpack_from(layout, data, offset))
                 offset += struct.calcsize(layout)
         except struct.error:
-            raise _cut_off(element, row, source) from None
-    return builder.rows(None), offset
+            raise _cut_off(element, row) from None
+    return _rows(element, rows, None), offset
 
 
-class _Builder:
-    """Columns that grow row by row."""
-
-    def __init__(self, element: Element) -> None:
-        self._element = element
-        self._values: dict[str, list[float]] = {p.name: [] for p in element.properties}
-        self._counts: dict[str, list[int]] = {p.name: [] for p in element.properties}
-
-    def add(self, name: str, values: tuple[float, ...] | list[float]) -> None:
-        self._values[name].extend(values)
-        self._counts[name].append(len(values))
-
-    def rows(self, lines: list[int] | None) -> Rows:
-        columns = {
-            p.name: Column(
-                values=np.array(self._values[p.name]),
-                counts=np.array(self._counts[p.name], dtype=np.int64) if p.length_type else None,
-            )
-            for p in self._element.properties
-        }
-        return Rows(columns=columns, lines=lines)
+def _rows(element: Element, rows: Sequence[Sequence[Sequence[float]]], lines: list[int] | None) -> Rows:
+    """Columns of rows that were read one by one, each with the values of every property."""
+    columns = {}
+    for k, p in enumerate(element.properties):
+        parts = [row[k] for row in rows]
+        counts = np.array([len(part) for part in parts], dtype=np.int64) if p.length_type else None
+        columns[p.name] = Column(values=np.array([value for part in parts for value in part]), counts=counts)
+    return Rows(columns=columns, lines=lines)
 
 
-def _read_text(data: bytes, header: Header, source: str) -> dict[str, Rows]:
-    lines = [(number + header.lines, text) for number, text in numbered_lines(data[header.size :], source)]
+def _read_text(data: bytes, header: Header) -> dict[str, Rows]:
+    lines = [(number + header.lines, text) for number, text in numbered_lines(data[header.size :])]
     rows = {}
     start = 0
     for element in header.elements:
         part = lines[start : start + element.count]
-        read = _text_lists if element.has_lists else _text_values
-        rows[element.name] = read(part, element, source)
+        rows[element.name] = _text_rows(part, element)
         # After the rows themselves: where one count is too large, the first row of the wrong form says more.
         if len(part) < element.count:
-            raise _cut_off(element, len(part), source)
+            raise _cut_off(element, len(part))
         start += element.count
     if start < len(lines):
         raise InputError(
-            f"{source}: line {lines[start][0]}: {shorten(lines[start][1])} behind {_declared(header)}; "
+            f"line {lines[start][0]}: {shorten(lines[start][1])} behind {_declared(header)}; "
             "the counts in the header are wrong, or something was added to the file"
         )
     return rows
 
 
-def _text_values(lines: list[Line], element: Element, source: str) -> Rows:
-    names = [p.name for p in element.properties]
-    layout = f"a row of element '{element.name}': {' '.join(names)}"
-    table = parse_table(lines, source, columns=(len(names),), layout=layout)
-    columns = {name: Column(values=table[:, k]) for k, name in enumerate(names)}
-    return Rows(columns=columns, lines=[number for number, _ in lines])
-
-
-def _text_lists(lines: list[Line], element: Element, source: str) -> Rows:
+def _text_rows(lines: list[Line], element: Element) -> Rows:
     names = " ".join(f"LENGTH {p.name}..." if p.length_type else p.name for p in element.properties)
     layout = f"a row of element '{element.name}': {names}"
-    builder = _Builder(element)
+    numbers = [number for number, _ in lines]
+    if not element.has_lists:
+        table = parse_table(lines, columns=(len(element.properties),), layout=layout)
+        columns = {p.name: Column(values=table[:, k]) for k, p in enumerate(element.properties)}
+        return Rows(columns=columns, lines=numbers)
+    rows = []
     for line in lines:
-        parts = _split(parse_numbers(line, source, layout), element)
-        if len(parts) != len(element.properties):
-            raise InputError(f"{source}: line {line[0]}: {shorten(line[1])}; expected {layout}")
-        for p, part in zip(element.properties, parts, strict=True):
-            builder.add(p.name, part)
-    return builder.rows([number for number, _ in lines])
+        rows.append(_split(parse_numbers(line, layout), element))
+        if len(rows[-1]) != len(element.properties):
+            raise InputError(f"line {line[0]}: {shorten(line[1])}; expected {layout}")
+    return _rows(element, rows, numbers)
 
 
 def _split(numbers: list[float], element: Element) -> list[list[float]]:
@@ -211,9 +194,9 @@ def _split(numbers: list[float], element: Element) -> list[list[float]]:
     return parts if position == len(numbers) else [*parts, numbers[position:]]
 
 
-def _cut_off(element: Element, rows: int, source: str) -> InputError:
+def _cut_off(element: Element, rows: int) -> InputError:
     return InputError(
-        f"{source}: cut off in element '{element.name}': the header declares {count(element.count, 'row')}, "
+        f"cut off in element '{element.name}': the header declares {count(element.count, 'row')}, "
         f"only {rows} {'is' if rows == 1 else 'are'} there"
     )
 

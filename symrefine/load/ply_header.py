@@ -46,7 +46,7 @@ class Header:
     lines: int
 
 
-def parse_header(data: bytes, source: str) -> Header:
+def parse_header(data: bytes) -> Header:
     """Header of a PLY file.
 
     Raises:
@@ -54,31 +54,29 @@ def parse_header(data: bytes, source: str) -> Header:
     """
     end_of_line = next((e for e in (b"\r\n", b"\n", b"\r") if data.startswith(b"ply" + e)), None)
     if end_of_line is None:
-        raise InputError(f"{source}: not a PLY file: begins with {data[:12]!a}; expected a line 'ply'")
+        raise InputError(f"not a PLY file: begins with {data[:12]!a}; expected a line 'ply'")
     end = data.find(end_of_line + b"end_header" + end_of_line)
     if end < 0:
-        raise InputError(f"{source}: the header has no line 'end_header'; the file is cut off or not a PLY file")
+        raise InputError("the header has no line 'end_header'; the file is cut off or not a PLY file")
     size = end + len(b"end_header") + 2 * len(end_of_line)
     lines = [line.decode("utf-8", errors="replace") for line in data[:end].split(end_of_line)]
-    byte_order = _byte_order(lines, source)
+    byte_order = _byte_order(lines)
     elements: list[Element] = []
     for number, line in enumerate(lines[2:], start=3):
         fault = _add(elements, line.split())
         if fault:
-            raise InputError(f"{source}: line {number}: {shorten(line)}: {fault}")
+            raise InputError(f"line {number}: {shorten(line)}: {fault}")
     for element in elements:
         if not element.properties:
-            raise InputError(f"{source}: the header gives element '{element.name}' no properties")
+            raise InputError(f"the header gives element '{element.name}' no properties")
     return Header(byte_order=byte_order, elements=elements, size=size, lines=len(lines) + 1)
 
 
-def _byte_order(lines: list[str], source: str) -> str:
+def _byte_order(lines: list[str]) -> str:
     words = lines[1].split() if len(lines) > 1 else []
     if len(words) != 3 or words[0] != "format" or words[1] not in _BYTE_ORDER or words[2] != "1.0":
         choice = ", ".join(_BYTE_ORDER)
-        raise InputError(
-            f"{source}: line 2: {shorten(' '.join(words))}; expected 'format KIND 1.0', KIND one of {choice}"
-        )
+        raise InputError(f"line 2: {shorten(' '.join(words))}; expected 'format KIND 1.0', KIND one of {choice}")
     return _BYTE_ORDER[words[1]]
 
 

@@ -14,7 +14,7 @@ Flags = NDArray[np.bool_]
 FLAT = 1e-9
 
 
-def triangulate(content: Content, faces: Polygons, source: str) -> tuple[Index, Index]:
+def triangulate(content: Content, faces: Polygons) -> tuple[Index, Index]:
     """Triangles [T, 3] of all faces and the face [T] each is part of, in the order of the faces.
 
     A quadrilateral is cut along its shorter diagonal, so that mirror images are cut alike even where they are not
@@ -26,16 +26,16 @@ def triangulate(content: Content, faces: Polygons, source: str) -> tuple[Index, 
     few = np.flatnonzero(faces.counts < 3)
     if few.size:
         row = int(few[0])
-        raise InputError(f"{source}: {content.face_name(row)} has {faces.counts[row]} corners; expected at least 3")
+        raise InputError(f"{content.face_name(row)} has {faces.counts[row]} corners; expected at least 3")
     triples = np.flatnonzero(faces.counts == 3)
     quads = np.flatnonzero(faces.counts == 4)
-    pieces = [_gather(faces, triples, 3), _quads(content, faces, quads, source)]
+    pieces = [_gather(faces, triples, 3), _quads(content, faces, quads)]
     owners = [triples, np.repeat(quads, 2)]
     for row in np.flatnonzero(faces.counts > 4).tolist():
         corners = faces.corners[faces.starts[row] :][: faces.counts[row]]
         local = _polygon(content.points[corners])
         if len(local) == 0:
-            raise _crossing(content, row, source)
+            raise _crossing(content, row)
         pieces.append(corners[local])
         owners.append(np.full(len(local), row))
     owner = np.concatenate(owners)
@@ -60,7 +60,7 @@ def _gather(faces: Polygons, rows: Index, corners: int) -> Index:
     return gathered
 
 
-def _quads(content: Content, faces: Polygons, rows: Index, source: str) -> Index:
+def _quads(content: Content, faces: Polygons, rows: Index) -> Index:
     """Both halves [2Q, 3] of each quadrilateral, along the shorter of the diagonals that lie inside."""
     if len(rows) == 0:
         return np.empty((0, 3), dtype=np.int64)
@@ -72,7 +72,7 @@ def _quads(content: Content, faces: Polygons, rows: Index, source: str) -> Index
     valid_first, valid_second = (_inside(content.points, halves, normal) for halves in (first, second))
     bad = np.flatnonzero(~(valid_first | valid_second))
     if bad.size:
-        raise _crossing(content, int(rows[bad[0]]), source)
+        raise _crossing(content, int(rows[bad[0]]))
     shorter = ((p[:, 2] - p[:, 0]) ** 2).sum(axis=1) <= ((p[:, 3] - p[:, 1]) ** 2).sum(axis=1)
     use_first = valid_first & (shorter | ~valid_second)
     return np.where(use_first[:, None, None], first, second).reshape(-1, 3)
@@ -148,7 +148,5 @@ def _cross(u: Array, v: Array) -> Array:
     return product
 
 
-def _crossing(content: Content, row: int, source: str) -> InputError:
-    return InputError(
-        f"{source}: the outline of {content.face_name(row)} crosses or folds over itself; split it into triangles"
-    )
+def _crossing(content: Content, row: int) -> InputError:
+    return InputError(f"the outline of {content.face_name(row)} crosses or folds over itself; split it into triangles")

@@ -8,7 +8,6 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.content import Content, Polygons, as_float64
 from symrefine.load.text import Line, numbered_lines, parse_table, shorten
-from symrefine.shape import Index
 
 _HEADER = 84
 _RECORD = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -21,7 +20,7 @@ _PATTERN = [
 _BRACKET = {False: re.compile(r"solid\b", re.IGNORECASE), True: re.compile(r"endsolid\b", re.IGNORECASE)}
 
 
-def read_stl(data: bytes, source: str) -> Content:
+def read_stl(data: bytes) -> Content:
     """Content of an STL file; normals of facets repeat what the vertices say.
 
     Many binary files begin with `solid` like text files do, so the size decides.
@@ -31,13 +30,13 @@ def read_stl(data: bytes, source: str) -> Content:
         records = np.frombuffer(data, _RECORD, offset=_HEADER)
         return _content(as_float64(records["vertices"].reshape(-1, 3)), None)
     if data.lstrip()[:5].lower() == b"solid" and b"\0" not in data:
-        lines = _vertex_lines(numbered_lines(data, source), source)
-        table = parse_table(lines, source, columns=(3,), layout="vertex x y z")
+        lines = _vertex_lines(numbered_lines(data))
+        table = parse_table(lines, columns=(3,), layout="vertex x y z")
         return _content(table, [number for number, _ in lines])
     if declared is None:
-        raise InputError(f"{source}: not an STL file: neither 'solid' nor a header of {_HEADER} bytes")
+        raise InputError(f"not an STL file: neither 'solid' nor a header of {_HEADER} bytes")
     raise InputError(
-        f"{source}: not a whole STL file: does not begin with 'solid', and as a binary file would hold {declared} "
+        f"not a whole STL file: does not begin with 'solid', and as a binary file would hold {declared} "
         f"triangles in {_HEADER + declared * _RECORD.itemsize} bytes; it has {len(data)}"
     )
 
@@ -45,17 +44,13 @@ def read_stl(data: bytes, source: str) -> Content:
 def _content(points: Array, lines: list[int] | None) -> Content:
     if len(points) == 0:
         return Content(points=points)
-    faces = Polygons(corners=_count_to(len(points)), counts=np.full(len(points) // 3, 3))
+    faces = Polygons(corners=np.arange(len(points), dtype=np.int64), counts=np.full(len(points) // 3, 3))
     return Content(
         points=points, faces=faces, point_lines=lines, face_lines=None if lines is None else lines[::3], split=True
     )
 
 
-def _count_to(number: int) -> Index:
-    return np.arange(number, dtype=np.int64)
-
-
-def _vertex_lines(lines: list[Line], source: str) -> list[Line]:
+def _vertex_lines(lines: list[Line]) -> list[Line]:
     """Coordinates of all vertices in order; every line must be the one the grammar asks for.
 
     file := (solid facet* endsolid)+
@@ -70,12 +65,12 @@ def _vertex_lines(lines: list[Line], source: str) -> list[Line]:
         match = _PATTERN[position].match(text) if inside else None
         if match is None:
             choice = _expected(position) if inside else "solid"
-            raise InputError(f"{source}: line {number}: {shorten(text)}; expected {choice}")
+            raise InputError(f"line {number}: {shorten(text)}; expected {choice}")
         if _FACET[position] == "vertex":
             vertices.append((number, text[match.end() :]))
         position = (position + 1) % len(_FACET)
     if inside:
-        raise InputError(f"{source}: ends after line {lines[-1][0]}, where {_expected(position)} should follow")
+        raise InputError(f"ends after line {lines[-1][0]}, where {_expected(position)} should follow")
     return vertices
 
 

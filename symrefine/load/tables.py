@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symrefine.errors import InputError
+from symrefine.errors import InputError, about
 from symrefine.geometry import Array
 from symrefine.load.content import Content, Polygons, Values, as_float64
 from symrefine.load.molecule import is_molecule, read_molecule
@@ -21,22 +21,22 @@ _COLOURS = (("red", "green", "blue"), ("r", "g", "b"))
 _UNIT = 1e-2
 
 
-def read_xyz(data: bytes, source: str) -> Content:
+def read_xyz(data: bytes) -> Content:
     """Points of 3-space, with unit normals or without, where `#` begins a remark; or the atoms of chemical .xyz."""
-    lines = numbered_lines(data, source, comment="#")
+    lines = numbered_lines(data, comment="#")
     if is_molecule(lines):
-        return read_molecule(data, source)
-    table = parse_table(lines, source, columns=(3, 6), layout="3 columns (x y z) or 6 (x y z and a unit normal)")
+        return read_molecule(data)
+    table = parse_table(lines, columns=(3, 6), layout="3 columns (x y z) or 6 (x y z and a unit normal)")
     normals = table[:, 3:] if table.shape[1] == 6 else None
     if normals is not None and (bad := np.flatnonzero(~_is_unit(normals))).size:
         raise InputError(
-            f"{source}: line {lines[bad[0]][0]}: columns 4 to 6 are {normals[bad[0]].tolist()}, no unit normal; "
+            f"line {lines[bad[0]][0]}: columns 4 to 6 are {normals[bad[0]].tolist()}, no unit normal; "
             "expected 3 columns (x y z) or 6 (x y z and a unit normal), so remove colours"
         )
     return Content(points=table[:, :3], normals=normals, point_lines=[number for number, _ in lines])
 
 
-def read_table(data: bytes, source: str, named: Collection[str] = ()) -> Content:
+def read_table(data: bytes, named: Collection[str] = ()) -> Content:
     """Points of n-space, one a line, between commas if the first line has any; `#` begins a remark.
 
     A first line of names may say which columns are coordinates and which a normal.
@@ -45,7 +45,7 @@ def read_table(data: bytes, source: str, named: Collection[str] = ()) -> Content
         named: fields that the caller asks for: names of columns of numbers or texts, or `color` for those of red,
             green and blue. Other columns are refused as ever.
     """
-    lines = numbered_lines(data, source, comment="#")
+    lines = numbered_lines(data, comment="#")
     delimiter = "," if lines and "," in lines[0][1] else None
     names = [name.strip().strip('"').lower() for name in lines[0][1].split(delimiter)] if lines else []
     titled = bool(names) and not any(re.match(r"[+-]?\.?[0-9]|[+-]?(nan|inf)", name) for name in names)
@@ -53,18 +53,18 @@ def read_table(data: bytes, source: str, named: Collection[str] = ()) -> Content
     fields = _field_columns(names if titled else [], named)
     taken = {column for group in fields.values() for column in group}
     places = [column for column in range(len(names)) if column not in taken]
-    normals = _check_names([names[k] for k in places], lines[0][0], source) if titled else False
+    normals = _check_names([names[k] for k in places], lines[0][0]) if titled else False
     columns = (len(names),) if titled else ()
     layout = f"{count(len(names), 'column')} as in the first line" if titled else "as many numbers in every line"
-    texts = {k: entries for k in taken if (entries := _texts(rows, k, delimiter, source))}
+    texts = {k: entries for k in taken if (entries := _texts(rows, k, delimiter))}
     numeric = [_without(row, texts, delimiter) for row in rows] if texts else rows
-    table = parse_table(numeric, source, columns=columns, layout=layout, delimiter=delimiter)
+    table = parse_table(numeric, columns=columns, layout=layout, delimiter=delimiter)
     values = {name: np.array(texts.get(group[0], table[:, group])) for name, group in fields.items()}
     if titled:
         table = table[:, places]
     else:
-        _refuse_hidden_normals(table, source, "name the columns in a first line: x,y,z,nx,ny,nz or x1,...,x6")
-    _check_shape(table, source)
+        _refuse_hidden_normals(table, "name the columns in a first line: x,y,z,nx,ny,nz or x1,...,x6")
+    _check_shape(table)
     return Content(
         points=table[:, :3] if normals else table,
         normals=table[:, 3:] if normals else None,
@@ -82,13 +82,13 @@ def _field_columns(names: list[str], named: Collection[str]) -> dict[str, list[i
     return fields
 
 
-def _texts(rows: list[Line], column: int, delimiter: str | None, source: str) -> list[str]:
+def _texts(rows: list[Line], column: int, delimiter: str | None) -> list[str]:
     """Entries of a column that holds anything but numbers; none of a column of numbers, or where a row is short."""
     entries = [fields[column].strip().strip('"') for _, text in rows if len(fields := text.split(delimiter)) > column]
     if len(entries) < len(rows) or all(is_number(entry) for entry in entries):
         return []
     if "" in entries:
-        raise InputError(f"{source}: line {rows[entries.index('')][0]}, column {column + 1}: is empty")
+        raise InputError(f"line {rows[entries.index('')][0]}, column {column + 1}: is empty")
     return entries
 
 
@@ -99,7 +99,7 @@ def _without(row: Line, columns: Collection[int], delimiter: str | None) -> Line
     return number, (delimiter or " ").join(fields)
 
 
-def _check_names(names: list[str], line: int, source: str) -> bool:
+def _check_names(names: list[str], line: int) -> bool:
     """Whether the columns end in a normal; refuses names that are no coordinates."""
     numbered = [[f"x{k + first}" for k in range(len(names))] for first in (0, 1)]
     if names == ["x", "y", "z", "nx", "ny", "nz"]:
@@ -107,43 +107,43 @@ def _check_names(names: list[str], line: int, source: str) -> bool:
     if names in (["x", "y"], ["x", "y", "z"], ["x", "y", "z", "w"]) or names in numbered:
         return False
     raise InputError(
-        f"{source}: line {line}: columns {shorten(','.join(names))}; expected x,y or x,y,z or x,y,z,nx,ny,nz or "
+        f"line {line}: columns {shorten(','.join(names))}; expected x,y or x,y,z or x,y,z,nx,ny,nz or "
         "x1,...,xn: keep only these, name one as labels or weights, or remove the line of names if every column is a "
         f"coordinate{separators(','.join(names), ',')}"
     )
 
 
-def read_npy(data: bytes, source: str) -> Content:
+def read_npy(data: bytes) -> Content:
     """Points of n-space: one array [N, n] of real numbers."""
-    points = _numbers(_read_array(io.BytesIO(data), source), "the array", source)
-    _refuse_hidden_normals(points, source, "save points and normals in an .npz, or 6-D points as `points` in an .npz")
-    _check_shape(points, source)
+    points = _numbers(_read_array(io.BytesIO(data)), "the array")
+    _refuse_hidden_normals(points, "save points and normals in an .npz, or 6-D points as `points` in an .npz")
+    _check_shape(points)
     return Content(points=points)
 
 
-def read_npz(data: bytes, source: str, named: Collection[str] = ()) -> Content:
+def read_npz(data: bytes, named: Collection[str] = ()) -> Content:
     """Arrays named as the fields of a shape: points, and normals, weights or faces [F, 3] if there are any.
 
     Args:
         named: further arrays that the caller asks for: numbers or texts [F] for faces, [N] for points (the faces have
             them where both would do), or colours [F, 3] or [N, 3], [F, 4] or [N, 4]. Others are refused as ever.
     """
-    arrays = _read_archive(data, source)
+    arrays = _read_archive(data)
     fields = {name: arrays.pop(name) for name in named if name in arrays and name not in _FIELDS}
     unknown = sorted(set(arrays) - set(_FIELDS))
     if unknown or "points" not in arrays:
         raise InputError(
-            f"{source}: holds arrays {', '.join(sorted(arrays)) or '(none)'}; expected points, and any of "
+            f"holds arrays {', '.join(sorted(arrays)) or '(none)'}; expected points, and any of "
             f"{', '.join(_FIELDS[1:])}, and what you name as labels or weights"
         )
-    numbers = {name: _numbers(array, name, source) for name, array in arrays.items() if name != "faces"}
-    _check_shape(numbers["points"], source)
-    faces = _faces(arrays["faces"], source) if "faces" in arrays else None
+    numbers = {name: _numbers(array, name) for name, array in arrays.items() if name != "faces"}
+    _check_shape(numbers["points"])
+    faces = _faces(arrays["faces"]) if "faces" in arrays else None
     if faces is not None and "weights" in arrays:
-        raise InputError(f"{source}: weights and faces; a mesh takes its weights from its faces: remove one of them")
+        raise InputError("weights and faces; a mesh takes its weights from its faces: remove one of them")
     if faces is not None and numbers["points"].shape[1] != 3:
-        raise InputError(f"{source}: faces over points {numbers['points'].shape}; faces need points [N, 3]")
-    point_fields, face_fields = _sorted(fields, len(numbers["points"]), 0 if faces is None else len(faces), source)
+        raise InputError(f"faces over points {numbers['points'].shape}; faces need points [N, 3]")
+    point_fields, face_fields = _sorted(fields, len(numbers["points"]), 0 if faces is None else len(faces))
     return Content(
         points=numbers["points"],
         normals=numbers.get("normals") if faces is None else None,
@@ -154,9 +154,7 @@ def read_npz(data: bytes, source: str, named: Collection[str] = ()) -> Content:
     )
 
 
-def _sorted(
-    fields: dict[str, NDArray[Any]], points: int, faces: int, source: str
-) -> tuple[dict[str, Values], dict[str, Values]]:
+def _sorted(fields: dict[str, NDArray[Any]], points: int, faces: int) -> tuple[dict[str, Values], dict[str, Values]]:
     """The fields of the points and those of the faces, by their lengths."""
     of_points: dict[str, Values] = {}
     of_faces: dict[str, Values] = {}
@@ -165,7 +163,7 @@ def _sorted(
         if not fit or len(array) not in {points, faces or points} or array.dtype.kind not in "biufUS":
             lengths = f"{points} points" + (f", {faces} faces" if faces else "")
             raise InputError(
-                f"{source}: {name} is {array.dtype} of shape {array.shape}; expected numbers or texts, or colours "
+                f"{name} is {array.dtype} of shape {array.shape}; expected numbers or texts, or colours "
                 f"[N, 3], for {lengths}"
             )
         values = array.astype(np.int64) if array.dtype.kind == "b" else array
@@ -173,51 +171,52 @@ def _sorted(
     return of_points, of_faces
 
 
-def _read_archive(data: bytes, source: str) -> dict[str, NDArray[Any]]:
+def _read_archive(data: bytes) -> dict[str, NDArray[Any]]:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = {name: archive.read(name) for name in archive.namelist()}
     except Exception as error:  # noqa: BLE001 (zipfile leaks many types on damaged files; nothing else in the block)
-        raise InputError(f"{source}: not a whole .npz archive: {shorten(str(error), 80)}") from None
-    return {
-        name.removesuffix(".npy"): _read_array(io.BytesIO(member), f"{source}: {name}")
-        for name, member in members.items()
-    }
+        raise InputError(f"not a whole .npz archive: {shorten(str(error), 80)}") from None
+    arrays = {}
+    for name, member in members.items():
+        with about(name):
+            arrays[name.removesuffix(".npy")] = _read_array(io.BytesIO(member))
+    return arrays
 
 
-def _read_array(stream: io.BytesIO, source: str) -> NDArray[Any]:
+def _read_array(stream: io.BytesIO) -> NDArray[Any]:
     try:
         array: NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)
     except Exception as error:  # noqa: BLE001 (NumPy evaluates the header: many types; nothing else in the block)
-        raise InputError(f"{source}: not a whole .npy array of numbers: {shorten(str(error), 80)}") from None
+        raise InputError(f"not a whole .npy array of numbers: {shorten(str(error), 80)}") from None
     rest = len(stream.read())
     if rest:
-        raise InputError(f"{source}: {count(rest, 'byte')} behind the array of shape {array.shape}; save it again")
+        raise InputError(f"{count(rest, 'byte')} behind the array of shape {array.shape}; save it again")
     return array
 
 
-def _numbers(array: NDArray[Any], name: str, source: str) -> Array:
+def _numbers(array: NDArray[Any], name: str) -> Array:
     if array.dtype.kind not in "iuf":
-        raise InputError(f"{source}: {name} is of type {array.dtype}; expected real numbers, integer or floating")
+        raise InputError(f"{name} is of type {array.dtype}; expected real numbers, integer or floating")
     return as_float64(array)
 
 
-def _faces(array: NDArray[Any], source: str) -> Polygons:
+def _faces(array: NDArray[Any]) -> Polygons:
     if array.dtype.kind not in "iu" or array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
-        raise InputError(f"{source}: faces have shape {array.shape} of {array.dtype}; expected [F, 3] integers, F >= 1")
+        raise InputError(f"faces have shape {array.shape} of {array.dtype}; expected [F, 3] integers, F >= 1")
     return Polygons(corners=array.ravel().astype(np.int64), counts=np.full(len(array), 3))
 
 
-def _check_shape(table: Array, source: str) -> None:
+def _check_shape(table: Array) -> None:
     if table.ndim != 2 or table.shape[1] < 2:
         shape = f"shape {table.shape}" if table.ndim != 2 else f"{len(table)} rows of {count(table.shape[1], 'number')}"
-        raise InputError(f"{source}: {shape}; expected one row [N, n] for each point, n >= 2 coordinates")
+        raise InputError(f"{shape}; expected one row [N, n] for each point, n >= 2 coordinates")
 
 
-def _refuse_hidden_normals(table: Array, source: str, remedy: str) -> None:
+def _refuse_hidden_normals(table: Array, remedy: str) -> None:
     """Six columns are points of 6-space, unless the last three are always a unit vector: that is no accident."""
     if table.ndim == 2 and table.shape[1] == 6 and len(table) and _is_unit(table[:, 3:]).all():
-        raise InputError(f"{source}: columns 4 to 6 are unit vectors in every row, normals or coordinates? {remedy}")
+        raise InputError(f"columns 4 to 6 are unit vectors in every row, normals or coordinates? {remedy}")
 
 
 def _is_unit(vectors: Array) -> NDArray[np.bool_]:

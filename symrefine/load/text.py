@@ -16,14 +16,14 @@ INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 NATURAL = re.compile(r"[0-9]{1,18}")
 
 
-def numbered_lines(data: bytes, source: str, *, comment: str | None = None) -> list[Line]:
+def numbered_lines(data: bytes, *, comment: str | None = None) -> list[Line]:
     """Lines that hold something; `comment` begins a remark that lasts to the end of its line.
 
     Raises:
         InputError: bytes that no text file holds.
     """
     if b"\0" in data:
-        raise InputError(f"{source}: not a text file: zero byte at offset {data.index(0)}")
+        raise InputError(f"not a text file: zero byte at offset {data.index(0)}")
     # Names and remarks may be in any encoding; a number that is not ASCII is refused where it is parsed.
     text = data.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
     lines = enumerate(text.split("\n"), start=1)
@@ -34,7 +34,6 @@ def numbered_lines(data: bytes, source: str, *, comment: str | None = None) -> l
 
 def parse_table(
     lines: Sequence[Line],
-    source: str,
     *,
     columns: Collection[int] = (),
     layout: str = "one row of numbers a line",
@@ -44,7 +43,6 @@ def parse_table(
 
     Args:
         lines: the rows.
-        source: file, for messages.
         columns: numbers of columns that are right; any, if empty, as long as all rows agree.
         layout: what would be right, for messages.
         delimiter: between the columns; white space if None.
@@ -54,31 +52,30 @@ def parse_table(
     """
     if not lines:
         return np.empty((0, max(columns, default=0)))
-    if not all(text for _, text in lines):
-        # NumPy would leave the row out.
-        _explain(lines, source, columns, layout, delimiter)
+    fault: object = "an empty row"
     try:
-        table = np.loadtxt([text for _, text in lines], comments=None, delimiter=delimiter, ndmin=2)
+        if all(text for _, text in lines):  # NumPy would leave an empty row out
+            table = np.loadtxt([text for _, text in lines], comments=None, delimiter=delimiter, ndmin=2)
+            if not columns or table.shape[1] in columns:
+                return table
     except ValueError as error:
-        # NumPy counts rows, not lines, and stops at the first fault of any kind: look again, slowly, for a message.
-        _explain(lines, source, columns, layout, delimiter)
-        raise InputError(f"{source}: {error}; expected {layout}") from None
-    if columns and table.shape[1] not in columns:
-        _explain(lines, source, columns, layout, delimiter)
-    return table
+        fault = error
+    # NumPy counts rows, not lines, and stops at the first fault of any kind: look again, slowly, for a message.
+    _explain(lines, columns, layout, delimiter)
+    raise InputError(f"{fault}; expected {layout}")
 
 
-def parse_integers(line: Line, source: str, what: str) -> list[int]:
+def parse_integers(line: Line, what: str) -> list[int]:
     """All entries of a line as whole numbers."""
     number, text = line
     fields = text.split()
     for field in fields:
         if not INTEGER.fullmatch(field):
-            raise InputError(f"{source}: line {number}: {shorten(field)} is not a whole number; expected {what}")
+            raise InputError(f"line {number}: {shorten(field)} is not a whole number; expected {what}")
     return [int(field) for field in fields]
 
 
-def parse_numbers(line: Line, source: str, layout: str) -> list[float]:
+def parse_numbers(line: Line, layout: str) -> list[float]:
     """All entries of a line, for rows that differ in length."""
     number, text = line
     fields = text.split()
@@ -88,7 +85,7 @@ def parse_numbers(line: Line, source: str, layout: str) -> list[float]:
     except ValueError:
         pass
     column, field = next((k, field) for k, field in enumerate(fields, start=1) if not is_number(field))
-    raise InputError(f"{source}: line {number}, column {column}: {shorten(field)} is not a number; expected {layout}")
+    raise InputError(f"line {number}, column {column}: {shorten(field)} is not a number; expected {layout}")
 
 
 def shorten(text: str, limit: int = 40) -> str:
@@ -96,22 +93,21 @@ def shorten(text: str, limit: int = 40) -> str:
     return ascii(text if len(text) <= limit else text[: limit - 3] + "...")
 
 
-def _explain(lines: Sequence[Line], source: str, columns: Collection[int], layout: str, delimiter: str | None) -> None:
+def _explain(lines: Sequence[Line], columns: Collection[int], layout: str, delimiter: str | None) -> None:
     width = 0
     for number, text in lines:
         fields = [field.strip() for field in text.split(delimiter)]
         for column, field in enumerate(fields, start=1):
             if not is_number(field):
                 raise InputError(
-                    f"{source}: line {number}, column {column}: {shorten(field)} is not a number; expected {layout}"
+                    f"line {number}, column {column}: {shorten(field)} is not a number; expected {layout}"
                     f"{separators(text, delimiter)}"
                 )
         if columns and len(fields) not in columns:
-            raise InputError(f"{source}: line {number} has {count(len(fields), 'column')}; expected {layout}")
+            raise InputError(f"line {number} has {count(len(fields), 'column')}; expected {layout}")
         if width and len(fields) != width:
             raise InputError(
-                f"{source}: line {number} has {count(len(fields), 'column')}, the lines above have {width}; "
-                f"expected {layout}"
+                f"line {number} has {count(len(fields), 'column')}, the lines above have {width}; expected {layout}"
             )
         width = len(fields)
 

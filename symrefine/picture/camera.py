@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from symrefine.geometry import Array, read_only, unit
+from symrefine.geometry import Array, ReadOnly, unit
 from symrefine.picture.scene import Scene
 
 ELEVATIONS_DEG = (22, 26, 30, 34)
@@ -16,17 +16,13 @@ OPEN, FRONTAL = 0.35, 0.8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Camera:
+class Camera(ReadOnly):
     """Pinhole camera at `eye` [3], looking at `target` [3], with `up` [3] upwards; `fov_rad` spans the height."""
 
     eye: Array
     target: Array
     up: Array
     fov_rad: float
-
-    def __post_init__(self) -> None:
-        for name in ("eye", "target", "up"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def frame(self) -> Array:
@@ -53,9 +49,14 @@ def look_at(scene: Scene, *, aspect: float, fov_rad: float, fill: float = 0.92) 
         fov_rad: angle that the height of the image spans.
         fill: share of the image that may be used.
     """
-    back = _line_of_sight(scene)
+    # The direction from the shape to the eye is the best of a grid.
+    angles = np.radians(list(product(ELEVATIONS_DEG, range(0, 360, AZIMUTH_STEP_DEG))))
+    level = [(math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)) for e, a in angles]
+    candidates = np.array(level) @ scene.stage.frame
+    back = candidates[int(np.argmax(np.round(_merit(candidates, scene), 4)))]
     frame = _frame(back, scene.stage.frame[2])
-    corners = _outline(scene) @ frame.T
+    sheets = [] if scene.crowded else [q.corners for q in scene.planes]
+    corners = np.concatenate([scene.stage.points, *sheets, *(a.ends for a in scene.axes)]) @ frame.T
     tangent = np.array([aspect, 1.0]) * fill * math.tan(0.5 * fov_rad)
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     for _ in range(4):  # what is near looks larger, so the middle moves with the distance
@@ -67,29 +68,10 @@ def look_at(scene: Scene, *, aspect: float, fov_rad: float, fill: float = 0.92) 
     return Camera(eye=target + distance * back, target=target, up=scene.stage.frame[2], fov_rad=fov_rad)
 
 
-def _outline(scene: Scene) -> Array:
-    """Points that must be in view."""
-    sheets = [] if scene.crowded else [q.corners for q in scene.planes]
-    return np.concatenate([scene.stage.points, *sheets, *(a.ends for a in scene.axes)])
-
-
 def _frame(back: Array, up: Array) -> Array:
     back = unit(back)
     right = unit(np.cross(up, back))
     return np.stack([right, np.cross(back, right), back])
-
-
-def _line_of_sight(scene: Scene) -> Array:
-    """Direction from the shape to the eye: the best of a grid."""
-    angles = product(ELEVATIONS_DEG, range(0, 360, AZIMUTH_STEP_DEG))
-    candidates = np.array([_direction(math.radians(e), math.radians(a)) for e, a in angles]) @ scene.stage.frame
-    best = int(np.argmax(np.round(_merit(candidates, scene), 4)))
-    return np.asarray(candidates[best])
-
-
-def _direction(elevation: float, azimuth: float) -> tuple[float, float, float]:
-    level = math.cos(elevation)
-    return level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)
 
 
 def _merit(candidates: Array, scene: Scene) -> Array:

@@ -64,7 +64,9 @@ def place_labels(scene: Scene, camera: Camera, painted: Array) -> list[Label]:
     placed: list[Label] = []
     wanted = [(line.name, line.colour, line.ends[::-1]) for line in scene.axes]
     if not scene.crowded:
-        wanted += [(quad.name, quad.colour, _around(quad.corners)) for quad in scene.planes]
+        # Corners and middles of the sides.
+        around = [np.concatenate([q.corners, 0.5 * (q.corners + np.roll(q.corners, -1, axis=0))]) for q in scene.planes]
+        wanted += [(quad.name, quad.colour, places) for quad, places in zip(scene.planes, around, strict=True)]
     middle, _ = camera.project(np.zeros((1, 3)), width, height)
     for text, colour, anchors in wanted:
         xy, depth = camera.project(anchors, width, height)
@@ -78,11 +80,6 @@ def place_labels(scene: Scene, camera: Camera, painted: Array) -> list[Label]:
                 placed.append(label)
                 break
     return placed
-
-
-def _around(corners: Array) -> Array:
-    """Corners and middles of the sides."""
-    return np.concatenate([corners, 0.5 * (corners + np.roll(corners, -1, axis=0))])
 
 
 def _inked(painted: Array, at: Array) -> float:

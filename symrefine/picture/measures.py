@@ -8,24 +8,14 @@ import numpy as np
 from symrefine.fit.refine import Iterate
 
 
-def cost_series(history: Sequence[Iterate]) -> list[float]:
-    """Mean weighted squared residual of the pairs."""
-    return [i.cost for i in history[1:]]
+def series(history: Sequence[Iterate], name: str) -> list[float]:
+    """A field of each iterate: mean weighted squared residual (`cost`), pairs in agreement (`inliers`), `step`."""
+    return [float(getattr(i, name)) for i in history[1:]]
 
 
 def rms_series(history: Sequence[Iterate], unit: float = 1.0) -> list[float]:
     """Root of the cost, in RMS radii times `unit`; exact data leave a cost of rounding errors, of either sign."""
-    return [unit * float(np.sqrt(max(cost, 0.0))) for cost in cost_series(history)]
-
-
-def step_series(history: Sequence[Iterate]) -> list[float]:
-    """Largest change of each iteration, radians and RMS radii together."""
-    return [i.step for i in history[1:]]
-
-
-def inlier_series(history: Sequence[Iterate]) -> list[float]:
-    """Pairs in agreement, over all operations."""
-    return [float(i.inliers) for i in history[1:]]
+    return [unit * float(np.sqrt(max(cost, 0.0))) for cost in series(history, "cost")]
 
 
 def turn_series_deg(history: Sequence[Iterate]) -> list[float]:

@@ -155,7 +155,8 @@ def _strokes(planes: tuple[Quad, ...], axes: tuple[Line, ...], camera: Camera, r
     """Edges of planes, axes and their marks."""
     drawn = [(np.vstack([quad.corners, quad.corners[:1]]), EDGE, quad.colour, 0.0) for quad in planes]
     for line in axes:
-        drawn += [(part, AXIS_LINE * share, line.colour, HIDDEN) for part, share in _parts(line)]
+        drawn += [(line.ends, AXIS_LINE, line.colour, HIDDEN)]
+        drawn += [(line.mark, 0.75 * AXIS_LINE, line.colour, HIDDEN)] if len(line.mark) else []
     for number, (strip, thickness, _, _) in enumerate(drawn):
         _draw(raster, strip, thickness, number, camera)
     return Strokes(
@@ -164,10 +165,6 @@ def _strokes(planes: tuple[Quad, ...], axes: tuple[Line, ...], camera: Camera, r
         colours=np.array([_rgb(colour) for _, _, colour, _ in drawn]).reshape(-1, 3),
         ghosts=np.array([ghost for _, _, _, ghost in drawn]),
     )
-
-
-def _parts(line: Line) -> list[tuple[Array, float]]:
-    return [(line.ends, 1.0)] + ([(line.mark, 0.75)] if len(line.mark) else [])
 
 
 def _draw(raster: Raster, strip: Array, thickness: float, number: int, camera: Camera) -> None:

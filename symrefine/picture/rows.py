@@ -1,11 +1,10 @@
 """What was found and what was turned down, as rows of a table."""
 
-import math
 from dataclasses import dataclass
 
-from symrefine.detection.result import Detection, FoundAxis
+from symrefine.detection.result import Detection, FoundAxis, FoundPlane
 from symrefine.picture.scene import AXIS, MISS, Colour, plane_colour
-from symrefine.picture.words import direction, order_name
+from symrefine.picture.words import direction, kind_name, order_name
 from symrefine.surface.misses import Deviation
 
 
@@ -26,56 +25,29 @@ class Row:
 
 def found_rows(detection: Detection) -> list[Row]:
     """Planes, then axes, then the inversion."""
-    planes = [
-        Row(
-            name=str(k + 1),
-            colour=plane_colour(k),
-            kind="mirror plane",
-            vector=direction(p.plane.normal),
-            residual=p.residual,
-            score=p.confidence,
-        )
+    rows = [
+        _row(str(k + 1), plane_colour(k), kind_name("plane"), direction(p.plane.normal), p)
         for k, p in enumerate(detection.planes)
     ]
-    return planes + [_axis_row(a) for a in detection.axes] + _inversion_rows(detection)
-
-
-def _axis_row(found: FoundAxis) -> Row:
-    return Row(
-        name=order_name(found.order, found.improper),
-        colour=AXIS,
-        kind=_kind("improper" if found.improper else "axis", found.order),
-        vector=direction(found.axis.direction),
-        residual=found.residual,
-        score=found.confidence,
-    )
-
-
-def _inversion_rows(detection: Detection) -> list[Row]:
+    for a in detection.axes:
+        kind = kind_name("improper" if a.improper else "axis", a.order)
+        rows.append(_row(order_name(a.order, a.improper), AXIS, kind, direction(a.axis.direction), a))
     miss, sure = detection.inversion_residual, detection.inversion_confidence
     if miss is None or sure is None:
-        return []
-    return [Row(name="i", colour=AXIS, kind="inversion", vector="about the centre", residual=miss, score=sure)]
+        return rows
+    about = "about the centre"
+    return [*rows, Row(name="i", colour=AXIS, kind=kind_name("inversion"), vector=about, residual=miss, score=sure)]
+
+
+def _row(name: str, colour: Colour, kind: str, vector: str, found: FoundPlane | FoundAxis) -> Row:
+    return Row(name=name, colour=colour, kind=kind, vector=vector, residual=found.residual, score=found.confidence)
 
 
 def near_miss_rows(detection: Detection) -> list[Row]:
     """Candidates turned down, best first."""
-    return [
-        Row(
-            name=str(k),
-            colour=MISS,
-            kind=_kind(m.kind, m.order)
-            + (f" {order_name(m.order, m.kind == 'improper')}" if m.kind in ("axis", "improper") else ""),
-            vector=direction(m.direction),
-            residual=m.residual,
-            score=m.excess,
-        )
-        for k, m in enumerate(detection.near_misses, start=1)
-    ]
-
-
-def _kind(kind: str, order: float) -> str:
-    if kind == "axis" and math.isinf(order):
-        return "revolution"
-    names = {"plane": "mirror plane", "axis": "rotation", "improper": "rotoreflection", "inversion": "inversion"}
-    return names[kind]
+    rows = []
+    for k, m in enumerate(detection.near_misses, start=1):
+        order = f" {order_name(m.order, m.kind == 'improper')}" if m.kind in ("axis", "improper") else ""
+        kind, where = kind_name(m.kind, m.order) + order, direction(m.direction)
+        rows.append(Row(name=str(k), colour=MISS, kind=kind, vector=where, residual=m.residual, score=m.excess))
+    return rows

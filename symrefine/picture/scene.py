@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from symrefine.detection.result import Detection, FoundAxis
-from symrefine.geometry import Array, Plane, read_only, unit
+from symrefine.geometry import Array, Plane, ReadOnly, unit
 from symrefine.picture.words import order_name
 from symrefine.shape import Shape
 
@@ -39,7 +39,7 @@ def plane_colour(index: int) -> Colour:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Quad:
+class Quad(ReadOnly):
     """Part of a plane to draw: corners [4, 3] in turn, unit normal, name and colour."""
 
     corners: Array
@@ -47,13 +47,9 @@ class Quad:
     name: str
     colour: Colour
 
-    def __post_init__(self) -> None:
-        for name in ("corners", "normal"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Line:
+class Line(ReadOnly):
     """Part of an axis to draw: ends [2, 3], name, colour, order, and a mark [K, 3] around it that tells its order."""
 
     ends: Array
@@ -62,13 +58,9 @@ class Line:
     order: float
     mark: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
-    def __post_init__(self) -> None:
-        for name in ("ends", "mark"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Stage:
+class Stage(ReadOnly):
     """Where a shape stands in its picture.
 
     Attributes:
@@ -82,10 +74,6 @@ class Stage:
     points: Array
     frame: Array
     diagonal: float
-
-    def __post_init__(self) -> None:
-        for name in ("center", "points", "frame"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     def quad(self, plane: Plane, name: str, colour: Colour) -> Quad:
         """The part of a plane (input units) that the shape fills, and a little more."""
@@ -228,13 +216,11 @@ def _lines(detection: Detection, stage: Stage) -> tuple[Line, ...]:
             bundles.append([found])
     bundles = [sorted(bundle, key=lambda found: found.improper) for bundle in bundles]
     marked = len(bundles) <= MAX_MARKS
-    return tuple(_line(stage, bundle, marked) for bundle in bundles)
-
-
-def _line(stage: Stage, bundle: list[FoundAxis], marked: bool) -> Line:
-    first = bundle[0]
-    names = " ".join(order_name(found.order, found.improper) for found in bundle)
-    return stage.line(first.axis.point, first.axis.direction, names, AXIS, first.order, marked=marked)
+    names = [" ".join(order_name(found.order, found.improper) for found in bundle) for bundle in bundles]
+    return tuple(
+        stage.line(first.axis.point, first.axis.direction, name, AXIS, first.order, marked=marked)
+        for name, (first, *_) in zip(names, bundles, strict=True)
+    )
 
 
 def _missed(detection: Detection, stage: Stage) -> tuple[tuple[Quad, ...], tuple[Line, ...]]:

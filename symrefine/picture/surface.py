@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.geometry import Array, read_only
+from symrefine.geometry import Array, ReadOnly
 from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.picture.scene import OBJECT, Quad, Scene
 from symrefine.shape import Index, Shape
@@ -18,7 +18,7 @@ FLAT = 0.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Surface:
+class Surface(ReadOnly):
     """Something to paint, relative to the centre of its scene.
 
     Attributes:
@@ -37,26 +37,15 @@ class Surface:
     radius: float
     depth_scale: float
 
-    def __post_init__(self) -> None:
-        for name in ("points", "normals", "colours"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-
 
 def make_surface(shape: Shape, scene: Scene) -> Surface:
     """The shape, or a part of the points of a large cloud; those that lie in a plane have its colour."""
     stage = scene.stage
     if shape.faces is not None:
-        points = shape.points - stage.center
-        _, normals = triangle_areas_and_normals(points, shape.faces)
-        scale = 0.03 * stage.diagonal
-        return Surface(
-            points=points,
-            normals=normals,
-            colours=_plain(len(normals)),
-            faces=shape.faces,
-            radius=0.0,
-            depth_scale=scale,
-        )
+        corners, scale = shape.points - stage.center, 0.03 * stage.diagonal
+        _, normals = triangle_areas_and_normals(corners, shape.faces)
+        plain = _plain(len(normals))
+        return Surface(points=corners, normals=normals, colours=plain, faces=shape.faces, radius=0.0, depth_scale=scale)
     step = max(1, -(-len(shape.points) // MOST_POINTS))
     points = shape.points[::step] - stage.center
     radius = COVER * stage.diagonal * _spacing(points / stage.diagonal)

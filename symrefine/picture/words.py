@@ -3,10 +3,8 @@
 import math
 from collections.abc import Iterable
 
-import numpy as np
-
 from symrefine.detection.result import Detection
-from symrefine.geometry import Array
+from symrefine.geometry import Array, toward_positive
 from symrefine.groups import PointGroup
 
 _NAMED = {
@@ -38,11 +36,12 @@ _AXIAL = {
 }
 _COUNTS = "no one two three four five six seven eight nine ten eleven twelve".split()
 _TUPLES = {
-    "none": "span space: neither a mirror plane nor an axis is possible",
-    "plane": "lie in one plane: a mirror plane at most",
-    "axis": "lie on one line: an axis, with or without mirror planes through it",
-    "vanish": "all vanish: several axes, an inversion, or a mirror plane across an axis",
+    "none": "span space: no mirror plane and no axis is possible",
+    "plane": "lie in one plane, within their noise: a mirror plane at most",
+    "axis": "lie on one line, within their noise: where to look first",
+    "vanish": "all vanish, within their noise: every direction is looked at",
 }
+_KINDS = {"plane": "mirror plane", "axis": "rotation", "improper": "rotoreflection", "inversion": "inversion"}
 
 
 def headline(detection: Detection) -> str:
@@ -96,6 +95,11 @@ def tuples_meaning(kind: str) -> str:
     return _TUPLES[kind]
 
 
+def kind_name(kind: str, order: float = 0.0) -> str:
+    """What an element is called: a plane, an axis, an improper one, the inversion."""
+    return "revolution" if kind == "axis" and math.isinf(order) else _KINDS[kind]
+
+
 def percent(fraction: float) -> str:
     """A fraction to two significant digits, in percent."""
     return f"{100.0 * fraction:.2g} %" if fraction >= 1e-4 or fraction == 0 else "less than 0.01 %"
@@ -117,8 +121,7 @@ def order_name(order: float, improper: bool = False) -> str:
 
 def direction(vector: Array) -> str:
     """A unit vector in brackets, turned so that its first component of some size is positive."""
-    size = np.abs(vector)
-    turned = vector * np.sign(vector[int(np.argmax(size >= 0.1 * size.max()))])
+    turned = toward_positive(vector) * vector
     return "(" + ", ".join(f"{round(float(v), 4) + 0.0:.4f}" for v in turned) + ")"
 
 

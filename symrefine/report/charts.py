@@ -32,7 +32,8 @@ def line_chart(title: str, values: Sequence[float], *, first: int, unit: str, co
 
     points = [place(k, v) for k, v in kept]
     parts = [_gridline(place(first, t)[1], _short(t)) for t in ticks]
-    parts += [_below(place(k, kept[0][1])[0], str(k)) for k in _few(range(first, first + len(values)))]
+    named = range(first, first + len(values), math.ceil(len(values) / 10))
+    parts += [_text(place(k, kept[0][1])[0], HEIGHT - BOTTOM + 18, str(k), "middle", PALE) for k in named]
     parts.append(_text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 6, "iteration", "middle", PALE))
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
     parts.append(
@@ -85,14 +86,6 @@ def _text(x: float, y: float, text: str, anchor: str, colour: str) -> str:
 def _gridline(y: float, name: str) -> str:
     line = f'<line x1="{LEFT}" y1="{y:.1f}" x2="{WIDTH - RIGHT}" y2="{y:.1f}" stroke="{GRID}"/>'
     return line + _text(LEFT - 8, y + 4, name, "end", PALE)
-
-
-def _below(x: float, name: str) -> str:
-    return _text(x, HEIGHT - BOTTOM + 18, name, "middle", PALE)
-
-
-def _few(numbers: range) -> range:
-    return numbers[:: max(1, math.ceil(len(numbers) / 10))]
 
 
 def _ticks(high: float) -> list[float]:

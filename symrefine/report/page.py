@@ -8,8 +8,8 @@ from importlib.metadata import version
 
 from symrefine.detection.result import Detection
 from symrefine.ntuples.rank import SIGNIFICANT
-from symrefine.picture.measures import inlier_series, rms_series, turn_series_deg
-from symrefine.picture.rows import Row, found_rows, near_miss_rows
+from symrefine.picture.measures import rms_series, series, turn_series_deg
+from symrefine.picture.rows import found_rows, near_miss_rows
 from symrefine.picture.words import coordinates, fit, headline, meaning, percent, symbol, tuples_meaning
 from symrefine.report.charts import bar_chart, line_chart
 from symrefine.report.style import STYLE
@@ -80,7 +80,7 @@ def _facts(d: Detection, shape: Shape) -> str:
 def _found(d: Detection) -> str:
     rows = [
         (
-            _swatch(r),
+            f'<b class="swatch" style="background:rgb{r.colour}">{escape(r.name)}</b>',
             r.kind,
             _code(r.vector),
             *_misses(r.residual),
@@ -153,7 +153,7 @@ def _convergence(d: Detection) -> str:
     charts = (
         _chart("Turn of the frame [degrees]", turns, "°", "#d55e00", log=True),
         _chart("RMS residual [% of the diagonal]", misses, " %", "#0072b2"),
-        _chart("Pairs in agreement", inlier_series(d.history), "", "#009e73"),
+        _chart("Pairs in agreement", series(d.history, "inliers"), "", "#009e73"),
     )
     return _section("How the refinement converged", told, f'<div class="charts">{"".join(charts)}</div>')
 
@@ -208,10 +208,6 @@ def _bar(share: float) -> str:
     """A bar of up to 1.25 times what is allowed, with a mark there."""
     width = 80.0 * min(max(share, 0.01), 1.25)
     return f'<span class="bar" title="{100 * share:.0f} % of what is allowed"><i style="width:{width:.1f}%"></i></span>'
-
-
-def _swatch(row: Row) -> str:
-    return f'<b class="swatch" style="background:rgb{row.colour}">{escape(row.name)}</b>'
 
 
 def _code(text: str) -> str:

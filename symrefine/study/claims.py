@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from symrefine.study.experiment import Experiment, Row
-from symrefine.study.plan import matches, select
+from symrefine.study.plan import chosen
 from symrefine.study.schema import Claim, Study
 from symrefine.study.summary import EMPTY, Measure, Summary, read_expectation, read_measure, short, summarise
 from symrefine.study.tables import grid
@@ -27,15 +27,13 @@ class Verdict:
     met: bool | None
 
 
-def check_claims(study: Study, experiment: Experiment) -> list[Measure]:
+def check_claims(study: Study) -> list[Measure]:
     """The measures of all claims.
 
     Raises:
-        InputError: fields, aggregates or comparisons that do not exist.
+        InputError: aggregates or comparisons that do not exist.
     """
     for claim in study.claims:
-        for where in (claim.where, claim.ours, *claim.peers.values()):
-            select(where, experiment)
         if claim.expect:
             read_expectation(claim.node.at("expect"), claim.expect)
     return [_measure(claim) for claim in study.claims]
@@ -47,20 +45,16 @@ def _measure(claim: Claim) -> Measure:
 
 def judge(claim: Claim, rows: Sequence[Row], experiment: Experiment) -> Verdict:
     """Our figure and those of others, and whether ours is as expected; a failed run of ours is a miss."""
-    common = select(claim.where, experiment)
-    chosen = [row for row in rows if matches(row, common)]
-
-    def of(who: dict[str, frozenset[object]]) -> list[Row]:
-        return [row for row in chosen if matches(row, who)]
-
+    own, *others = (
+        chosen(chosen(rows, claim.where, experiment), who, experiment) for who in (claim.ours, *claim.peers.values())
+    )
     measure = _measure(claim)
-    own = of(dict(select(claim.ours, experiment)))
     ours = summarise(own, measure)
     met = None
     if claim.expect and own:
         expected = read_expectation(claim.node.at("expect"), claim.expect)
         met = expected.holds(ours) and all(row["error"] is None for row in own)
-    peers = {name: summarise(of(dict(select(node, experiment))), measure) for name, node in claim.peers.items()}
+    peers = {name: summarise(theirs, measure) for name, theirs in zip(claim.peers, others, strict=True)}
     return Verdict(claim=claim, ours=ours, peers=peers, met=met)
 
 

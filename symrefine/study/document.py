@@ -27,7 +27,11 @@ class Node:
         """The node under a key path; the last one that is there."""
         node = self
         for key in keys:
-            inside = node.value if isinstance(node.value, dict) else dict(enumerate(_items(node)))
+            inside = (
+                node.value
+                if isinstance(node.value, dict)
+                else dict(enumerate(node.value if isinstance(node.value, list) else []))
+            )
             if key not in inside:
                 return node
             node = inside[key]
@@ -38,10 +42,6 @@ class Node:
         if isinstance(self.value, dict):
             return {key: node.plain() for key, node in self.value.items()}
         return [node.plain() for node in self.value] if isinstance(self.value, list) else self.value
-
-
-def _items(node: Node) -> list[Node]:
-    return node.value if isinstance(node.value, list) else []
 
 
 def read_document(path: Path) -> Node:

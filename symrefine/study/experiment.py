@@ -9,6 +9,7 @@ from types import ModuleType, NoneType, UnionType
 from typing import Any, get_args, get_type_hints
 
 from symrefine.errors import InputError
+from symrefine.study.document import Node
 from symrefine.study.typed import Scalar
 
 Row = dict[str, Scalar | None]
@@ -39,6 +40,16 @@ class Experiment:
     record: Callable[[Any, Path], None] | None
     measured: frozenset[str]
 
+    def field(self, name: str, node: Node) -> Any:
+        """The type of a field of the case, which `node` names.
+
+        Raises:
+            InputError: there is none.
+        """
+        if name not in self.hints:
+            raise node.error(f"{self.name} has no field {name!r}; expected one of {sorted(self.hints)}")
+        return self.hints[name]
+
 
 def find_root(name: str, start: Path) -> Path:
     """The nearest directory at or above `start` in which the module stands.
@@ -68,17 +79,9 @@ def load_experiment(name: str, root: Path) -> Experiment:
         kinds = get_args(kind) if isinstance(kind, UnionType) else (kind,)
         if not set(kinds) <= {int, float, str, bool, NoneType}:
             raise InputError(f"{name}.Case.{field}: is {kind}; fields are int, float, str or bool")
-    return Experiment(
-        name=name,
-        root=root,
-        case=case,
-        hints=hints,
-        run=module.run,
-        check=getattr(module, "check", None),
-        trace=getattr(module, "trace", None),
-        record=getattr(module, "record", None),
-        measured=frozenset(getattr(module, "MEASURED", ())),
-    )
+    optional: dict[str, Any] = {part: getattr(module, part, None) for part in ("check", "trace", "record")}
+    measured = frozenset(getattr(module, "MEASURED", ()))
+    return Experiment(name=name, root=root, case=case, hints=hints, run=module.run, measured=measured, **optional)
 
 
 def _import(name: str, root: Path) -> ModuleType:

@@ -6,7 +6,7 @@ from statistics import median
 from typing import TYPE_CHECKING, Any
 
 from symrefine.study.experiment import Experiment, Row
-from symrefine.study.plan import matches, select
+from symrefine.study.plan import chosen
 from symrefine.study.schema import Figure, Study
 from symrefine.study.summary import Measure, read_measure, short, summarise
 
@@ -36,24 +36,16 @@ def check_figures(study: Study, experiment: Experiment) -> list[Measure]:
     """
     measures = []
     for figure in study.figures:
-        select(figure.where, experiment)
         if figure.kind not in KINDS:
             raise figure.node.at("kind").error(f"expected one of {', '.join(KINDS)}, got {figure.kind!r}")
-        if figure.by and figure.by not in experiment.hints:
-            raise figure.node.at("by").error(
-                f"{experiment.name} has no field {figure.by!r}; expected one of {sorted(experiment.hints)}"
-            )
+        if figure.by:
+            experiment.field(figure.by, figure.node.at("by"))
         if figure.kind != "convergence":
             measures.append(read_measure(figure.node.at("y"), figure.y))
             measures.append(Measure(how="", column=figure.x, node=figure.node.at("x")))
         elif experiment.trace is None:
             raise figure.node.at("kind").error(f"{experiment.name} has no `trace` for a convergence plot")
     return measures
-
-
-def wants_trace(figure: Figure, experiment: Experiment) -> Mapping[str, frozenset[Any]] | None:
-    """Which cases a figure needs the iterations of; None if it needs none."""
-    return select(figure.where, experiment) if figure.kind == "convergence" else None
 
 
 def draw(figure: Figure, rows: Sequence[Row], experiment: Experiment, path: Path) -> None:
@@ -69,14 +61,13 @@ def draw(figure: Figure, rows: Sequence[Row], experiment: Experiment, path: Path
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Canvas
 
-    picked = select(figure.where, experiment)
-    chosen = [row for row in rows if row["error"] is None and matches(row, picked)]
+    done = [row for row in chosen(rows, figure.where, experiment) if row["error"] is None]
     with mpl.rc_context(_STYLE):
         canvas = Canvas(figsize=(7.2, 4.2), dpi=120, layout="constrained")
         FigureCanvasAgg(canvas)
         axes = canvas.add_subplot()
-        names = list(dict.fromkeys(row[figure.by] for row in chosen)) if figure.by else [None]
-        groups = {name: [row for row in chosen if not figure.by or row[figure.by] == name] for name in names}
+        names = list(dict.fromkeys(row[figure.by] for row in done)) if figure.by else [None]
+        groups = {name: [row for row in done if not figure.by or row[figure.by] == name] for name in names}
         {"line": _lines, "bar": _bars, "convergence": _runs}[figure.kind](axes, figure, groups)
         axes.set(title=figure.title, xlabel=figure.x_label or figure.x, ylabel=figure.y_label or figure.y)
         if figure.log:

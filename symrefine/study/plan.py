@@ -53,7 +53,9 @@ def make_plan(path: Path, settings: Sequence[str] = (), *, quick: bool = False) 
         raise InputError(f"{path}: no such config file; {_elsewhere(path)}")
     root = read_document(path)
     if quick:
-        root = _quick(root)
+        section = root.value.get("quick", NOTHING) if isinstance(root.value, dict) else NOTHING
+        for key, node in mapping(section).items():
+            root = put(root, key.split("."), node, f"{node.place}: {node.path}")
     root = override(root, settings)
     if isinstance(root.value, dict) and "experiment" not in root.value:
         raise root.error(f"missing experiment, so `symrefine run` can do nothing with it; {_elsewhere(path)}")
@@ -68,11 +70,12 @@ def make_plan(path: Path, settings: Sequence[str] = (), *, quick: bool = False) 
     except InputError as error:
         raise name.error(str(error)) from None
     cases = list(_cases(study, experiment))
+    content = json.dumps([experiment.name, [asdict(case) for case in cases]], sort_keys=True)
     return Plan(
         study=study,
         experiment=experiment,
         cases=cases,
-        config_hash=_digest([experiment.name, [asdict(case) for case in cases]]),
+        config_hash=hashlib.sha256(content.encode()).hexdigest()[:12],
         changed=bool(settings) or (quick and bool(study.quick)),
     )
 
@@ -87,17 +90,6 @@ def _elsewhere(path: Path) -> str:
         if names:
             return f"in {folder} there are {' '.join(names)}"
     return "configs are YAML files with a key `experiment`, as in the directory configs of symrefine's repository"
-
-
-def _quick(root: Node) -> Node:
-    section = root.value.get("quick", NOTHING) if isinstance(root.value, dict) else NOTHING
-    for key, node in mapping(section).items():
-        root = put(root, key.split("."), node, f"{node.place}: {node.path}")
-    return root
-
-
-def _digest(content: Any) -> str:
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:12]
 
 
 def _cases(study: Study, experiment: Experiment) -> Iterator[Any]:
@@ -153,10 +145,7 @@ def _range(node: Node) -> range:
 
 def _case(nodes: Mapping[str, Node], root: Node, experiment: Experiment) -> Any:
     """The case that the nodes describe; wrong names, types and impossible values are told where they stand."""
-    hints = experiment.hints
-    for name, node in nodes.items():
-        if name not in hints:
-            raise node.error(f"{experiment.name} has no field {name!r}; expected one of {sorted(hints)}")
+    hints = {name: experiment.field(name, node) for name, node in nodes.items()}
     needed = [f.name for f in fields(experiment.case) if f.default is MISSING and f.default_factory is MISSING]
     if missing := [name for name in needed if name not in nodes]:
         raise root.error(f"neither `fixed` nor `sweep` sets {', '.join(missing)}")
@@ -179,12 +168,17 @@ def select(where: Node, experiment: Experiment) -> Mapping[str, frozenset[Any]]:
     """
     picked = {}
     for name, node in mapping(where).items():
-        if name not in experiment.hints:
-            raise node.error(f"{experiment.name} has no field {name!r}; expected one of {sorted(experiment.hints)}")
-        picked[name] = frozenset(scalar(inner, experiment.hints[name]) for inner in spread(node))
+        kind = experiment.field(name, node)
+        picked[name] = frozenset(scalar(inner, kind) for inner in spread(node))
     return picked
 
 
 def matches(row: Row, picked: Mapping[str, frozenset[Any]]) -> bool:
     """Whether a row, or the fields of a case, is among those picked."""
     return all(row[name] in values for name, values in picked.items())
+
+
+def chosen(rows: Sequence[Row], where: Node, experiment: Experiment) -> list[Row]:
+    """The rows that a `where` picks."""
+    picked = select(where, experiment)
+    return [row for row in rows if matches(row, picked)]

@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from symrefine.errors import InputError
-from symrefine.export.files import replacing
+from symrefine.files import replacing
 from symrefine.study.claims import Verdict, check_claims, claims_table, judge, verdict_rows
 from symrefine.study.document import Node
 from symrefine.study.experiment import Row
-from symrefine.study.figures import check_figures, draw, wants_trace
+from symrefine.study.figures import check_figures, draw
 from symrefine.study.journal import Entry, Stamp, opened
 from symrefine.study.plan import Plan, matches, select
-from symrefine.study.schema import Figure
 from symrefine.study.summary import Measure, check_columns
 from symrefine.study.tables import check_tables, csv_text, markdown
 from symrefine.study.versions import code_version, library_versions
@@ -49,11 +48,6 @@ class Outcome:
     failed: int
 
 
-def no_progress(_text: str, _total: int, _done: int) -> AbstractContextManager[Callable[[], None]]:
-    """Nobody looks on."""
-    return nullcontext(lambda: None)
-
-
 def run_study(
     plan: Plan,
     folder: Path,
@@ -61,7 +55,7 @@ def run_study(
     workers: int = 1,
     limit: int | None = None,
     replace: bool = False,
-    progress: Progress = no_progress,
+    progress: Progress = lambda *_: nullcontext(lambda: None),
 ) -> Outcome:
     """Run what is not done yet and write what the config asks for.
 
@@ -77,7 +71,8 @@ def run_study(
         InputError: something in the config does not fit, or the folder holds other rows.
     """
     measures = _check(plan)
-    stamp = _stamp(plan)
+    code = code_version(plan.experiment.name, plan.experiment.root)
+    stamp = Stamp(config=plan.config_hash, code=code, libraries=library_versions())
     _make(folder)
     wanted = range(len(plan.cases) if limit is None else min(limit, len(plan.cases)))
     with opened(folder / JOURNAL, stamp, replace=replace) as (entries, journal):
@@ -85,7 +80,7 @@ def run_study(
         jobs = [(index, plan.cases[index]) for index in wanted if index not in entries]
         with progress("running", len(wanted), before) as advance:
             for entry in finish(plan.experiment, jobs, workers):
-                journal.append(entry)
+                journal.append(asdict(stamp) | asdict(entry))
                 entries[entry.index] = entry
                 advance()
         done = [entries[index] for index in sorted(entries)]
@@ -95,7 +90,7 @@ def run_study(
 def _check(plan: Plan) -> list[Measure]:
     """The measures of everything that is made of the rows, after a look at the names in the config."""
     study, experiment = plan.study, plan.experiment
-    measures = [check(study, experiment) for check in (check_tables, check_figures, check_claims)]
+    measures = [*check_tables(study, experiment), *check_figures(study, experiment), *check_claims(study)]
     if study.record and experiment.record is None:
         raise study.record[0].error(f"{experiment.name} has no `record`")
     selections = [*study.record, *(table.where for table in study.tables), *(figure.where for figure in study.figures)]
@@ -108,7 +103,7 @@ def _check(plan: Plan) -> list[Measure]:
     for figure, slug in zip(study.figures, slugs, strict=True):
         if not slug or slugs.count(slug) > 1:
             raise figure.node.at("title").error("names the file: expected a title of its own")
-    return [measure for some in measures for measure in some]
+    return measures
 
 
 def _must_pick(where: Node, plan: Plan, *common: Node) -> None:
@@ -116,11 +111,6 @@ def _must_pick(where: Node, plan: Plan, *common: Node) -> None:
     picks = [select(node, plan.experiment) for node in (where, *common)]
     if not plan.changed and not any(all(matches(asdict(case), p) for p in picks) for case in plan.cases):
         raise where.error("picks no run of the sweep")
-
-
-def _stamp(plan: Plan) -> Stamp:
-    code = code_version(plan.experiment.name, plan.experiment.root)
-    return Stamp(config=plan.config_hash, code=code, libraries=library_versions())
 
 
 def _make(folder: Path) -> None:
@@ -179,7 +169,10 @@ def _figures(
     for figure in plan.study.figures:
         path = folder / f"{_slug(figure.title)}.png"
         source = iterations if figure.kind == "convergence" else rows
-        _check_trace(figure, source)
+        known = {name: None for row in source for name in row}
+        for key in ("x", "y") if figure.kind == "convergence" and source else ():
+            if (name := getattr(figure, key)) not in known:
+                raise figure.node.at(key).error(f"no iteration has {name!r}; there are {' '.join(known)}")
         with replacing(path) as draft:
             draw(figure, source, plan.experiment, draft)
         written[figure.title] = path
@@ -189,8 +182,7 @@ def _figures(
 def _trace(plan: Plan, chosen: Sequence[Any], progress: Progress) -> list[Row]:
     """A row for each iteration of each run that a figure shows."""
     trace = plan.experiment.trace
-    picks = [p for figure in plan.study.figures if (p := wants_trace(figure, plan.experiment)) is not None]
-    cases = [case for case in chosen if any(matches(asdict(case), picked) for picked in picks)]
+    cases = _picked(plan, chosen, [figure.where for figure in plan.study.figures if figure.kind == "convergence"])
     if trace is None or not cases:
         return []
     rows: list[Row] = []
@@ -201,17 +193,15 @@ def _trace(plan: Plan, chosen: Sequence[Any], progress: Progress) -> list[Row]:
     return rows
 
 
-def _check_trace(figure: Figure, rows: Sequence[Row]) -> None:
-    known = {name: None for row in rows for name in row}
-    for key in ("x", "y") if figure.kind == "convergence" and rows else ():
-        if getattr(figure, key) not in known:
-            raise figure.node.at(key).error(f"no iteration has {getattr(figure, key)!r}; there are {' '.join(known)}")
+def _picked(plan: Plan, cases: Sequence[Any], wheres: Sequence[Node]) -> list[Any]:
+    """The cases that one of the selections picks."""
+    picks = [select(where, plan.experiment) for where in wheres]
+    return [case for case in cases if any(matches(asdict(case), picked) for picked in picks)]
 
 
 def _record(plan: Plan, folder: Path, chosen: Sequence[Any], progress: Progress) -> None:
     record = plan.experiment.record
-    picks = [select(where, plan.experiment) for where in plan.study.record]
-    cases = [case for case in chosen if any(matches(asdict(case), picked) for picked in picks)]
+    cases = _picked(plan, chosen, plan.study.record)
     if record is None or not cases:
         return
     _make(folder / "recordings")

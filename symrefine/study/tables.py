@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import groupby
 
 from symrefine.study.experiment import Experiment, Row
-from symrefine.study.plan import matches, select
+from symrefine.study.plan import chosen
 from symrefine.study.schema import Study, Table
 from symrefine.study.summary import Measure, read_measure, short, summarise
 from symrefine.study.typed import Scalar
@@ -36,12 +36,8 @@ def check_tables(study: Study, experiment: Experiment) -> list[Measure]:
         InputError: fields or aggregates that do not exist.
     """
     for table in study.tables:
-        select(table.where, experiment)
         for i, name in enumerate(table.groups):
-            if name not in experiment.hints:
-                raise table.node.at("groups", i).error(
-                    f"{experiment.name} has no field {name!r}; expected one of {sorted(experiment.hints)}"
-                )
+            experiment.field(name, table.node.at("groups", i))
     return [measure for table in study.tables for measure in _measures(table).values()]
 
 
@@ -51,18 +47,17 @@ def _measures(table: Table) -> dict[str, Measure]:
 
 def markdown(table: Table, rows: Sequence[Row], experiment: Experiment) -> str:
     """A table under its title, with the number of runs that failed."""
-    picked = select(table.where, experiment)
-    chosen = [row for row in rows if matches(row, picked)]
+    picked = chosen(rows, table.where, experiment)
     measures = _measures(table)
     lines = []
     # Groups in the order in which the sweep came upon them.
-    order = {key: i for i, key in enumerate(dict.fromkeys(_key(row, table.groups) for row in chosen))}
-    chosen = sorted(chosen, key=lambda row: order[_key(row, table.groups)])
-    for key, group in groupby(chosen, key=lambda row: _key(row, table.groups)):
+    order = {key: i for i, key in enumerate(dict.fromkeys(_key(row, table.groups) for row in picked))}
+    picked = sorted(picked, key=lambda row: order[_key(row, table.groups)])
+    for key, group in groupby(picked, key=lambda row: _key(row, table.groups)):
         members = list(group)
         lines.append([*map(short, key), *(summarise(members, m).text for m in measures.values()), str(len(members))])
-    failed = sum(row["error"] is not None for row in chosen)
-    note = f"\n{failed} of {len(chosen)} runs failed and are left out of the figures.\n" if failed else ""
+    failed = sum(row["error"] is not None for row in picked)
+    note = f"\n{failed} of {len(picked)} runs failed and are left out of the figures.\n" if failed else ""
     return f"## {table.title}\n\n{grid([*table.groups, *measures, 'runs'], lines)}{note}"
 
 

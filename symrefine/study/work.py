@@ -51,11 +51,14 @@ def finish(experiment: Experiment, jobs: Sequence[Job], workers: int) -> Iterato
 
 
 def in_processes(work: Callable[[P], R], parcels: Sequence[P], workers: int) -> Iterator[R]:
-    """What `work` makes of each parcel, as soon as it is done, in that many processes of one thread each.
+    """What `work` makes of each parcel, as soon as it is done, in this process or in several of one thread.
 
     Raises:
         SymrefineError: a process died.
     """
+    if workers == 1 or len(parcels) < 2:
+        yield from map(work, parcels)
+        return
     from concurrent.futures import ProcessPoolExecutor, as_completed
     from concurrent.futures.process import BrokenProcessPool
     from multiprocessing import get_context

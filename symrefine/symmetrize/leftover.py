@@ -37,7 +37,8 @@ def with_leftovers(points: Array, operations: Array, action: Action, labels: Ind
     if not 0 < len(free) <= LARGEST or len(operations) > LARGEST_GROUP:
         return action
     images, closed, miss = action.images.copy(), action.closed.copy(), action.miss.copy()
-    table = _products(operations)
+    products = (operations[:, None] @ operations[None]).reshape(-1, 9)
+    table = cKDTree(operations.reshape(-1, 9)).query(products)[1].reshape(len(operations), -1)  # of g h
     while len(free):
         orbit = _orbit(points, operations, table, free, labels, reach)
         members = free[:1] if orbit is None else np.unique(orbit.owners)
@@ -48,13 +49,6 @@ def with_leftovers(points: Array, operations: Array, action: Action, labels: Ind
             miss[members] = orbit.moved.max()
         free = np.setdiff1d(free, members)
     return Action(images=images, closed=closed, miss=miss)
-
-
-def _products(operations: Array) -> Index:
-    """Index [K, K] of g h."""
-    products = (operations[:, None] @ operations[None]).reshape(-1, 9)
-    found: Index = cKDTree(operations.reshape(-1, 9)).query(products)[1]
-    return found.reshape(len(operations), -1)
 
 
 def _orbit(

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from symrefine.errors import DegenerateShapeError, InputError
-from symrefine.geometry import Array, orthogonal_factor, read_only, tight_diagonal, unit
+from symrefine.geometry import Array, ReadOnly, orthogonal_factor, tight_diagonal, unit
 from symrefine.groups import PointGroup
 from symrefine.shape import Index, Shape
 from symrefine.surface.skin import FEW
@@ -42,7 +42,7 @@ Method = Literal["vertices", "orbits", "surface"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Symmetrized:
+class Symmetrized(ReadOnly):
     """A shape made symmetric.
 
     Attributes:
@@ -71,9 +71,6 @@ class Symmetrized:
     residual: float
     diagonal: float
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "center", read_only(self.center))
-
 
 def symmetrize(
     shape: Shape, group: PointGroup, center: Array, *, tolerance: float = 0.02, seed: int = 0
@@ -98,27 +95,24 @@ def symmetrize(
     if group.name == "C1":
         raise InputError(f"{shape.source}: C1 has no operation but the identity: there is nothing to make symmetric")
     diagonal = tight_diagonal(shape.points)
-    local = (shape.points - center) / diagonal
-    rows, back = _distinct(local, shape)
-    finite = finite_group(group, local[rows], copied=shape.faces is None)
-    labels = None if shape.labels is None or shape.faces is not None else shape.labels[rows]
-    place, action = _counterparts(local[rows], finite, labels, REACH * tolerance)
-    work = _Work(shape=shape, points=local[rows], rows=rows, back=back, place=place, rng=np.random.default_rng(seed))
-    few = len(rows) <= FEW and shape.faces is None
-    if _corresponds(local[rows], action, few):
+    work = _start(shape, (shape.points - center) / diagonal, group, copied=shape.faces is None, seed=seed)
+    place, action = _counterparts(work.points, work.place.group, work.labels, REACH * tolerance)
+    work = replace(work, place=place)
+    few = len(work.rows) <= FEW and shape.faces is None
+    if _corresponds(work.points, action, few):
         made = work.by_vertices(action)
     elif few:
         raise DegenerateShapeError(
-            f"{shape.source}: {int((~action.closed).sum())} of {len(rows)} points have no counterpart under "
-            f"{finite.name}; so few points stand for themselves, not for a surface: choose a subgroup (--group)"
+            f"{shape.source}: {int((~action.closed).sum())} of {len(work.rows)} points have no counterpart under "
+            f"{place.group.name}; so few points stand for themselves, not for a surface: choose a subgroup (--group)"
         )
     else:
         made = work.by_orbits() if shape.faces is None else work.by_surface(action)
     moved = np.linalg.norm(made.moved, axis=1)
     return Symmetrized(
         shape=replace(made.shape, points=center + diagonal * made.shape.points),
-        group=made.group,
-        center=center + diagonal * made.center,
+        group=made.place.group,
+        center=center + diagonal * made.place.center,
         method=made.method,
         paired=made.paired,
         largest=float(moved.max()),
@@ -140,19 +134,15 @@ def exact_place(shape: Shape, group: PointGroup, center: Array) -> tuple[PointGr
     if group.name == "C1" or group.symbol.family in ("K", "Kh"):
         return group, center
     diagonal = tight_diagonal(shape.points)
-    local = (shape.points - center) / diagonal
-    rows, back = _distinct(local, shape)
-    finite = finite_group(group, local[rows], copied=False)
-    if finite.order * len(rows) > LARGEST:
+    work = _start(shape, (shape.points - center) / diagonal, group, copied=False, seed=0)
+    finite = work.place.group
+    if finite.order * len(work.rows) > LARGEST:
         return group, center
-    labels = None if shape.labels is None or shape.faces is not None else shape.labels[rows]
-    action = act(local[rows], finite.operations(), labels, EXACT)
+    action = act(work.points, finite.operations(), work.labels, EXACT)
     if not action.closed.all():
         return group, center
-    place = _Place(group=finite, center=np.zeros(3))
-    work = _Work(shape=shape, points=local[rows], rows=rows, back=back, place=place, rng=np.random.default_rng(0))
-    made = work.by_vertices(action)
-    return PointGroup(name=group.name, frame=made.group.frame), center + diagonal * made.center
+    place = work.by_vertices(action).place
+    return PointGroup(name=group.name, frame=place.group.frame), center + diagonal * place.center
 
 
 def _corresponds(points: Array, action: Action, few: bool) -> bool:
@@ -163,22 +153,12 @@ def _corresponds(points: Array, action: Action, few: bool) -> bool:
     return bool(np.sqrt(np.mean(action.miss**2)) <= SPACED * spacing and action.miss.max() <= WORST * spacing)
 
 
-def _distinct(local: Array, shape: Shape) -> tuple[Index, Index]:
-    """Rows of the distinct points (and labels), and which of them each point is."""
-    key = local
-    if shape.labels is not None and shape.faces is None:
-        key = np.column_stack([local, shape.labels])
-    _, rows, back = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    return rows, back.reshape(-1)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Made:
     """A result in units of the diagonal about the given centre; `moved` [N, 3] is by what each point moved."""
 
     shape: Shape
-    group: PointGroup
-    center: Array
+    place: "_Place"
     method: Method
     paired: float
     moved: Array
@@ -216,12 +196,16 @@ def _counterparts(points: Array, group: PointGroup, labels: Index | None, reach:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Work:
-    """What every method starts from: distinct points in units of the diagonal about the given centre."""
+    """What every method starts from: distinct points in units of the diagonal about the given centre.
+
+    `rows` are those of the distinct points (and labels), `back` [N] tells which of them each point is.
+    """
 
     shape: Shape
     points: Array
     rows: Index
     back: Index
+    labels: Index | None
     place: _Place
     rng: np.random.Generator
 
@@ -235,41 +219,53 @@ class _Work:
                 break
             place = nearer
         wanted = self._means(action, place)
-        made = replace(self._with_points(wanted[self.back]), weights=self._even_weights(action))
+        made = replace(
+            self.shape,
+            points=wanted[self.back],
+            weights=self._even_weights(action),
+            normals=self._mean_normals(action, place),
+        )
         residual = _miss_of_points(wanted, place)
-        return self._made(
-            self._with_normals(made, action, place), place, "vertices", 1.0, wanted - self.points, residual
+        return _Made(
+            shape=made, place=place, method="vertices", paired=1.0, moved=wanted - self.points, residual=residual
         )
 
     def by_orbits(self) -> _Made:
         """A cloud of a surface: its points on the symmetric surface, of which one sector is copied to the others."""
-        closest = closest_on(self._with_points(self.points[self.back]), self.rng)
+        closest = closest_on(replace(self.shape, points=self.points[self.back]), self.rng)
         place = self._fitted(closest)
         wanted = _on_symmetric_surface(self.points, place, closest)
         rows = _sector(wanted - place.center, place.group)
-        copies = np.einsum("kij,nj->kni", place.group.operations(), wanted[rows] - place.center).reshape(-1, 3)
-        count = place.group.operations().shape[0]
-        keep = _once(copies, np.tile(self.rows[rows], count) if self.shape.labels is not None else None)
+        operations, owners = place.group.operations(), self.rows[rows]
+        copies = _turned(operations, wanted[rows] - place.center)
+        weights, normals, labels = self.shape.weights, self.shape.normals, self.shape.labels
+        keep = _once(copies, np.tile(owners, len(operations)) if labels is not None else None)
         made = Shape(
             points=place.center + copies[keep],
-            weights=None if self.shape.weights is None else np.tile(self.shape.weights[self.rows[rows]], count)[keep],
-            normals=self._copied_normals(rows, place, keep),
-            labels=None if self.shape.labels is None else np.tile(self.shape.labels[self.rows[rows]], count)[keep],
+            weights=None if weights is None else np.tile(weights[owners], len(operations))[keep],
+            normals=None if normals is None else _turned(operations, normals[owners])[keep],
+            labels=None if labels is None else np.tile(labels[owners], len(operations))[keep],
             source=self.shape.source,
         )
-        return self._made(made, place, "orbits", 0.0, wanted - self.points, _miss_of_points(made.points, place))
+        residual = _miss_of_points(made.points, place)
+        return _Made(
+            shape=made, place=place, method="orbits", paired=0.0, moved=wanted - self.points, residual=residual
+        )
 
     def by_surface(self, action: Action) -> _Made:
         """A mesh: vertices with counterparts go to their means, the others onto the symmetric surface."""
-        closest = closest_on(self._with_points(self.points[self.back]), self.rng)
+        closest = closest_on(replace(self.shape, points=self.points[self.back]), self.rng)
         place = self._fitted(closest)
         wanted = _on_symmetric_surface(self.points, place, closest)
         own = action.miss < OWN * cKDTree(self.points).query(self.points, k=2)[0][:, 1]
         paired = action.closed & own & own[action.images].all(axis=0)
         wanted[paired] = self._means(action, place)[paired]
-        made = self._with_points(wanted[self.back])
+        made = replace(self.shape, points=wanted[self.back])
         residual = _miss_of_surface(wanted, place, closest_on(made, self.rng))
-        return self._made(made, place, "surface", float(paired[self.back].mean()), wanted - self.points, residual)
+        share = float(paired[self.back].mean())
+        return _Made(
+            shape=made, place=place, method="surface", paired=share, moved=wanted - self.points, residual=residual
+        )
 
     def _means(self, action: Action, place: _Place) -> Array:
         return place.center + action.mean(self.points - place.center, place.group.operations())
@@ -282,9 +278,6 @@ class _Work:
             place, _ = place.towards(some, _on_symmetric_surface(some, place, closest))
         return place
 
-    def _with_points(self, points: Array) -> Shape:
-        return replace(self.shape, points=points)
-
     def _even_weights(self, action: Action) -> Array | None:
         """Weights that are equal over each orbit, their sum kept; copies of one point share its mean."""
         if self.shape.weights is None:
@@ -293,32 +286,36 @@ class _Work:
         even = np.mean([mass[image] for image in action.images], axis=0)
         return np.asarray((even / np.bincount(self.back))[self.back])
 
-    def _with_normals(self, made: Shape, action: Action, place: _Place) -> Shape:
+    def _mean_normals(self, action: Action, place: _Place) -> Array | None:
         """Normals averaged like the points, each with the sign of the normal that it joins."""
         if self.shape.normals is None:
-            return made
+            return None
         own, total = self.shape.normals[self.rows], np.zeros_like(self.points)
         for g, image in zip(place.group.operations(), action.images, strict=True):
             turned = own[image] @ g
             total += turned * np.where(np.sum(turned * own, axis=1) < 0.0, -1.0, 1.0)[:, None]
-        return replace(made, normals=unit(total)[self.back])
+        return unit(total)[self.back]
 
-    def _copied_normals(self, rows: Index, place: _Place, keep: Index) -> Array | None:
-        if self.shape.normals is None:
-            return None
-        own = self.shape.normals[self.rows[rows]]
-        return np.asarray(np.einsum("kij,nj->kni", place.group.operations(), own).reshape(-1, 3)[keep])
 
-    def _made(self, shape: Shape, place: _Place, method: Method, paired: float, moved: Array, residual: float) -> _Made:
-        return _Made(
-            shape=shape,
-            group=place.group,
-            center=place.center,
-            method=method,
-            paired=paired,
-            moved=moved,
-            residual=residual,
-        )
+def _start(shape: Shape, local: Array, group: PointGroup, *, copied: bool, seed: int) -> _Work:
+    """The distinct points (and labels) of a shape, given in units of the diagonal about the centre of its group."""
+    of_points = shape.labels if shape.faces is None else None
+    key = local if of_points is None else np.column_stack([local, of_points])
+    _, rows, back = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    return _Work(
+        shape=shape,
+        points=local[rows],
+        rows=rows,
+        back=back.reshape(-1),
+        labels=None if of_points is None else of_points[rows],
+        place=_Place(group=finite_group(group, local[rows], copied=copied), center=np.zeros(3)),
+        rng=np.random.default_rng(seed),
+    )
+
+
+def _turned(operations: Array, vectors: Array) -> Array:
+    """All vectors [N, 3] under each operation [K, 3, 3], one operation after the other: [K N, 3]."""
+    return np.asarray(np.einsum("kij,nj->kni", operations, vectors).reshape(-1, 3))
 
 
 def _on_symmetric_surface(points: Array, place: _Place, closest: Closest) -> Array:

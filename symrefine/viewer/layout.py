@@ -3,6 +3,8 @@
 import math
 from typing import Any
 
+import rerun.blueprint as rrb
+
 from symrefine.detection.result import Detection
 from symrefine.picture.camera import look_at
 from symrefine.picture.scene import Colour, Scene
@@ -21,19 +23,11 @@ BACKGROUND = (22, 25, 32)
 
 def blueprint(detection: Detection, scene: Scene, scale: float) -> Any:
     """The layout; `scale` is that of the transform above all positions."""
-    import rerun.blueprint as rrb
-
     refined = len(detection.history) > 1
     views = [_view("Result", scene, scale, ["- /object/refinement/**"])]
     if refined:
-        without = [
-            "- /object/cloud",
-            "- /object/mesh",
-            "- /object/planes/**",
-            "- /object/ntuples",
-            "- /object/near_misses/**",
-        ]
-        views.append(_view("Refinement", scene, scale, without))
+        without = ("cloud", "mesh", "planes/**", "ntuples", "near_misses/**")
+        views.append(_view("Refinement", scene, scale, [f"- /object/{entity}" for entity in without]))
     report = rrb.TextDocumentView(origin="/report", name="Report")
     log = rrb.TextLogView(origin="/log", name="Log")
     right = rrb.Vertical(report, _series(), log, row_shares=[4, 4, 2]) if refined else rrb.Vertical(report, log)
@@ -48,8 +42,6 @@ def blueprint(detection: Detection, scene: Scene, scale: float) -> Any:
 
 def _view(name: str, scene: Scene, scale: float, without: list[str]) -> Any:
     """A 3-D view from where the scene shows best; near misses, and planes that crowd it, are switched off."""
-    import rerun.blueprint as rrb
-
     hidden = ["object/near_misses", *(["object/planes", "object/refinement/planes"] if scene.crowded else [])]
     camera = look_at(scene, aspect=1.1, fov_rad=FOV_RAD, fill=FILL)
     return rrb.Spatial3DView(
@@ -67,8 +59,6 @@ def _view(name: str, scene: Scene, scale: float, without: list[str]) -> Any:
 
 def _series() -> Any:
     """A tab for each series, and one for the planes' own angles."""
-    import rerun.blueprint as rrb
-
     hidden = rrb.PlotLegend(visible=False)
     views = [
         rrb.TimeSeriesView(origin=f"/series/{name}", name=title.split(":")[0], plot_legend=hidden)

@@ -14,13 +14,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import rerun as rr
 
 from symrefine.detection.result import Detection
 from symrefine.errors import InputError
 from symrefine.files import whole
 from symrefine.fit.refine import Iterate
 from symrefine.geometry import Array, Plane
-from symrefine.picture.measures import cost_series, inlier_series, step_series, theta_series_deg, turn_series_deg
+from symrefine.moments.quadrature import triangle_areas_and_normals
+from symrefine.picture.measures import series, theta_series_deg, turn_series_deg
 from symrefine.picture.scene import AXIS as DARK
 from symrefine.picture.scene import MISS, OBJECT, Colour, Line, Quad, Scene, make_scene, plane_colour
 from symrefine.shape import Shape
@@ -51,13 +53,12 @@ def record(detection: Detection, shape: Shape, path: Path | str) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    import rerun as rr
-
     scene = make_scene(detection, shape)
     with whole(Path(path)) as draft, _errors_of_the_system():
-        stream = rr.RecordingStream(
-            _application(shape), recording_id=_identity(detection, shape), send_properties=False
-        )
+        # The viewer keeps one layout for each application, so each object is one; rerun allows few characters there.
+        application = "symrefine-" + re.sub(r"[^A-Za-z0-9]+", "-", Path(shape.source).stem)[:60].strip("-")
+        identity = _identity(detection, shape)
+        stream = rr.RecordingStream(application, recording_id=identity, send_properties=False)
         stream.set_log_time_enabled(False)
         stream.set_log_tick_enabled(False)
         stream.save(draft, default_blueprint=blueprint(detection, scene, display_scale(scene)))
@@ -95,11 +96,6 @@ def display_scale(scene: Scene) -> float:
     return float(10.0 ** -math.floor(math.log10(scene.stage.diagonal)))
 
 
-def _application(shape: Shape) -> str:
-    """The viewer keeps one layout for each application, so each object is one; rerun allows few characters there."""
-    return "symrefine-" + re.sub(r"[^A-Za-z0-9]+", "-", Path(shape.source).stem)[:60].strip("-")
-
-
 def _identity(detection: Detection, shape: Shape) -> str:
     """A name for the content: the viewer merges recordings of one name."""
     digest = hashlib.sha256(shape.points.tobytes())
@@ -108,8 +104,6 @@ def _identity(detection: Detection, shape: Shape) -> str:
 
 
 def _log_shape(stream: Any, shape: Shape, scene: Scene) -> None:
-    import rerun as rr
-
     points = (shape.points - scene.stage.center).astype(np.float32)
     stream.log("object", rr.Transform3D(scale=display_scale(scene)), static=True)
     if shape.faces is None:
@@ -117,15 +111,9 @@ def _log_shape(stream: Any, shape: Shape, scene: Scene) -> None:
         stream.log("object/cloud", rr.Points3D(points, colors=[OBJECT], radii=[radius]), static=True)
         return
     corners = points[shape.faces].reshape(-1, 3)
-    normals = np.repeat(_face_normals(corners), 3, axis=0)
+    normals = np.repeat(triangle_areas_and_normals(points, shape.faces)[1], 3, axis=0)
     mesh = rr.Mesh3D(vertex_positions=corners, vertex_normals=normals, albedo_factor=[*OBJECT, 255])
     stream.log("object/mesh", mesh, static=True)
-
-
-def _face_normals(corners: Array) -> Array:
-    a, b, c = (corners[k::3] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30))
 
 
 def _log_found(stream: Any, scene: Scene) -> None:
@@ -143,8 +131,6 @@ def _log_found(stream: Any, scene: Scene) -> None:
 
 def _log_quad(stream: Any, entity: str, quad: Quad, opacity: int, *, static: bool = False) -> None:
     """A translucent sheet, and its edge with a name at a corner."""
-    import rerun as rr
-
     sheet = rr.Mesh3D(
         vertex_positions=quad.corners,
         triangle_indices=[[0, 1, 2], [0, 2, 3]],
@@ -152,24 +138,18 @@ def _log_quad(stream: Any, entity: str, quad: Quad, opacity: int, *, static: boo
         albedo_factor=[*_bright(quad.colour), opacity],
     )
     stream.log(entity, sheet, static=static)
-    edge = np.vstack([quad.corners, quad.corners[:1]])
-    stream.log(
-        f"{entity}/edge", rr.LineStrips3D([edge], colors=[_bright(quad.colour)], radii=[_pixels(1.2)]), static=static
-    )
+    edge = rr.LineStrips3D([[*quad.corners, quad.corners[0]]], colors=[_bright(quad.colour)], radii=[_pixels(1.2)])
+    stream.log(f"{entity}/edge", edge, static=static)
     beside = quad.corners[2] + 0.05 * (quad.corners[2] - quad.corners.mean(axis=0))
     _log_name(stream, f"{entity}/name", beside, quad.name, _bright(quad.colour), static=static)
 
 
 def _log_name(stream: Any, entity: str, at: Array, name: str, colour: Colour, *, static: bool) -> None:
-    import rerun as rr
-
     point = rr.Points3D([at], labels=[name], show_labels=True, colors=[colour], radii=[_pixels(0.5)])
     stream.log(entity, point, static=static)
 
 
 def _log_line(stream: Any, entity: str, line: Line, *, named: bool = True) -> None:
-    import rerun as rr
-
     colour = AXIS if line.colour == DARK else line.colour
     strips = [line.ends] + ([line.mark] if len(line.mark) else [])
     stream.log(entity, rr.LineStrips3D(strips, colors=[colour], radii=[_pixels(1.5)]), static=True)
@@ -190,8 +170,6 @@ def _pixels(width: float) -> float:
 
 def _log_tuples(stream: Any, detection: Detection, scene: Scene) -> None:
     """The n-tuples as arrows from the centre; the longest has the length ARROW, unless all are mere noise."""
-    import rerun as rr
-
     vectors = detection.vectors.vectors
     longest = float(np.linalg.norm(vectors, axis=1).max())
     reach = ARROW if detection.tuples.kind == "vanish" else ARROW / max(longest, 1e-12)
@@ -208,8 +186,6 @@ def _log_tuples(stream: Any, detection: Detection, scene: Scene) -> None:
 
 def _log_refinement(stream: Any, detection: Detection, scene: Scene) -> None:
     """The points that were matched; planes and correspondences at every iteration; the series."""
-    import rerun as rr
-
     if detection.history:
         matched = detection.scale * detection.points + (detection.origin - scene.stage.center)
         points = rr.Points3D(matched, colors=[MATCHED], radii=[0.6 * POINT * scene.stage.diagonal])
@@ -239,8 +215,6 @@ def _moving(detection: Detection, scene: Scene, now: Iterate) -> list[Quad]:
 
 def _log_pairs(stream: Any, detection: Detection, scene: Scene, before: Iterate, now: Iterate) -> None:
     """Lines from moved sources, as they were matched, to their targets: pairs were found before the frame moved."""
-    import rerun as rr
-
     segments = []
     for motion, pairs in zip(before.state.motions, now.pairs, strict=True):
         step = max(1, -(-len(pairs.sources) * len(now.pairs) // PAIRS))
@@ -255,18 +229,10 @@ def _log_pairs(stream: Any, detection: Detection, scene: Scene, before: Iterate,
 
 
 def _log_series(stream: Any, detection: Detection) -> None:
-    import rerun as rr
-
     history = detection.history
-    values = {
-        "turn_deg": turn_series_deg(history),
-        "cost": cost_series(history),
-        "inliers": inlier_series(history),
-        "step": step_series(history),
-    }
     for name, (title, colour) in SERIES.items():
-        if values[name]:
-            _send(stream, f"series/{name}", title, colour, values[name])
+        if values := turn_series_deg(history) if name == "turn_deg" else series(history, name):
+            _send(stream, f"series/{name}", title, colour, values)
     for k, column in enumerate(theta_series_deg(history)):
         _send(stream, f"series/theta_deg/{k + 1}", f"theta {k + 1} [deg]", _bright(plane_colour(k)), column)
     for now in history:
@@ -276,8 +242,6 @@ def _log_series(stream: Any, detection: Detection) -> None:
 
 
 def _send(stream: Any, entity: str, title: str, colour: Colour, values: list[float]) -> None:
-    import rerun as rr
-
     stream.log(entity, rr.SeriesLines(names=[title], colors=[colour], widths=[2.0]), static=True)
     if len(values) == 1:  # no line to be seen
         stream.log(entity, rr.SeriesPoints(names=[title], colors=[colour], marker_sizes=[4.0]), static=True)
@@ -286,8 +250,6 @@ def _send(stream: Any, entity: str, title: str, colour: Colour, values: list[flo
 
 
 def _log_texts(stream: Any, detection: Detection, shape: Shape) -> None:
-    import rerun as rr
-
     report = markdown(detection, shape)
     stream.log("report", rr.TextDocument(report, media_type=rr.MediaType.MARKDOWN), static=True)
     stream.set_time(TIMELINE, sequence=detection.history[-1].index if detection.history else 0)

@@ -22,21 +22,14 @@ def markdown(detection: Detection, shape: Shape) -> str:
     if near:
         parts.append("**Near misses** (grey, hidden until `near_misses` is switched on)")
         parts.append(_table(("", "kind", "mean %", "95 %", "times the limit"), near))
-    return "\n\n".join([*parts, _tuples(d), _conventions(d)]) + "\n"
-
-
-def _tuples(d: Detection) -> str:
     pairs = zip(d.tuples.singular_values, d.tuples.significance, strict=True)
     sizes = ", ".join(f"{value:.2g} ({times:.1f} times its noise)" for value, times in pairs)
-    count = len(d.vectors.vectors)
-    return f"The {count} n-tuples (yellow arrows) {tuples_meaning(d.tuples.kind)}. Singular values: {sizes}."
-
-
-def _conventions(d: Detection) -> str:
-    return (
+    meaning = f"The {len(d.vectors.vectors)} n-tuples (yellow arrows) {tuples_meaning(d.tuples.kind)}"
+    conventions = (
         f"Positions are relative to the centre {coordinates(d.center, d.diagonal)}, in the units of the input; "
         "misses are in percent of the diagonal of the bounding box."
     )
+    return "\n\n".join([*parts, f"{meaning}. Singular values: {sizes}.", conventions]) + "\n"
 
 
 def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
