@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from symrefine.geometry import Array, Isometry, tight_diagonal
-from symrefine.surface.misses import Deviation, disc_distances
+from symrefine.surface.misses import disc_distances, needs, needs_of_atoms
 from symrefine.surface.skin import LocalPlanes
 
 
@@ -24,14 +24,14 @@ class Surfaces:
         return tight_diagonal(self.target.points)
 
     @cached_property
-    def floor(self) -> Deviation:
+    def floor(self) -> Array:
         """What sampling alone explains: each surface against itself, and what only one of the two blurs.
 
         Local planes merge the two faces of a thin sheet, or follow each, as the density of the points has it.
         """
         own = [disc_distances(s, s.points, skip_self=True) for s in (self.source, self.target)]
         blurred = abs(float(self.source.thickness.mean() - self.target.thickness.mean()))
-        return Deviation.of((np.concatenate(own) + blurred) / self.diagonal)
+        return np.sort((np.concatenate(own) + blurred) / self.diagonal)
 
     def misses(self, motion: Isometry) -> Array:
         """Distances from the moved source to the target, fractions of the diagonal."""
@@ -39,5 +39,6 @@ class Surfaces:
 
     def excess(self, motion: Isometry) -> float:
         """The largest statistic of the miss over its limit; <= 1 if the surfaces agree. Of atoms every one counts."""
-        miss = Deviation.of(self.misses(motion))
-        return (miss.need_of_atoms if self.target.isolated else miss.need(self.floor)) / self.tolerance
+        misses = self.misses(motion)
+        needed = needs_of_atoms(misses) if self.target.isolated else needs(misses, self.floor)
+        return float(needed) / self.tolerance

@@ -7,6 +7,7 @@ the table that everything else reads.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -113,9 +114,9 @@ def _moved_each(operations: int) -> int:
 
 def _judged(surface: Surface, part: Operations, center: Array, sources: int) -> Element:
     motions = part.motions(center)
-    deviation = surface.deviation(motions, sources=sources)
-    needed = surface.needed(deviation, surface.spread(motions))
-    return Element(operations=part, center=center, deviation=deviation, need=needed)
+    misses = surface.misses(motions, sources=sources)
+    worst = reduce(Deviation.at_least, map(Deviation.of, misses))
+    return Element(operations=part, center=center, deviation=worst, need=float(surface.needed(misses, motions).max()))
 
 
 def joined(parts: Sequence[Placed]) -> Placed | None:

@@ -12,7 +12,6 @@ from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import FixedSubspace, fixed_subspace
 from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
-from symrefine.surface.misses import Deviation
 from symrefine.surface.neighbourhoods import fills_volume, kd_tree
 from symrefine.surface.noise import noise_distances
 from symrefine.surface.skin import FEW, LocalPlanes, Skin, drawn, isolated_points, make_skin
@@ -109,7 +108,7 @@ def _few_decide(measured: Measured) -> str:
 
 def _hidden(surface: Surface, tolerance: float) -> str:
     """Noise that hides what the tolerance tells apart."""
-    hidden = surface.noise.p95
+    hidden = float(np.quantile(surface.noise, 0.95)) if surface.noise.size else 0.0
     if hidden <= tolerance:
         return ""
     return (
@@ -184,7 +183,7 @@ def _surface(
     cloud = whole.local_planes(pick[kd_tree(local[pick]).indices], labels)
     diagonal = tight_diagonal(cloud.points)
     noise = noise_distances(len(local), half, rng)
-    return Surface(cloud=cloud, diagonal=diagonal, noise=Deviation.of(noise / diagonal))
+    return Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal)
 
 
 def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Surface:
@@ -196,7 +195,7 @@ def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Su
 
     diagonal = tight_diagonal(points)
     noise = noise_distances(len(points), some_of, rng)
-    return Surface(cloud=some_of(np.arange(len(points))), diagonal=diagonal, noise=Deviation.of(noise / diagonal))
+    return Surface(cloud=some_of(np.arange(len(points))), diagonal=diagonal, noise=noise / diagonal)
 
 
 def _cloud(

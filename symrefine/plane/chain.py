@@ -13,8 +13,7 @@ from symrefine.decide.hypotheses import DIRECTION_ERROR, MOVED_EACH, START_ERROR
 from symrefine.geometry import Array
 from symrefine.plane.outline import NOISES, Outlines
 from symrefine.plane.placed import Placed, fitted
-from symrefine.surface.misses import Deviation
-from symrefine.surface.surface import NOTHING as NO_MISS
+from symrefine.surface.misses import NO_MISS, Deviation
 
 # The largest fold that is looked for.
 MAX_FOLD = 36

@@ -41,9 +41,10 @@ class Outlines:
 
     def judged(self, motions: Sequence[Isometry]) -> tuple[Deviation, tuple[float, ...]]:
         """The miss of several operations together, and what it needs, whatever the noise (see `NOISES`)."""
-        found = [s.deviation(motions) for s in self.surfaces]
-        needs = [max(s.with_noise(n).needed(d) for s, d in zip(self.surfaces, found, strict=True)) for n in NOISES]
-        return reduce(Deviation.at_least, found), tuple(needs)
+        found = [s.misses(motions) for s in self.surfaces]
+        worst = reduce(Deviation.at_least, (Deviation.of(d) for misses in found for d in misses))
+        pairs = list(zip(self.surfaces, found, strict=True))
+        return worst, tuple(max(float(s.with_noise(n).needed(d, motions).max()) for s, d in pairs) for n in NOISES)
 
     def need(self, motions: Sequence[Isometry]) -> float:
         """The smallest tolerance, a fraction of the diagonal, at which operations hold."""
@@ -88,22 +89,21 @@ def _of_raster(raster: Raster, pixels: int, rng: np.random.Generator) -> Outline
     diagonal = smallest_diagonal(np.concatenate(lines))
     # Straight along a row of full and empty pixels, the edge is anywhere between their middles.
     sharp = 0.5 * fine.pitch / diagonal if len(np.unique(fine.values)) <= 2 else 0.0
-    least = Deviation(mean=0.0, p95=sharp, p97=sharp, p99=sharp, p994=sharp, max=sharp)
     return Outlines(
-        surfaces=tuple(_seen(a, b, diagonal, least, rng) for a, b in zip(lines, aside, strict=True)),
+        surfaces=tuple(_seen(a, b, diagonal, sharp, rng) for a, b in zip(lines, aside, strict=True)),
         sampled=False,
         # The part of a pixel that the outline cuts off is uniform, with a variance of 1/12.
         pixel_noise=math.sqrt(by * len(lines[0]) / 12.0) / pixels,
     )
 
 
-def _seen(line: Array, aside: Array, diagonal: float, least: Deviation, rng: np.random.Generator) -> Surface:
+def _seen(line: Array, aside: Array, diagonal: float, least: float, rng: np.random.Generator) -> Surface:
     """The outline [M, 2] of a picture; its noise is how far off pixels half a step aside would have put it."""
     cloud = local_planes(line, ASKED, rng)
     if not _tells(aside):
-        return Surface(cloud=cloud, diagonal=diagonal, noise=least)
+        return Surface(cloud=cloud, diagonal=diagonal, noise=np.array([least]))
     across = disc_distances(cloud, local_planes(aside, ASKED, rng).points)
-    return Surface(cloud=cloud, diagonal=diagonal, noise=Deviation.of(across / diagonal).at_least(least))
+    return Surface(cloud=cloud, diagonal=diagonal, noise=np.maximum(across / diagonal, least))
 
 
 def _telling(raster: Raster) -> Array:
@@ -142,7 +142,7 @@ def _sampled(points: Array, diagonal: float, rng: np.random.Generator) -> Surfac
         return local_planes(points[some], ASKED, rng)
 
     noise = noise_distances(len(points), lines, rng)
-    return Surface(cloud=lines(), diagonal=diagonal, noise=Deviation.of(noise / diagonal))
+    return Surface(cloud=lines(), diagonal=diagonal, noise=noise / diagonal)
 
 
 def _levels(points: Array, weights: Array) -> list[Array]:

@@ -9,9 +9,9 @@ from dataclasses import dataclass, fields
 from functools import reduce
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from symrefine.geometry import Array, Isometry
+from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.shape import Index
 from symrefine.surface.skin import LocalPlanes
 
@@ -20,6 +20,7 @@ from symrefine.surface.skin import LocalPlanes
 # Calibrated on the 52 catalogued meshes: every false element exceeds at least one of them (a propeller's blades the
 # first two, a mailbox's flag the last) and every true one but a posed ant stays below.
 LIMITS = (0.22, 0.75, 1.15, 1.6, 1.85)
+SHARES = (0.05, 0.03, 0.01, 0.006)
 # The same for atoms, of mean, 95th percentile and the farthest: noise moves every one of them, and every one counts.
 ATOM_LIMITS = (0.9, 1.3, 1.6)
 TOLERANCE = 0.02
@@ -33,60 +34,51 @@ class Deviation:
 
     mean: float
     p95: float
-    p97: float
     p99: float
-    p994: float
     max: float
 
     @classmethod
     def of(cls, distances: Array) -> "Deviation":
         """The distribution of distances [N], in fractions of the diagonal."""
-        mean, p95, p97, p99, p994 = limited(distances).tolist()
-        return cls(mean=mean, p95=p95, p97=p97, p99=p99, p994=p994, max=float(distances.max()))
+        p95, p99 = np.quantile(distances, [0.95, 0.99]).tolist()
+        return cls(mean=float(distances.mean()), p95=p95, p99=p99, max=float(distances.max()))
 
     def at_least(self, other: "Deviation") -> "Deviation":
         """The larger of the two in every statistic."""
         return Deviation(**{f.name: max(getattr(self, f.name), getattr(other, f.name)) for f in fields(Deviation)})
 
-    def need(self, noise: "Deviation") -> float:
-        """The smallest tolerance, a fraction of the diagonal, at which a miss still counts as symmetric.
 
-        Each statistic may reach its own multiple of the tolerance beyond what noise alone shows; noise and miss add up
-        in squares.
-        """
-        return float(needs(np.array(self.limited), noise))
-
-    @property
-    def need_of_atoms(self) -> float:
-        """The same of points that stand for themselves."""
-        return float(needs_of_atoms(self.mean, self.p95, self.max))
-
-    def scaled(self, factor: float) -> "Deviation":
-        """Each statistic so many times as large."""
-        return Deviation(**{f.name: factor * getattr(self, f.name) for f in fields(Deviation)})
-
-    @property
-    def limited(self) -> tuple[float, ...]:
-        """The statistics that have limits."""
-        return self.mean, self.p95, self.p97, self.p99, self.p994
+NO_MISS = Deviation(mean=0.0, p95=0.0, p99=0.0, max=0.0)
 
 
-def limited(distances: Array) -> Array:
-    """The statistics [..., 5] of distances [..., N] that have limits: mean, 95th, 97th, 99th and 99.4th percentile."""
-    upper = np.quantile(distances, [0.95, 0.97, 0.99, 0.994], axis=-1)
-    return np.stack([distances.mean(axis=-1), *upper], axis=-1)
+def needs(misses: Array, noise: Array) -> Array:
+    """The smallest tolerances [...], fractions of the diagonal, at which misses [..., N] still count as symmetric.
+
+    What noise alone explains is taken away: from the mean in squares, as noise and miss add up; from the share of the
+    surface that misses by more than some distance, the share of noise that does, and what such shares are uncertain by.
+
+    Args:
+        misses: distances, fractions of the diagonal.
+        noise: [M] misses that noise alone shows, in ascending order; none if empty.
+    """
+    farthest = -np.sort(-misses, axis=-1)
+    beyond = np.arange(1, misses.shape[-1] + 1) / misses.shape[-1]
+    mean = misses.mean(axis=-1)
+    if noise.size:
+        chance = 1.0 - np.searchsorted(noise, farthest, side="right") / noise.size
+        error = np.sqrt(chance * (1.0 - chance) * (1.0 / misses.shape[-1] + 1.0 / noise.size))
+        beyond = beyond - chance - SIGNIFICANT * error
+        mean = np.sqrt(np.maximum(mean**2 - noise.mean() ** 2, 0.0))
+    found = [mean / LIMITS[0]]
+    for share, limit in zip(SHARES, LIMITS[1:], strict=True):
+        found.append((farthest * (beyond > share)).max(axis=-1) / limit)
+    return np.asarray(reduce(np.maximum, found))
 
 
-def needs(statistics: Array, noise: Deviation) -> Array:
-    """`Deviation.need` of many: the smallest tolerances [...] for statistics [..., 5]."""
-    beyond = np.maximum(statistics**2 - np.square(noise.limited), 0.0)
-    return np.asarray((np.sqrt(beyond) / LIMITS).max(axis=-1))
-
-
-def needs_of_atoms(mean: ArrayLike, p95: ArrayLike, largest: ArrayLike) -> Array:
-    """The same [...] of points that stand for themselves, from mean, 95th percentile and maximum [...] of the miss."""
-    parts = (np.asarray(v) / limit for v, limit in zip((mean, p95, largest), ATOM_LIMITS, strict=True))
-    return np.asarray(reduce(np.maximum, parts))
+def needs_of_atoms(misses: Array) -> Array:
+    """The same [...] of points that stand for themselves: mean, 95th percentile and maximum have limits."""
+    statistics = (misses.mean(axis=-1), np.quantile(misses, 0.95, axis=-1), misses.max(axis=-1))
+    return np.asarray(reduce(np.maximum, [v / limit for v, limit in zip(statistics, ATOM_LIMITS, strict=True)]))
 
 
 def miss_distances(cloud: LocalPlanes, motions: Sequence[Isometry], *, stride: int = 1, bound: float = np.inf) -> Array:

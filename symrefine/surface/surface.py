@@ -3,79 +3,74 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
 
 import numpy as np
 
-from symrefine.geometry import Array, Isometry
-from symrefine.surface.misses import (
-    LIMITS,
-    Deviation,
-    limited,
-    miss_distances,
-    needs,
-    needs_of_atoms,
-    spread_distance,
-)
+from symrefine.geometry import Array, Isometry, read_only
+from symrefine.surface.misses import LIMITS, miss_distances, needs, needs_of_atoms, spread_distance
 from symrefine.surface.skin import LocalPlanes
 
 # Standard deviation over mean of the distance to the nearest of random points in a volume (Weibull, shape 3).
 NEAREST_SPREAD = 0.363
-NOTHING = Deviation(mean=0.0, p95=0.0, p97=0.0, p99=0.0, p994=0.0, max=0.0)
+NONE = read_only(np.empty(0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Surface:
-    """Local planes in normalised units, the diagonal their misses are measured by, and what noise alone would show."""
+    """Local planes in normalised units, the diagonal their misses are measured by, and what noise alone would show.
+
+    Attributes:
+        cloud: the local planes.
+        diagonal: normalised units.
+        noise: [M] misses that noise alone shows, fractions of the diagonal; none if empty.
+    """
 
     cloud: LocalPlanes
     diagonal: float
-    noise: Deviation = NOTHING
+    noise: Array = NONE
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "noise", read_only(np.sort(self.noise)))
 
     def with_noise(self, factor: float) -> "Surface":
         """The same surface, if noise were so many times as large."""
-        return replace(self, noise=self.noise.scaled(factor))
+        return replace(self, noise=factor * self.noise)
 
     def stride(self, sources: int) -> int:
         """Stride that leaves about `sources` local planes."""
         return max(1, len(self.cloud.points) // sources)
 
-    def deviation(self, motions: Sequence[Isometry], *, sources: int = 10**9) -> Deviation:
-        """The miss of one or several operations together: the worst of each statistic."""
-        found = miss_distances(self.cloud, motions, stride=self.stride(sources)) / self.diagonal
-        return reduce(Deviation.at_least, (Deviation.of(d) for d in found))
-
-    def need(self, motions: Sequence[Isometry], *, sources: int = 10**9) -> float:
-        """The smallest tolerance at which operations hold (see `needed`)."""
-        return float(self.needs(motions, sources=sources).max())
-
-    def needs(self, motions: Sequence[Isometry], *, sources: int, bound: float = math.inf) -> Array:
-        """The smallest tolerances [K] at which each of K operations holds, by some of the local planes.
+    def misses(self, motions: Sequence[Isometry], *, sources: int = 10**9, bound: float = math.inf) -> Array:
+        """By how much each of K operations misses the surface [K, N], fractions of the diagonal.
 
         Args:
             motions: the operations.
             sources: local planes that are moved.
-            bound: distances end here, a fraction of the diagonal, which is quicker.
+            bound: misses end here, which is quicker.
         """
         stride = self.stride(sources)
-        found = miss_distances(self.cloud, motions, stride=stride, bound=bound * self.diagonal) / self.diagonal
-        if self.cloud.body == "atoms":
-            return needs_of_atoms(found.mean(axis=-1), np.quantile(found, 0.95, axis=-1), found.max(axis=-1))
-        spreads = [self.spread([m]) / LIMITS[0] for m in motions]
-        return np.maximum(needs(limited(found), self.noise), spreads)
+        return miss_distances(self.cloud, motions, stride=stride, bound=bound * self.diagonal) / self.diagonal
 
-    def spread(self, motions: Sequence[Isometry]) -> float:
-        """By how much the mass of a volume spreads otherwise, of which the nearest points tell the outline only."""
-        if self.cloud.body != "volume":
-            return 0.0
+    def needed(self, misses: Array, motions: Sequence[Isometry]) -> Array:
+        """The smallest tolerances [K], fractions of the diagonal, at which operations hold that miss so [K, N].
+
+        Of a volume the nearest points tell the outline only; by how much its mass spreads otherwise counts like a mean.
+        """
+        if self.cloud.body == "atoms":
+            return needs_of_atoms(misses)
+        found = needs(misses, self.noise)
+        if self.cloud.body == "surface":
+            return found
         own = np.cov(self.cloud.points.T)
-        return max(spread_distance(own, m) for m in motions) / self.diagonal
+        return np.maximum(found, [spread_distance(own, m) / (self.diagonal * LIMITS[0]) for m in motions])
 
-    def needed(self, deviation: Deviation, spread: float = 0.0) -> float:
-        """The smallest tolerance, a fraction of the diagonal, at which a miss still counts as symmetric."""
-        if self.cloud.body == "atoms":
-            return deviation.need_of_atoms
-        return max(deviation.need(self.noise), spread / LIMITS[0])
+    def needs(self, motions: Sequence[Isometry], *, sources: int = 10**9, bound: float = math.inf) -> Array:
+        """The smallest tolerances [K] at which each of K operations holds; arguments as of `misses`."""
+        return self.needed(self.misses(motions, sources=sources, bound=bound), motions)
+
+    def need(self, motions: Sequence[Isometry], *, sources: int = 10**9) -> float:
+        """The smallest tolerance at which all of some operations hold."""
+        return float(self.needs(motions, sources=sources).max())
 
     @property
     def floor(self) -> float:
@@ -83,5 +78,7 @@ class Surface:
 
         Of a volume the noise is the distance to the nearest point, which is known; only how it spreads is not.
         """
+        if not self.noise.size:
+            return 0.0
         share = NEAREST_SPREAD if self.cloud.body == "volume" else 1.0
-        return share * self.noise.need(NOTHING)
+        return share * float(needs(self.noise, NONE))
