@@ -18,6 +18,7 @@ from symrefine.align.pair import Evidence, few
 from symrefine.align.polish import Polished, Similarity, polish
 from symrefine.align.procrustes import SIGNIFICANT
 from symrefine.geometry import Array, frame_with_z, rotation
+from symrefine.propose.folds import MAX_FOLD
 from symrefine.surface.skin import LocalPlanes, Skin
 
 # Hills of the landscape that are climbed, for each determinant.
@@ -159,11 +160,10 @@ def _phases(evidence: Evidence, matrix: Array, rivals: Fits) -> Iterator[Array]:
     spectrum = np.zeros(PHASES, complex)
     spectrum[1 : len(source)] = (np.conj(target) * source).sum(axis=1)[1:]
     score = np.fft.ifft(spectrum).real
-    for _ in range(JUDGED):
-        i = int(np.argmax(score))
-        yield rotation(axis, 2.0 * np.pi * i / PHASES) @ matrix
-        window = (np.arange(-6, 7) + i) % PHASES
-        score[window] = -np.inf
+    peaks = np.flatnonzero((score > np.roll(score, 1)) & (score >= np.roll(score, -1)))
+    turns = 2.0 * np.pi * peaks[np.argsort(-score[peaks])] / PHASES
+    others = turns[np.abs(np.exp(1j * turns) - 1.0) > np.pi / MAX_FOLD]  # the nearest is where the polish ends anyway
+    yield from (rotation(axis, turn) @ matrix for turn in others[:JUDGED])
 
 
 def polished(evidence: Evidence, start: Similarity, covariance: Array) -> Polished:
