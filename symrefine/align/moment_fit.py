@@ -21,14 +21,13 @@ from symrefine.moments.action import FLOOR, Action, turned_by
 STEPS = 12
 # Longest step (radians): half of a period of degree 6.
 LONGEST = 0.3
-# A step of this (radians) leaves 1e-14 where the moments agree to rounding; else the costs come to a standstill first.
-SETTLED, STANDSTILL = 1e-7, 1e-5
 # Matrices nearer than this (Frobenius norm; 0.8 degrees) are one.
 SAME = 0.02
 # A map is as good as the best if its cost is below this many times the best, or what sampling explains: on 52 objects,
 # costs of true maps scatter between 0.02 and 2.5 per number, as the errors of moments are correlated.
 RIVAL = 5.0
-# Moments that agree to this are those of the same points: some hundred roundings.
+# Moments that agree to this are those of the same points: some hundred roundings. A step of this
+# (radians) ends the fit: quadratic convergence then leaves 1e-14.
 ROUNDING = 1e-7
 
 
@@ -86,9 +85,7 @@ def fit(pair: MomentPair, starts: Array) -> Fits:
             costs=np.einsum("ki,ki->k", r, r), gradients=(j @ r[:, :, None])[:, :, 0], hessians=j @ j.transpose(0, 2, 1)
         )
 
-    found = minimise_all(
-        linearise, starts, move=turned_by, max_steps=STEPS, tolerance=SETTLED, longest=LONGEST, standstill=STANDSTILL
-    )
+    found = minimise_all(linearise, starts, move=turned_by, max_steps=STEPS, tolerance=ROUNDING, longest=LONGEST)
     order = np.argsort(found.costs, kind="stable")
     return Fits(matrices=orthogonal_factor(found.x), costs=found.costs, hessians=found.hessians)[order]
 

@@ -11,9 +11,8 @@ import numpy as np
 
 from symrefine.geometry import Array, read_only
 from symrefine.ntuples.contract import NTuples
+from symrefine.ntuples.rank import FLOOR
 
-# Standard deviation of a tuple that no sample takes away, as a fraction of the bound |v| <= 1.
-FLOOR = 1e-3
 # Singular values of M beyond what noise alone would give, over its standard deviation, count as determined.
 SIGNIFICANT = 5.0
 
