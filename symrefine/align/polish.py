@@ -10,15 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from symrefine.align.moment_fit import LONGEST
 from symrefine.fit.gauss_newton import Linearisation, minimise
 from symrefine.fit.matching import SCALE_FLOOR, each_coordinate, geman_mcclure, meet, robust_scale, worth
 from symrefine.fit.refine import MAX_OUTER, SETTLED, WITHIN_NOISE
 from symrefine.fit.residual import SIZE, design_rows, gram, turn_frame
 from symrefine.geometry import Array, Isometry, cross_matrix
 from symrefine.surface.skin import LocalPlanes, Skin
-
-# Motions uncertain by more than this (radians, RMS radii) are left alone: gliding along a cylinder is an example.
-UNOBSERVABLE = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -165,11 +163,12 @@ def _jacobian(motion: Similarity, size: int) -> Array:
 def _step(linearise: Callable[[Array], Linearisation], at: Array, scale: float) -> tuple[Array, Array, float]:
     """Gauss-Newton over what is observable: the way from x, the covariance, zero elsewhere, and the way over that.
 
-    It ends with a step below the robust scale: a smaller scale is due then.
+    It ends with a step below the robust scale: a smaller scale is due then. Motions uncertain by more than the longest
+    step of a fit are left alone: gliding along a cylinder is an example.
     """
     here = linearise(at)
     values, vectors = np.linalg.eigh(here.hessian)
-    basis = vectors[:, values > max(1e-9 * values[-1], UNOBSERVABLE**-2)]
+    basis = vectors[:, values > max(1e-9 * values[-1], LONGEST**-2)]
 
     def within(y: Array) -> Linearisation:
         full = linearise(at + basis @ y) if y.any() else here
