@@ -11,10 +11,7 @@ import numpy as np
 
 from symrefine.geometry import Array, read_only
 from symrefine.ntuples.contract import NTuples
-from symrefine.ntuples.rank import FLOOR
-
-# Singular values of M beyond what noise alone would give, over its standard deviation, count as determined.
-SIGNIFICANT = 5.0
+from symrefine.ntuples.rank import FLOOR, SIGNIFICANT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -12,7 +12,7 @@ from math import factorial, prod
 
 import numpy as np
 
-from symrefine.align.moment_fit import LONGEST, SAME, Fits, MomentPair, as_good, best_fits, covariance, exact, misfit
+from symrefine.align.moment_fit import LONGEST, Fits, MomentPair, as_good, best_fits, covariance, exact, misfit
 from symrefine.align.procrustes import Procrustes, procrustes
 from symrefine.geometry import Array
 from symrefine.moments.action import FLOOR, Monomials, skew
@@ -21,10 +21,8 @@ from symrefine.ntuples.contract import NTuples
 
 # Variance across, as a fraction of the whole, below which points count as lying in a subspace: rounding of float32.
 FLAT = 1e-12
-# Cost per moment above which the objects differ: correlated errors of 300 numbers make 17 of it.
-MISFIT = 20.0
-# Angles tried in the plane, for each determinant; up to this dimension all signs of the principal axes are.
-ANGLES, ALL_SIGNS = 24, 5
+# Up to this dimension all signs of the principal axes are tried.
+ALL_SIGNS = 5
 # A turn is not determined if its information is mostly noise: where the moments of the two, with their independent
 # errors, share less than this part of it.
 SHARED = 0.75
@@ -63,7 +61,7 @@ def span_fit(source: Moments, target: Moments, tuples: tuple[NTuples, NTuples], 
     starts = np.stack(_starts(tuples, procrustes(*tuples), source_axes, axes))
     fits = best_fits(pair, starts[(np.linalg.det(axes @ starts) > 0.0) | reflections])
     same = exact(pair, fits)
-    good = same if len(same.costs) else as_good(pair, fits)
+    good = same if len(same.costs) else fits[as_good(pair, fits.matrices)]
     free = _free(pair, good, exact=bool(len(same.costs))) @ axes.T
     matrices = sorted(axes @ good.matrices, key=lambda m: -np.sign(np.linalg.det(m)))
     return SpanFit(
@@ -114,7 +112,7 @@ def _starts(tuples: tuple[NTuples, NTuples], closed: Procrustes, a: Array, b: Ar
     agreement = np.sign(np.sum((tuples[0].vectors @ a) * (tuples[1].vectors @ b), axis=0))
     starts = [b.T @ closed.matrix, b.T @ closed.flipped, np.diag(np.where(agreement == 0.0, 1.0, agreement)) @ a.T]
     if dim == 2:
-        angles = 2.0 * np.pi * np.arange(ANGLES) / ANGLES
+        angles = np.arange(0.0, 2.0 * np.pi, LONGEST)
         turns = np.array([[np.cos(angles), -np.sin(angles)], [np.sin(angles), np.cos(angles)]]).transpose(2, 0, 1)
         starts += [*turns, *(turns @ np.diag([1.0, -1.0]))]
     elif closed.rank < dim - 1 and dim <= ALL_SIGNS:
@@ -144,7 +142,7 @@ def _one_for_each_part(matrices: Sequence[Array], free: Array) -> list[Array]:
     across = np.eye(free.shape[1]) - free.T @ free
     kept: list[Array] = []
     for m in matrices:
-        same = [np.linalg.norm(across @ (m - k)) < SAME and np.linalg.det(m) * np.linalg.det(k) > 0.0 for k in kept]
+        same = [np.linalg.norm(across @ (m - k)) < LONGEST and np.linalg.det(m) * np.linalg.det(k) > 0.0 for k in kept]
         if not any(same):
             kept.append(m)
     return kept

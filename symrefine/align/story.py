@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from symrefine.align.alignment import OK, OPEN, Alignment
 from symrefine.align.coset import Coset, coset_of_group, coset_of_list, lifted
-from symrefine.align.moment_fit import ROUNDING
+from symrefine.align.moment_fit import MISFIT, ROUNDING
 from symrefine.align.pair import Evidence, Side, few
 from symrefine.align.polish import Similarity
 from symrefine.align.rivals import choose, polished
-from symrefine.align.span import FLAT, MISFIT, span_fit
+from symrefine.align.span import FLAT, span_fit
 from symrefine.clock import Clock
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
