@@ -8,15 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.geometry import Array, read_only, unit
+from symrefine.geometry import Array, householder, read_only, unit
 from symrefine.groups import PointGroup
-
-# One operation for each connected part of the continuous groups that a set of points can have (rows: diagonals).
-_PARTS = {
-    "Cv": [(1, 1, 1), (1, -1, 1)],
-    "Dh": [(1, 1, 1), (1, -1, -1), (1, -1, 1), (1, 1, -1)],
-    "Kh": [(1, 1, 1), (-1, -1, -1)],
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,9 +52,10 @@ def coset_of_group(
     if group.is_finite:
         operations, free = group.operations(), group.frame[:0]
     else:
-        family = group.symbol.family
-        operations = np.stack([group.frame.T @ np.diag(d) @ group.frame for d in np.array(_PARTS[family], float)])
-        free = group.frame if family == "Kh" else group.frame[:2]
+        # The mirrors, one for each continuous family of them, and their products lead to every connected part.
+        operations, free = np.eye(3)[None], group.frame if group.symbol.family == "Kh" else group.frame[:2]
+        for normal in group.mirrors():
+            operations = np.concatenate([operations, householder(normal) @ operations])
     if not reflections:
         operations = operations[np.linalg.det(operations) > 0.0]
     return Coset(

@@ -16,6 +16,7 @@ from symrefine.align.polish import Similarity
 from symrefine.align.rivals import choose, polished
 from symrefine.align.span import FLAT, span_fit
 from symrefine.clock import Clock
+from symrefine.detection.measure import PARTS
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, check_tolerance
@@ -31,8 +32,6 @@ __all__ = ["Alignment", "align"]
 
 # Highest order of the moments in so many dimensions: some 100 to 500 moments, of n^order components.
 ORDERS = {1: 8, 2: 8, 3: 8, 4: 5, 5: 5, 6: 5, 7: 3, 8: 3, 9: 3, 10: 3}
-# Parts of the jackknife, as in `detect`.
-PARTS = 16
 # Radii that differ by more than this factor are no matter of sampling.
 RADII = 1.2
 
