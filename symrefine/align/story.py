@@ -245,25 +245,9 @@ def _align_moments(sides: tuple[Side, Side], scale: bool, reflections: bool, clo
 def _planar_coset(target: Shape, known: Coset, reflections: bool) -> Coset:
     """In the plane, the operations of the target that `detect_planar` finds, after the map that is known."""
     found = detect_planar(target)
-    if (
-        found.undetermined
-        or not np.isfinite(found.group.order)
-        or found.group.order <= len(known.matrices)
-        or len(known.free)
-    ):
+    if found.undetermined or np.isinf(found.group.order) or len(known.free):
         return known
-    operations = found.group.operations()
-    if not reflections:
-        operations = operations[np.linalg.det(operations) > 0]
-    first, shift = known.matrices[0], known.translations[0]
-    either = ", and the determinant is free" if np.linalg.det(operations).min() < 0 else ""
-    return Coset(
-        matrices=operations @ first,
-        translations=operations @ (shift - found.center) + found.center,
-        free=known.free,
-        symmetry=found.point_group,
-        observable=f"up to the {len(operations)} operations of {found.point_group}{either}",
-    )
+    return coset_of_group(known.matrices[0], known.translations[0], found.group, found.center, reflections=reflections)
 
 
 def _within(side: Side, basis: Array) -> Moments:
