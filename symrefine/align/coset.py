@@ -48,7 +48,9 @@ def coset_of_group(
         center: [n] point of the target that the group leaves in place.
         reflections: whether improper operations count.
     """
-    free, observable = np.zeros((0, len(matrix))), ""
+    free: Array = np.zeros((0, len(matrix)))
+    operations: Array
+    observable = ""
     if isinstance(group, PointGroup) and not group.is_finite:
         # The mirrors, one for each continuous family of them, and their products lead to every connected part.
         group = group.for_point_set()

@@ -17,6 +17,7 @@ from symrefine.fit.gauss_newton import Linearisations, minimise_all
 from symrefine.fit.refine import MAX_OUTER
 from symrefine.geometry import Array, orthogonal_factor
 from symrefine.moments.action import FLOOR, Action, turned_by
+from symrefine.moments.moments import deviations
 from symrefine.ntuples.rank import SIGNIFICANT
 
 # Longest step (radians): less than half a period of order 8, the finest that moments see. Maps nearer than this
@@ -136,9 +137,6 @@ def covariance(pair: MomentPair, fits: Fits) -> Array:
 
 def _jackknife(pair: MomentPair, matrix: Array, directions: Array) -> Array:
     """Jackknife covariance [A, A] of the residual `D(R) a - b` along directions [A, C], at a matrix [1, n, n]."""
-    total: Array = np.zeros((len(directions), len(directions)))
-    for replicates in (pair.action.turned(matrix, pair.source[1:])[0], pair.target[1:]):
-        if len(replicates):
-            along = (replicates - replicates.mean(axis=0)) @ directions.T
-            total += (1.0 - 1.0 / len(along)) * along.T @ along
-    return total
+    both = pair.action.turned(matrix, pair.source[1:])[0], pair.target[1:]
+    along = np.concatenate([deviations(replicates) for replicates in both]) @ directions.T
+    return along.T @ along

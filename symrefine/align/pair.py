@@ -8,16 +8,17 @@ import numpy as np
 from symrefine.align.landscape import harmonic_pair
 from symrefine.align.moment_fit import MomentPair
 from symrefine.align.procrustes import Procrustes, procrustes
-from symrefine.align.surfaces import Surfaces
 from symrefine.detection.measure import SAMPLES
-from symrefine.geometry import Array
+from symrefine.geometry import Array, Isometry, tight_diagonal
 from symrefine.moments.moments import Moments, central_moments
 from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import ntuples
 from symrefine.propose.folds import azimuthal_spectrum
 from symrefine.shape import Shape
+from symrefine.surface.misses import Deviation, disc_distances
 from symrefine.surface.neighbourhoods import NEIGHBOURS
 from symrefine.surface.skin import FEW, LocalPlanes, Skin, isolated_points, make_skin
+from symrefine.surface.surface import Surface
 
 # Local planes of the source and of the target.
 SOURCE_PLANES, TARGET_PLANES = 800, 2000
@@ -128,9 +129,25 @@ class Evidence:
         return self._planes(1, 0) if few(self.source.shape, self.target.shape) else self._skins[1]
 
     @cached_property
-    def surfaces(self) -> Surfaces:
-        """Local planes of both sides, for the judgement."""
-        return Surfaces(source=self.moving, target=self._planes(1, TARGET_PLANES), tolerance=self.tolerance)
+    def judge(self) -> Surface:
+        """The target as a judge of what meets it, by the limits of `detect`.
+
+        Its noise is what sampling alone explains: each surface against itself, and what only one of the two blurs.
+        Local planes merge the two faces of a thin sheet, or follow each, as the density of the points has it.
+        """
+        target = self._planes(1, TARGET_PLANES)
+        diagonal = tight_diagonal(target.points)
+        own = [disc_distances(s, s.points, skip_self=True) for s in (self.moving, target)]
+        blurred = abs(float(self.moving.thickness.mean() - target.thickness.mean()))
+        return Surface(cloud=target, diagonal=diagonal, noise=Deviation.of((np.concatenate(own) + blurred) / diagonal))
+
+    def misses(self, motion: Isometry) -> Array:
+        """Distances from the moved source to the target, fractions of the diagonal."""
+        return disc_distances(self.judge.cloud, motion.apply(self.moving.points)) / self.judge.diagonal
+
+    def excess(self, motion: Isometry) -> float:
+        """The largest statistic of the miss over its limit; <= 1 if the surfaces agree. Of atoms every one counts."""
+        return self.judge.needed(Deviation.of(self.misses(motion))) / self.tolerance
 
     def _rng(self) -> np.random.Generator:
         return np.random.default_rng(self.seed)

@@ -18,6 +18,7 @@ from symrefine.align.pair import Evidence, few
 from symrefine.align.polish import Polished, Similarity, polish
 from symrefine.geometry import Array, frame_with_z, rotation
 from symrefine.moments.action import FLOOR
+from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.propose.folds import BINS_PER_ORDER, MAX_FOLD
 from symrefine.surface.skin import LocalPlanes, Skin
 
@@ -77,8 +78,7 @@ def _choose(evidence: Evidence, reflections: bool) -> Choice:
     rivals, unlike, spread = fitted[as_good(pair, fitted.matrices)], misfit(pair, fitted), covariance(pair, fitted)
     motion, excess = Similarity(matrix=rivals.matrices[0], shift=np.zeros(3)), 0.0
     if (len(rivals.costs) > 1 or unlike > MISFIT) and evidence.has_points:
-        judged = _judged(evidence, rivals, spread)
-        motion, excess = judged.motion, judged.excess
+        motion, excess = _judged(evidence, rivals, spread)
     return Choice(evidence=evidence, motion=motion, covariance=spread, exact=False, misfit=unlike, excess=excess)
 
 
@@ -95,31 +95,25 @@ def candidates(evidence: Evidence, determinants: tuple[int, ...]) -> Fits:
     return best_fits(pair, np.concatenate([starts, *climbed]))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Judged:
-    motion: Similarity
-    excess: float
-
-
-def _judged(evidence: Evidence, rivals: Fits, covariance: Array) -> _Judged:
-    """The rival that the points confirm best; the proper one if its mirror image does no better."""
-    best: dict[int, _Judged] = {}
+def _judged(evidence: Evidence, rivals: Fits, covariance: Array) -> tuple[Similarity, float]:
+    """The rival that the points confirm best, and its excess; the proper one if its mirror image does no better."""
+    best: dict[int, tuple[Similarity, float]] = {}
     for det in dict.fromkeys(int(sign) for sign in rivals.signs):  # by cost
         of_det = rivals.matrices[rivals.signs == det]
         best[det] = _first_good(evidence, chain(of_det[:RIVALS], _phases(evidence, of_det[0], rivals)), covariance)
-    return best[min(best, key=lambda det: best[det].excess + GOOD * (det < 0))]
+    return best[min(best, key=lambda det: best[det][1] + GOOD * (det < 0))]
 
 
-def _first_good(evidence: Evidence, matrices: Iterable[Array], covariance: Array) -> _Judged:
+def _first_good(evidence: Evidence, matrices: Iterable[Array], covariance: Array) -> tuple[Similarity, float]:
     """Polish and judge one after the other until one is good, or the best of all."""
-    found: list[_Judged] = []
+    found: list[tuple[Similarity, float]] = []
     for m in matrices:
         start = Similarity(matrix=m, shift=np.zeros(3))
-        motion = _polish(evidence, evidence.surfaces.target, start, covariance).motion
-        found.append(_Judged(motion=motion, excess=evidence.surfaces.excess(motion)))
-        if found[-1].excess <= GOOD:
+        motion = polished(evidence, evidence.judge.cloud, start, covariance).motion
+        found.append((motion, evidence.excess(motion)))
+        if found[-1][1] <= GOOD:
             break
-    return min(found, key=lambda f: f.excess)
+    return min(found, key=lambda f: f[1])
 
 
 def _phases(evidence: Evidence, matrix: Array, rivals: Fits) -> Iterator[Array]:
@@ -140,13 +134,9 @@ def _phases(evidence: Evidence, matrix: Array, rivals: Fits) -> Iterator[Array]:
     yield from turned[1:][as_good(evidence.harmonics, turned)[1:]]
 
 
-def polished(evidence: Evidence, start: Similarity, covariance: Array) -> Polished:
+def polished(evidence: Evidence, target: Skin | LocalPlanes, start: Similarity, covariance: Array) -> Polished:
     """Polish on the points of the evidence from a start whose rotation the moments know with this covariance [3, 3]."""
-    return _polish(evidence, evidence.met, start, covariance)
-
-
-def _polish(evidence: Evidence, target: Skin | LocalPlanes, start: Similarity, covariance: Array) -> Polished:
-    error = min(3.0 * float(np.sqrt(np.trace(covariance))), LONGEST)
+    error = min(SIGNIFICANT * float(np.sqrt(np.trace(covariance))), LONGEST)
     known = _information(evidence, covariance)
     return polish(evidence.moving, target, start, error=error, known=known, scale=evidence.scale)
 

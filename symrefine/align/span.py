@@ -16,7 +16,7 @@ from symrefine.align.moment_fit import LONGEST, Fits, MomentPair, as_good, best_
 from symrefine.align.procrustes import Procrustes, procrustes
 from symrefine.geometry import Array
 from symrefine.moments.action import FLOOR, Monomials, skew
-from symrefine.moments.moments import Moments, exponents
+from symrefine.moments.moments import Moments, deviations, exponents
 from symrefine.ntuples.contract import NTuples
 
 # Variance across, as a fraction of the whole, below which points count as lying in a subspace: rounding of float32.
@@ -98,9 +98,7 @@ def _multiplicity(dim: int, order: int) -> Array:
 
 def _relative_variance(replicates: Array, size: Array, dim: int, order: int) -> Array:
     """Jackknife variance [K] of moments over their size squared, averaged over each degree; zero where exact."""
-    if not len(replicates):
-        return np.zeros(len(size))
-    relative = (len(replicates) - 1) * replicates.var(axis=0) / size
+    relative = (deviations(replicates) ** 2).sum(axis=0) / size
     degree, multiplicity = exponents(dim, order).sum(axis=1), _multiplicity(dim, order)
     means = [np.average(relative[degree == d], weights=multiplicity[degree == d]) for d in range(order + 1)]
     return np.array(means)[degree]

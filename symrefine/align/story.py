@@ -132,7 +132,7 @@ def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: boo
         with clock("planes"):
             _ = evidence.moving, evidence.met
         with clock("polish"):
-            done = polished(evidence, motion, covariance)
+            done = polished(evidence, evidence.met, motion, covariance)
             motion, covariance = done.motion, done.covariance[:3, :3]
     matrix, translation, factor = _in_input_units(evidence, motion, scale)
 
@@ -177,8 +177,8 @@ def _miss(evidence: Evidence, motion: Similarity, scale: bool, exact: bool) -> t
     status = OK if scale else _sizes(a, b)
     if status != OK or not evidence.has_points:
         return _nearest(a.shape, b.shape, *_in_input_units(evidence, motion, scale)), status
-    misses = evidence.surfaces.misses(motion)
-    rms, excess = float(np.sqrt(np.mean(misses**2))), evidence.surfaces.excess(motion)
+    misses = evidence.misses(motion)
+    rms, excess = float(np.sqrt(np.mean(misses**2))), evidence.excess(motion)
     if excess <= 1.0 or exact:
         return rms, OK
     return rms, (

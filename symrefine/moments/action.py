@@ -14,7 +14,7 @@ import numpy as np
 
 from symrefine.geometry import Array, read_only
 from symrefine.moments.harmonics import generators, turn
-from symrefine.moments.moments import exponents, turned_values
+from symrefine.moments.moments import deviations, exponents, turned_values
 from symrefine.shape import Index
 
 # Entries of a generator below this are rounding; those that are not are 1 at least.
@@ -121,10 +121,8 @@ def row_variance(replicates: Array, rows: Rows) -> Array:
 
     The mean over a row does not change when the object turns.
     """
-    if not len(replicates):
-        return np.zeros(replicates.shape[1])
     lengths = 2 * np.array(rows) + 1
-    sums = np.add.reduceat((len(replicates) - 1) * replicates.var(axis=0), np.cumsum(lengths) - lengths)
+    sums = np.add.reduceat((deviations(replicates) ** 2).sum(axis=0), np.cumsum(lengths) - lengths)
     return np.repeat(sums / lengths, lengths)
 
 

@@ -157,6 +157,15 @@ def central_moments(points: Array, weights: Array, order: int, *, parts: int = 0
     )
 
 
+def deviations(replicates: Array) -> Array:
+    """Jackknife replicates [B, ...] less their mean, scaled so that their squares add up to variances.
+
+    Delete-a-group jackknife (Kott 2001) of B parts; B - 1 degrees of freedom, none of them where B = 0.
+    """
+    parts = len(replicates)
+    return np.asarray(np.sqrt((parts - 1) / parts) * (replicates - replicates.mean(axis=0))) if parts else replicates
+
+
 def shape_moments(shape: Shape, order: int, *, parts: int = 0) -> Moments:
     """Normalised central moments of a shape: exact for a mesh, with `parts` jackknife replicates for a cloud.
 
