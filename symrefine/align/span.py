@@ -14,15 +14,12 @@ import numpy as np
 
 from symrefine.align.moment_fit import LONGEST, Fits, MomentPair, as_good, best_fits, covariance, exact, misfit
 from symrefine.align.procrustes import Procrustes, procrustes
+from symrefine.detection.measure import FLAT
 from symrefine.geometry import Array
 from symrefine.moments.action import FLOOR, Monomials, skew
 from symrefine.moments.moments import Moments, deviations, exponents
 from symrefine.ntuples.contract import NTuples
 
-# Variance across, as a fraction of the whole, below which points count as lying in a subspace: rounding of float32.
-FLAT = 1e-12
-# Up to this dimension all signs of the principal axes are tried.
-ALL_SIGNS = 5
 # A turn is not determined if its information is mostly noise: where the moments of the two, with their independent
 # errors, share less than this part of it.
 SHARED = 0.75
@@ -58,7 +55,7 @@ def span_fit(source: Moments, target: Moments, tuples: tuple[NTuples, NTuples], 
     """
     source_axes, axes = (np.linalg.eigh(m.covariance)[1] for m in (source, target))
     pair = monomial_pair(source, target)
-    starts = np.stack(_starts(tuples, procrustes(*tuples), source_axes, axes))
+    starts = np.stack(_starts(procrustes(*tuples), source_axes, axes))
     fits = best_fits(pair, starts[(np.linalg.det(axes @ starts) > 0.0) | reflections])
     same = exact(pair, fits)
     good = same if len(same.costs) else fits[as_good(pair, fits.matrices)]
@@ -84,8 +81,9 @@ def monomial_pair(source: Moments, target: Moments) -> MomentPair:
     size = np.prod(np.maximum(0.5 * (widths[0] + widths[1]), FLAT) ** table, axis=1)
     own = action.turned(np.linalg.eigh(source.covariance)[1].T[None], a)[0]
     noise = _relative_variance(own[1:], size, dim, order) + _relative_variance(b[1:], size, dim, order)
-    told = table.sum(axis=1) > 1
-    weights = np.where(told, _multiplicity(dim, order) / (size * (noise + FLOOR)), 0.0)
+    # Each moment counts as often as it stands in its tensor, and all of them as many as they are.
+    often = np.where(table.sum(axis=1) > 1, _multiplicity(dim, order), 0.0)
+    weights = often / (often[often > 0.0].mean() * size * (noise + FLOOR))
     return MomentPair(source=a, target=b, weights=weights, action=action)
 
 
@@ -104,17 +102,19 @@ def _relative_variance(replicates: Array, size: Array, dim: int, order: int) -> 
     return np.array(means)[degree]
 
 
-def _starts(tuples: tuple[NTuples, NTuples], closed: Procrustes, a: Array, b: Array) -> list[Array]:
-    """Procrustes with both determinants; principal axes signed as the tuples have it, or any way; a ring of angles."""
-    dim = len(a)
-    agreement = np.sign(np.sum((tuples[0].vectors @ a) * (tuples[1].vectors @ b), axis=0))
-    starts = [b.T @ closed.matrix, b.T @ closed.flipped, np.diag(np.where(agreement == 0.0, 1.0, agreement)) @ a.T]
-    if dim == 2:
+def _starts(closed: Procrustes, a: Array, b: Array) -> list[Array]:
+    """Procrustes with both determinants; principal axes [n, n], signed as the tuples have it or any way; turns.
+
+    The tuples share few moments: where all are off by as much on both sides, they agree by the square of that.
+    """
+    correlation = closed.target_directions.T * closed.singular_values @ closed.target_directions @ closed.matrix
+    agreement = np.einsum("ik,ij,jk->k", b, correlation, a)
+    signs = [(np.sign(v),) if abs(v) > closed.significance**2 else (1.0, -1.0) for v in agreement]
+    starts = [b.T @ closed.matrix, b.T @ closed.flipped, *(np.diag(s) @ a.T for s in product(*signs))]
+    if len(a) == 2:
         angles = np.arange(0.0, 2.0 * np.pi, LONGEST)
         turns = np.array([[np.cos(angles), -np.sin(angles)], [np.sin(angles), np.cos(angles)]]).transpose(2, 0, 1)
         starts += [*turns, *(turns @ np.diag([1.0, -1.0]))]
-    elif closed.rank < dim - 1 and dim <= ALL_SIGNS:
-        starts += [np.diag(signs) @ a.T for signs in product([1.0, -1.0], repeat=dim)]
     return starts
 
 

@@ -14,9 +14,9 @@ from symrefine.align.moment_fit import MISFIT, ROUNDING
 from symrefine.align.pair import Evidence, Side, few
 from symrefine.align.polish import Similarity
 from symrefine.align.rivals import choose, polished
-from symrefine.align.span import FLAT, span_fit
+from symrefine.align.span import span_fit
 from symrefine.clock import Clock
-from symrefine.detection.measure import PARTS
+from symrefine.detection.measure import FLAT, PARTS
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, check_tolerance
