@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
-from math import factorial, prod
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from symrefine.align.procrustes import Procrustes, procrustes
 from symrefine.detection.measure import FLAT
 from symrefine.geometry import Array
 from symrefine.moments.action import FLOOR, Monomials, skew
-from symrefine.moments.moments import Moments, deviations, exponents
+from symrefine.moments.moments import Moments, deviations, exponents, occurrences
 from symrefine.ntuples.contract import NTuples
 
 # A turn is not determined if its information is mostly noise: where the moments of the two, with their independent
@@ -90,8 +89,7 @@ def monomial_pair(source: Moments, target: Moments) -> MomentPair:
 @lru_cache(maxsize=16)
 def _multiplicity(dim: int, order: int) -> Array:
     """How often each moment stands in its symmetric tensor."""
-    table = exponents(dim, order).tolist()
-    return np.array([factorial(sum(p)) / prod(factorial(k) for k in p) for p in table])
+    return np.array([float(occurrences(tuple(p))) for p in exponents(dim, order).tolist()])
 
 
 def _relative_variance(replicates: Array, size: Array, dim: int, order: int) -> Array:

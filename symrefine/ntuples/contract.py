@@ -8,13 +8,12 @@ section 2). `derive` finds the same space exactly; the tests compare the two.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import factorial, prod
 
 import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array, read_only
-from symrefine.moments.moments import Moments, deviations, exponents
+from symrefine.moments.moments import Moments, deviations, exponents, occurrences
 from symrefine.shape import Index
 
 # The 3-D orders of the paper's experiments: 17 triplets from moments to order 5.
@@ -199,11 +198,6 @@ class _Entries:
         """Places and occurrences of the entries of T_degree traced to each rank."""
         every = [self(degree, rank) for rank in range(1, degree + 1, 2)]
         return tuple((np.array(list(e.values())), np.array([occurrences(k) for k in e], float)) for e in every)
-
-
-def occurrences(exponent: tuple[int, ...]) -> int:
-    """How often an entry with these exponents stands in a symmetric tensor."""
-    return factorial(sum(exponent)) // prod(factorial(k) for k in exponent)
 
 
 @lru_cache(maxsize=32)
