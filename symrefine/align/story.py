@@ -101,11 +101,12 @@ def _check(source: Shape, target: Shape, tolerance: float) -> None:
 
 
 def _side(shape: Shape, parts: int) -> Side:
-    order = ORDERS[shape.dim]
-    if shape.faces is not None:
-        return Side(shape=shape, moments=shape_moments(shape, order), weights=np.zeros(0))
     weights = np.ones(len(shape.points)) if shape.weights is None else shape.weights
-    return Side(shape=shape, moments=shape_moments(shape, order, parts=parts), weights=weights / weights.sum())
+    return Side(
+        shape=shape,
+        moments=shape_moments(shape, ORDERS[shape.dim], parts=parts),
+        weights=weights / weights.sum() if shape.faces is None else np.zeros(0),
+    )
 
 
 def _rank(moments: Moments) -> int:

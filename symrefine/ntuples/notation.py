@@ -71,15 +71,8 @@ class NTupleBasis:
         values = np.zeros((len(self.tuples), self.dim))
         for row, ntuple in enumerate(self.tuples):
             for column, component in enumerate(ntuple):
-                values[row, column] = sum(c * _product(monomial, moments) for c, monomial in component)
+                values[row, column] = sum(c * math.prod(moments[e] for e in monomial) for c, monomial in component)
         return values
-
-
-def _product(monomial: Monomial, moments: Mapping[Exponents, float]) -> float:
-    value = 1.0
-    for exponents in monomial:
-        value *= moments[exponents]
-    return value
 
 
 def law(basis: NTupleBasis, kind: Kind) -> str:
@@ -174,12 +167,18 @@ def to_text(basis: NTupleBasis) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _text_monomial(monomial: Monomial) -> str:
-    return " ".join(_text_moment(e) + (f"^{k}" if k > 1 else "") for e, k in Counter(monomial).items())
+def _written(monomial: Monomial, moment: Callable[[Exponents], str], power: str, times: str = " ") -> str:
+    """A product of moments, repeated ones as powers."""
+    return times.join(moment(e) + (power.format(k) if k > 1 else "") for e, k in Counter(monomial).items())
 
 
 def _text_moment(exponents: Exponents) -> str:
+    # A letter of its own and the separator "_": in Python no exponents can collide with each other or with a parameter.
     return "m" + ("" if max(exponents) < 10 else "_").join(map(str, exponents))
+
+
+def _text_monomial(monomial: Monomial) -> str:
+    return _written(monomial, _text_moment, "^{}")
 
 
 def _signed_terms(component: Component, write: Callable[[Monomial], str], times: str = " ") -> list[str]:
@@ -269,7 +268,7 @@ def _latex_component(component: Component, number: int, axis: int) -> list[str]:
 
 
 def _latex_monomial(monomial: Monomial) -> str:
-    return " ".join(_latex_moment(e) + (f"^{{{k}}}" if k > 1 else "") for e, k in Counter(monomial).items())
+    return _written(monomial, _latex_moment, "^{{{}}}")
 
 
 def _latex_moment(exponents: Exponents) -> str:
@@ -286,7 +285,7 @@ def to_python(basis: NTupleBasis, *, name: str = "ntuples") -> str:
     thousands of terms would exceed the depth that Python's compiler accepts.
     """
     lines, factors = [f"def {name}(m):", f'    """{title(basis)}."""'], len(basis.orders)
-    lines += [f"    {_python_moment(e)} = m[{', '.join(map(str, e))}]" for e in basis.moments]
+    lines += [f"    {_text_moment(e)} = m[{', '.join(map(str, e))}]" for e in basis.moments]
     names = [[f"x{k}_{axis}" for axis in range(1, basis.dim + 1)] for k in range(1, len(basis) + 1)]
     for ntuple, row in zip(basis.tuples, names, strict=True):
         for component, variable in zip(ntuple, row, strict=True):
@@ -297,9 +296,4 @@ def to_python(basis: NTupleBasis, *, name: str = "ntuples") -> str:
 
 
 def _python_monomial(monomial: Monomial) -> str:
-    return " * ".join(_python_moment(e) + (f"**{k}" if k > 1 else "") for e, k in Counter(monomial).items())
-
-
-def _python_moment(exponents: Exponents) -> str:
-    # A letter of its own and the separator "_": no exponents can collide with each other or with the parameter m.
-    return "m" + ("" if max(exponents) < 10 else "_").join(map(str, exponents))
+    return _written(monomial, _text_moment, "**{}", " * ")
