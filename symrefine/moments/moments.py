@@ -19,9 +19,9 @@ from symrefine.shape import Shape
 
 # Points per block: the monomials of a block stay in the L2 cache (method.md, section 1: a factor of ten).
 BLOCK = 2048
-# Waves that the edges of a solid's surface are tested with, radians per diagonal, and the share of the area that may be
-# missing or turned round: what single precision leaves where triangles meet without sharing vertices.
-WAVES, WAVE_NUMBER, LOOSE = 6, 4.0, 1e-6
+# Waves, about a radian to a diagonal, that the edges of a solid's surface are tested with, and the share of the area
+# that may be missing or turned round: what single precision leaves where triangles meet without sharing vertices.
+WAVES, LOOSE = 6, 1e-6
 
 
 def exponents_of(dim: int, degree: int) -> list[tuple[int, ...]]:
@@ -225,9 +225,7 @@ def _closed(shape: Shape) -> bool:
     areas, _ = triangle_areas_and_normals(shape.points, shape.faces)
     corners = (shape.points - shape.points[0])[shape.faces] / shape.diagonal
     edges, middles = np.roll(corners, -1, axis=1) - corners, 0.5 * (np.roll(corners, -1, axis=1) + corners)
-    waves, fields = (
-        np.random.default_rng(0).standard_normal((2, WAVES, 3)) * np.array([WAVE_NUMBER, 1.0])[:, None, None]
-    )
+    waves, fields = np.random.default_rng(0).standard_normal((2, WAVES, 3))
     along = edges @ fields.T * np.sinc(edges @ waves.T / (2.0 * np.pi))
     left = np.abs(np.einsum("fek,fek->k", along, np.exp(1j * (middles @ waves.T))))
     most = np.linalg.norm(waves, axis=1) * np.linalg.norm(fields, axis=1) * areas.sum() / shape.diagonal**2

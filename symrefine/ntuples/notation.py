@@ -22,8 +22,8 @@ Component = tuple[tuple[int, Monomial], ...]
 NTuple = tuple[Component, ...]
 Kind = Literal["polar", "axial", "affine"]
 
-# Moments to a line: a text line stays below 120 characters, a LaTeX line within the page.
-_TEXT_WIDTH, _LATEX_WIDTH = 12, 8
+# Moments to a line: in LaTeX it stays within the page.
+_WIDTH = 8
 # Vectors up to which a basis is worth shortening for the eye (about a second).
 _READABLE = 40
 
@@ -163,7 +163,7 @@ def to_text(basis: NTupleBasis) -> str:
         lines += ["", f"x_v{number} ({kind})"]
         for axis, component in enumerate(ntuple, start=1):
             head = f"  [{axis}] "
-            lines += _wrapped(_signed_terms(component, _text_monomial), head, " " * len(head), _TEXT_WIDTH // factors)
+            lines += _wrapped(_signed_terms(component, _text_monomial), head, " " * len(head), _WIDTH // factors)
     return "\n".join(lines) + "\n"
 
 
@@ -264,7 +264,7 @@ def _latex_preamble(basis: NTupleBasis) -> str:
 def _latex_component(component: Component, number: int, axis: int) -> list[str]:
     head = f"x_{{\\mathrm{{v}}{number},{axis}}} &= "
     factors = len(component[0][1])
-    return _wrapped(_signed_terms(component, _latex_monomial), head, r"&\quad ", _LATEX_WIDTH // factors)
+    return _wrapped(_signed_terms(component, _latex_monomial), head, r"&\quad ", _WIDTH // factors)
 
 
 def _latex_monomial(monomial: Monomial) -> str:
@@ -290,7 +290,7 @@ def to_python(basis: NTupleBasis, *, name: str = "ntuples") -> str:
     for ntuple, row in zip(basis.tuples, names, strict=True):
         for component, variable in zip(ntuple, row, strict=True):
             terms = _signed_terms(component, _python_monomial, times=" * ")
-            lines += _wrapped(terms, f"    {variable} = ", f"    {variable} = {variable} ", _TEXT_WIDTH // factors)
+            lines += _wrapped(terms, f"    {variable} = ", f"    {variable} = {variable} ", _WIDTH // factors)
     lines += ["    return [", *(f"        [{', '.join(row)}]," for row in names), "    ]"]
     return "\n".join(lines) + "\n"
 
