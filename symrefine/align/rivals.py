@@ -23,7 +23,7 @@ from symrefine.propose.folds import BINS_PER_ORDER, MAX_FOLD
 from symrefine.surface.skin import LocalPlanes, Skin
 
 # Hills of the landscape that are climbed, and rivals judged, for each determinant.
-RIVALS = 6
+RIVALS = 4
 # Share of the limits by which the misses of true maps differ: clean samples show 0.16 at most, mirror images 0.2; a
 # wheel off by four degrees misses by 0.27, the wrong hand of a posed ant by 0.6 more.
 GOOD = 0.25
@@ -105,19 +105,20 @@ def _judged(evidence: Evidence, rivals: Fits, covariance: Array) -> tuple[Simila
 
 
 def _first_good(evidence: Evidence, matrices: Iterable[Array], covariance: Array) -> tuple[Similarity, float]:
-    """Polish and judge one after the other until one is good, or the best of all."""
+    """Polish and judge one after the other until one is good; else the first, unless another clearly misses by less."""
     found: list[tuple[Similarity, float]] = []
     for m in matrices:
         start = Similarity(matrix=m, shift=np.zeros(3))
         motion = polished(evidence, evidence.judge.cloud, start, covariance).motion
         found.append((motion, evidence.excess(motion)))
         if found[-1][1] <= GOOD:
-            break
-    return min(found, key=lambda f: f[1])
+            return found[-1]
+    best = min(found, key=lambda f: f[1])
+    return found[0] if found[0][1] <= best[1] + GOOD else best
 
 
 def _phases(evidence: Evidence, matrix: Array, rivals: Fits) -> Iterator[Array]:
-    """The best turns about the axis that the moments know least about, from the azimuths, where they leave them open.
+    """The best turns about the axis that the moments know least about, from the azimuths of both clouds.
 
     With c_k the azimuthal coefficients about that axis, a turn by phi multiplies those of the source by exp(i k phi).
     """
@@ -129,9 +130,8 @@ def _phases(evidence: Evidence, matrix: Array, rivals: Fits) -> Iterator[Array]:
     spectrum[1 : len(source)] = (np.conj(target) * source).sum(axis=1)[1:]
     score = np.fft.ifft(spectrum).real
     peaks = np.flatnonzero((score > np.roll(score, 1)) & (score >= np.roll(score, -1)))
-    highest = peaks[np.argsort(-score[peaks])][:RIVALS]
-    turned = np.array([matrix, *(rotation(axis, 2.0 * np.pi * i / circle) @ matrix for i in highest)])
-    yield from turned[1:][as_good(evidence.harmonics, turned)[1:]]
+    for i in peaks[np.argsort(-score[peaks])][:RIVALS]:
+        yield rotation(axis, 2.0 * np.pi * i / circle) @ matrix
 
 
 def polished(evidence: Evidence, target: Skin | LocalPlanes, start: Similarity, covariance: Array) -> Polished:
