@@ -104,7 +104,7 @@ def _starts(closed: Procrustes, a: Array, b: Array) -> list[Array]:
     """Procrustes with both determinants; principal axes [n, n], signed as the tuples have it or any way; turns."""
     correlation = closed.target_directions.T * closed.singular_values @ closed.target_directions @ closed.matrix
     agreement = np.einsum("ik,ij,jk->k", b, correlation, a)
-    signs = [(np.sign(v),) if abs(v) > closed.significance else (1.0, -1.0) for v in agreement]
+    signs = [(np.sign(v),) if abs(v) > closed.significance**2 else (1.0, -1.0) for v in agreement]
     starts = [b.T @ closed.matrix, b.T @ closed.flipped, *(np.diag(s) @ a.T for s in product(*signs))]
     if len(a) == 2:
         angles = np.arange(0.0, 2.0 * np.pi, LONGEST)
