@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
 from symrefine.align.landscape import grid_rotations, harmonic_pair, hills, landscape
-from symrefine.align.moment_fit import covariance, exact, fit, preference
+from symrefine.align.moment_fit import as_good, covariance, exact, fit
 from symrefine.align.polish import Similarity, polish
 from symrefine.align.procrustes import procrustes
 from symrefine.align.span import monomial_pair, span_fit
@@ -424,7 +424,8 @@ def test_the_moments_prefer_the_right_hand_only_of_chiral_objects() -> None:
             *(central_moments(sample(shape, 10000, 0.0, rng), np.ones(10000), 8, parts=16) for _ in range(2))
         )
         mirror = fit(pair, np.stack([householder(n) for n in np.eye(3)])).matrices[0]
-        assert (preference(pair, fit(pair, np.eye(3)[None]).matrices[0], mirror) > 5.0) is chiral
+        both = np.stack([fit(pair, np.eye(3)[None]).matrices[0], mirror])
+        assert as_good(pair, both).tolist() == [True, not chiral]
 
 
 def sheet(count: int, noise: float, rng: np.random.Generator) -> Array:

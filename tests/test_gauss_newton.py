@@ -163,17 +163,6 @@ def test_no_step_is_longer_than_allowed():
         assert not found.converged
 
 
-def test_a_standstill_ends_what_a_tolerance_would_not():
-    residual, jacobian = exponential, exponential_jacobian
-    starts = np.array([[1.0, 0.1]])
-    patient = minimise_all(many(residual, jacobian), starts, max_steps=100, tolerance=1e-12)
-    hasty = minimise_all(many(residual, jacobian), starts, max_steps=100, tolerance=1e-12, standstill=1e-3)
-    assert patient.converged.all()
-    assert hasty.converged.all()
-    assert hasty.steps[0] < patient.steps[0]
-    assert hasty.costs[0] == pytest.approx(patient.costs[0], rel=1e-3)
-
-
 def test_points_that_move_on_a_circle_stay_on_it():
     target = np.array([np.cos(2.0), np.sin(2.0)])
 

@@ -91,7 +91,7 @@ class Alignment:
     def rms(self) -> float:
         """Root mean square distance from the moved source to the target as a fraction of the target's diagonal.
 
-        In 3-space between denoised surfaces; elsewhere, and for fewer than 60 points, to the nearest point.
+        In 3-space between denoised surfaces; elsewhere to the nearest point.
         """
         return self._fit[0]
 

@@ -8,15 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.geometry import Array, read_only, unit
-from symrefine.groups import PointGroup
-
-# One operation for each connected part of the continuous groups that a set of points can have (rows: diagonals).
-_PARTS = {
-    "Cv": [(1, 1, 1), (1, -1, 1)],
-    "Dh": [(1, 1, 1), (1, -1, -1), (1, -1, 1), (1, 1, -1)],
-    "Kh": [(1, 1, 1), (-1, -1, -1)],
-}
+from symrefine.geometry import Array, householder, read_only, unit
+from symrefine.groups import PointGroup, PointGroup2D
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,24 +37,29 @@ class Coset:
 
 
 def coset_of_group(
-    matrix: Array, translation: Array, group: PointGroup, center: Array, *, reflections: bool = True
+    matrix: Array, translation: Array, group: PointGroup | PointGroup2D, center: Array, *, reflections: bool = True
 ) -> Coset:
     """The coset of a target whose symmetry group, about `center`, is known.
 
     Args:
-        matrix: [3, 3] the representative.
-        translation: [3].
+        matrix: [n, n] the representative; n = 3, or n = 2 where the group is finite.
+        translation: [n].
         group: of the target, placed in its coordinates.
-        center: [3] point of the target that the group leaves in place.
+        center: [n] point of the target that the group leaves in place.
         reflections: whether improper operations count.
     """
-    group = group.for_point_set()
-    if group.is_finite:
-        operations, free = group.operations(), group.frame[:0]
+    free: Array = np.zeros((0, len(matrix)))
+    operations: Array
+    observable = ""
+    if isinstance(group, PointGroup) and not group.is_finite:
+        # The mirrors, one for each continuous family of them, and their products lead to every connected part.
+        group = group.for_point_set()
+        operations, free = np.eye(3)[None], group.frame if group.symbol.family == "Kh" else group.frame[:2]
+        for normal in group.mirrors():
+            operations = np.concatenate([operations, householder(normal) @ operations])
+        observable = _continuous_in_words(group)
     else:
-        family = group.symbol.family
-        operations = np.stack([group.frame.T @ np.diag(d) @ group.frame for d in np.array(_PARTS[family], float)])
-        free = group.frame if family == "Kh" else group.frame[:2]
+        operations = group.operations()
     if not reflections:
         operations = operations[np.linalg.det(operations) > 0.0]
     return Coset(
@@ -69,33 +67,31 @@ def coset_of_group(
         translations=center + (translation - center) @ operations.transpose(0, 2, 1),
         free=free,
         symmetry=group.name,
-        observable=_in_words(group, len(operations)),
+        observable=observable or _in_words(f"the {len(operations)} operations of {group.name}", operations),
     )
 
 
-def _in_words(group: PointGroup, count: int) -> str:
+def _continuous_in_words(group: PointGroup) -> str:
     if group.name == "Kh":
         return "the position only: the target is a sphere"
-    if not group.is_finite:
-        return f"up to any turn about {spelled(group.frame[2])}: the target is a body of revolution ({group.name})"
-    if count == 1:
+    return f"up to any turn about {spelled(group.frame[2])}: the target is a body of revolution ({group.name})"
+
+
+def _in_words(many: str, matrices: Array) -> str:
+    """What finitely many maps leave open: nothing if there is only one."""
+    if len(matrices) == 1:
         return "full"
-    either = "" if group.is_chiral else ", and the determinant is free"
-    return f"up to the {count} operations of {group.name}{either}"
+    signs = np.linalg.det(matrices)
+    return f"up to {many}" + (", and the determinant is free" if signs.min() < 0.0 < signs.max() else "")
 
 
 def coset_of_list(matrices: Array, source_center: Array, target_center: Array, scale: float, free: Array) -> Coset:
     """The coset where the moments themselves give all the maps that do equally well, about the two centres."""
-    signs = np.linalg.det(matrices)
     dim = matrices.shape[1]
     if len(free):
         observable = f"up to any orthogonal map within {len(free)} of the {dim} dimensions"
-    elif len(matrices) == 1:
-        observable = "full"
     else:
-        either = ", the determinant among them" if signs.min() < 0 < signs.max() else ""
-        least = "" if dim <= 3 else "at least "
-        observable = f"up to {least}{len(matrices)} maps that do equally well{either}"
+        observable = _in_words(f"{'' if dim <= 3 else 'at least '}{len(matrices)} maps that do equally well", matrices)
     return Coset(
         matrices=matrices,
         translations=target_center - scale * (matrices @ source_center),

@@ -13,7 +13,7 @@ from symrefine.align.moment_fit import LONGEST, MomentPair
 from symrefine.geometry import Array, read_only
 from symrefine.moments.action import FLOOR, Harmonics, flattened, row_variance
 from symrefine.moments.harmonics import harmonic_moments
-from symrefine.moments.moments import Moments, exponents
+from symrefine.moments.moments import Moments, deviations, exponents
 from symrefine.propose.spectrum import whitened
 
 # Rotations of the grid: 11 degrees to the nearest one at worst, against hills 30 degrees wide at degree 6.
@@ -69,16 +69,11 @@ def landscape(source: Moments, target: Moments) -> tuple[Array, Array]:
         count = len(a)
         if l == 2:  # whitening has emptied the first row
             a[0], b[0] = (p[l][0, 0] for p in plain)
-        noise = sum(_noise(p[l][1:, :count], l) for p in plain)
+        noise = sum((deviations(p[l][1:, :count]) ** 2).sum(axis=(0, 2)) for p in plain)
         strength = np.sqrt((a**2).sum(axis=1) * (b**2).sum(axis=1))
         kernel = (a / (strength + noise + np.sqrt(FLOOR))[:, None]).T @ b
         (odd if l % 2 else even)[:] += _grid_table(l) @ kernel.ravel().astype(np.float32)
     return even + odd, even - odd
-
-
-def _noise(replicates: Array, l: int) -> Array:
-    """Sampling variance [n_l] of whole rows, from their replicates [B, n_l, 2l+1]."""
-    return (2 * l + 1) * row_variance(*flattened({l: replicates}))[:: 2 * l + 1]
 
 
 def hills(scores: Array, det: int, *, count: int) -> Array:

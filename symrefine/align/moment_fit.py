@@ -14,21 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.fit.gauss_newton import Linearisations, minimise_all
+from symrefine.fit.refine import MAX_OUTER
 from symrefine.geometry import Array, orthogonal_factor
 from symrefine.moments.action import FLOOR, Action, turned_by
+from symrefine.moments.moments import deviations
+from symrefine.ntuples.rank import SIGNIFICANT
 
-# Steps at most.
-STEPS = 12
-# Longest step (radians): half of a period of degree 6.
+# Longest step (radians): less than half a period of order 8, the finest that moments see. Maps nearer than this
+# (Frobenius norm) are one.
 LONGEST = 0.3
-# A step of this (radians) leaves 1e-14 where the moments agree to rounding; else the costs come to a standstill first.
-SETTLED, STANDSTILL = 1e-7, 1e-5
-# Matrices nearer than this (Frobenius norm; 0.8 degrees) are one.
-SAME = 0.02
-# A map is as good as the best if its cost is below this many times the best, or what sampling explains: on 52 objects,
-# costs of true maps scatter between 0.02 and 2.5 per number, as the errors of moments are correlated.
-RIVAL = 5.0
-# Moments that agree to this are those of the same points: some hundred roundings.
+# Cost per number above which the moments differ: numbers of one object err together, and what all miss by so many
+# standard deviations costs its square.
+MISFIT = SIGNIFICANT**2
+# Moments that agree to this are those of the same points: some hundred roundings. A step of this
+# (radians) ends the fit: quadratic convergence then leaves 1e-14.
 ROUNDING = 1e-7
 
 
@@ -86,9 +85,7 @@ def fit(pair: MomentPair, starts: Array) -> Fits:
             costs=np.einsum("ki,ki->k", r, r), gradients=(j @ r[:, :, None])[:, :, 0], hessians=j @ j.transpose(0, 2, 1)
         )
 
-    found = minimise_all(
-        linearise, starts, move=turned_by, max_steps=STEPS, tolerance=SETTLED, longest=LONGEST, standstill=STANDSTILL
-    )
+    found = minimise_all(linearise, starts, move=turned_by, max_steps=MAX_OUTER, tolerance=ROUNDING, longest=LONGEST)
     order = np.argsort(found.costs, kind="stable")
     return Fits(matrices=orthogonal_factor(found.x), costs=found.costs, hessians=found.hessians)[order]
 
@@ -98,14 +95,23 @@ def best_fits(pair: MomentPair, starts: Array) -> Fits:
     fits = fit(pair, starts)
     kept: list[int] = []
     for i, m in enumerate(fits.matrices):
-        if all(np.linalg.norm(m - fits.matrices[k]) > SAME for k in kept):
+        if all(np.linalg.norm(m - fits.matrices[k]) > LONGEST for k in kept):
             kept.append(i)
     return fits[kept]
 
 
-def as_good(pair: MomentPair, fits: Fits) -> Fits:
-    """The fits that sampling noise cannot tell from the best."""
-    return fits[fits.costs <= RIVAL * max(float(fits.costs[0]), float(pair.size))]
+def as_good(pair: MomentPair, matrices: Array) -> NDArray[np.bool_]:
+    """Which of the matrices [K, n, n] sampling noise cannot tell from the first.
+
+    With d = D(R) a - D(R') a the difference of the costs is linear in the residual r = D(R) a - b, namely
+    `|d|^2 - 2 d.r`; its noise is that of 2 d.r. Unlike the costs themselves, whose many numbers err together, this
+    tells chiral objects (3.6 standard deviations and more on 10,000 points) from mirror-symmetric ones (below 2.5).
+    """
+    moved = pair.moved(matrices)
+    costs, directions = (moved - pair.target[0]) ** 2 @ pair.weights, pair.weights * (moved[0] - moved)
+    variances = np.diag(_jackknife(pair, matrices[:1], directions)) + FLOOR * (directions**2).sum(axis=1)
+    unlike = max(1.0, float(costs[0]) / pair.size)
+    return np.asarray(costs - costs[0] <= 2.0 * SIGNIFICANT * np.sqrt(unlike * variances))
 
 
 def exact(pair: MomentPair, fits: Fits) -> Fits:
@@ -131,24 +137,6 @@ def covariance(pair: MomentPair, fits: Fits) -> Array:
 
 def _jackknife(pair: MomentPair, matrix: Array, directions: Array) -> Array:
     """Jackknife covariance [A, A] of the residual `D(R) a - b` along directions [A, C], at a matrix [1, n, n]."""
-    total: Array = np.zeros((len(directions), len(directions)))
-    for replicates in (pair.action.turned(matrix, pair.source[1:])[0], pair.target[1:]):
-        if len(replicates):
-            along = (replicates - replicates.mean(axis=0)) @ directions.T
-            total += (1.0 - 1.0 / len(along)) * along.T @ along
-    return total
-
-
-def preference(pair: MomentPair, better: Array, other: Array) -> float:
-    """By how many standard deviations of sampling noise the moments prefer one matrix [n, n] to another.
-
-    With d = D(R) a - D(R') a the difference of the costs is linear in the residual r = D(R) a - b, namely
-    `|d|^2 - 2 d.r`; its noise is that of 2 d.r. Unlike the costs themselves, whose many numbers err together, this
-    tells chiral objects (3.6 and more on 10,000 points) from mirror-symmetric ones (below 2.5, nearly symmetric ones
-    below 4.2).
-    """
-    here, there = pair.moved(np.stack([better, other]))
-    direction = pair.weights * (here - there)
-    difference = float(pair.weights @ ((there - pair.target[0]) ** 2 - (here - pair.target[0]) ** 2))
-    variance = float(_jackknife(pair, better[None], direction[None])[0, 0] + FLOOR * direction @ direction)
-    return difference / (2.0 * float(np.sqrt(variance)) + 1e-300)
+    both = pair.action.turned(matrix, pair.source[1:])[0], pair.target[1:]
+    along = np.concatenate([deviations(replicates) for replicates in both]) @ directions.T
+    return along.T @ along

@@ -8,22 +8,22 @@ import numpy as np
 from symrefine.align.landscape import harmonic_pair
 from symrefine.align.moment_fit import MomentPair
 from symrefine.align.procrustes import Procrustes, procrustes
-from symrefine.align.surfaces import Surfaces
-from symrefine.geometry import Array
+from symrefine.detection.measure import SAMPLES
+from symrefine.geometry import Array, Isometry, tight_diagonal
 from symrefine.moments.moments import Moments, central_moments
 from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import ntuples
 from symrefine.propose.folds import azimuthal_spectrum
 from symrefine.shape import Shape
+from symrefine.surface.misses import disc_distances
 from symrefine.surface.neighbourhoods import NEIGHBOURS
 from symrefine.surface.skin import FEW, LocalPlanes, Skin, isolated_points, make_skin
+from symrefine.surface.surface import Surface
 
-# Local planes of the source and of the target, and points below which local planes say nothing.
-SOURCE_PLANES, TARGET_PLANES, FEWEST = 800, 2000, 60
+# Local planes of the source and of the target.
+SOURCE_PLANES, TARGET_PLANES = 800, 2000
 # Flatness of thin sheets and edges without noise (0.13 at most at the lower quartile); noise of 0.2 % makes it 0.17.
 THIN = 0.15
-# Points of a cloud that planes are fitted to at most, and points that a mesh is sampled at.
-DENSE = 20000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,8 +59,8 @@ class Side:
         points, normals = self.shape.points, self.shape.normals
         if self.is_mesh:
             points, normals = sample_surface(self.shape, samples, rng)[0], None
-        elif len(points) > DENSE:
-            some = rng.choice(len(points), DENSE, replace=False)
+        elif len(points) > SAMPLES:
+            some = rng.choice(len(points), SAMPLES, replace=False)
             points, normals = points[some], None if normals is None else normals[some]
         return make_skin((points - self.moments.center) / unit, rng, normals=normals, thin=THIN)
 
@@ -69,7 +69,7 @@ class Side:
         points = self.shape.points
         weights = self.weights
         if self.is_mesh:
-            points, _, _ = sample_surface(self.shape, DENSE, np.random.default_rng(0))
+            points, _, _ = sample_surface(self.shape, SAMPLES, np.random.default_rng(0))
             weights = np.full(len(points), 1.0 / len(points))
         local = (points - self.moments.center) @ frame.T / self.moments.scale
         c, sigma = azimuthal_spectrum(local, weights, np.array([0.0, 0.0, 1.0]))
@@ -106,7 +106,7 @@ class Evidence:
     def _skins(self) -> tuple[Skin, Skin]:
         """Source and target as the points show them, each about its own centre."""
         sides = self.source, self.target
-        samples = min([DENSE if s.is_mesh else len(s.shape.points) for s in sides])
+        samples = min([SAMPLES if s.is_mesh else len(s.shape.points) for s in sides])
         first, second = (s.skin(unit, samples, self._rng()) for s, unit in zip(sides, self._units, strict=True))
         return first, second
 
@@ -129,20 +129,34 @@ class Evidence:
         return self._planes(1, 0) if few(self.source.shape, self.target.shape) else self._skins[1]
 
     @cached_property
-    def surfaces(self) -> Surfaces:
-        """Local planes of both sides, for the judgement."""
-        return Surfaces(source=self.moving, target=self._planes(1, TARGET_PLANES), tolerance=self.tolerance)
+    def judge(self) -> Surface:
+        """The target as a judge of what meets it, by the limits of `detect`.
+
+        Its noise is what sampling alone explains: each surface against itself, and what only one of the two blurs.
+        Local planes merge the two faces of a thin sheet, or follow each, as the density of the points has it.
+        """
+        target = self._planes(1, TARGET_PLANES)
+        diagonal = tight_diagonal(target.points)
+        own = [disc_distances(s, s.points, skip_self=True) for s in (self.moving, target)]
+        blurred = abs(float(self.moving.thickness.mean() - target.thickness.mean()))
+        return Surface(cloud=target, diagonal=diagonal, noise=(np.concatenate(own) + blurred) / diagonal)
+
+    def misses(self, motion: Isometry) -> Array:
+        """Distances from the moved source to the target, fractions of the diagonal."""
+        return disc_distances(self.judge.cloud, motion.apply(self.moving.points)) / self.judge.diagonal
+
+    def excess(self, motion: Isometry) -> float:
+        """The largest statistic of the miss over its limit; <= 1 if the surfaces agree. Of atoms every one counts."""
+        return float(self.judge.needed(self.misses(motion)[None], [motion])[0]) / self.tolerance
 
     def _rng(self) -> np.random.Generator:
         return np.random.default_rng(self.seed)
 
     @property
     def has_points(self) -> bool:
-        """Whether there is enough on both sides to judge: surfaces, or few points that stand for themselves."""
+        """Whether both sides can be judged: surfaces, or few points that stand for themselves, but no filled solid."""
         sides = (self.source.shape, self.target.shape)
-        solid = {s.measure for s in sides} == {"solid", "points"}
-        enough = all(s.faces is not None or len(s.points) >= FEWEST for s in sides)
-        return few(*sides) or (enough and not solid)
+        return few(*sides) or {s.measure for s in sides} != {"solid", "points"}
 
 
 def few(source: Shape, target: Shape) -> bool:

@@ -10,15 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from symrefine.align.moment_fit import LONGEST
 from symrefine.fit.gauss_newton import Linearisation, minimise
-from symrefine.fit.matching import each_coordinate, geman_mcclure, meet, robust_scale, worth
+from symrefine.fit.matching import SCALE_FLOOR, each_coordinate, geman_mcclure, meet, robust_scale, worth
 from symrefine.fit.refine import MAX_OUTER, SETTLED, WITHIN_NOISE
-from symrefine.fit.residual import SIZE, design_rows, gram
-from symrefine.geometry import Array, Isometry, cross_matrix, rotation
+from symrefine.fit.residual import SIZE, design_rows, gram, turn_frame
+from symrefine.geometry import Array, Isometry, cross_matrix
 from symrefine.surface.skin import LocalPlanes, Skin
-
-# Motions uncertain by more than this (radians, RMS radii) are left alone: gliding along a cylinder is an example.
-UNOBSERVABLE = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -33,9 +31,8 @@ class Similarity(Isometry):
 
     def moved(self, x: Array) -> "Similarity":
         """This map, turned about the origin and shifted by x [6], its scale times exp(x[6]) if there is one."""
-        angle = float(np.linalg.norm(x[:3]))
-        matrix = rotation(x[:3], angle) @ self.matrix if angle > 0.0 else self.matrix
         stretch = float(np.exp(x[6])) if len(x) > 6 else 1.0
+        matrix = turn_frame(self.matrix, x[:3])
         return Similarity(matrix=matrix, shift=self.shift + x[3:6], scale=self.scale * stretch)
 
 
@@ -89,14 +86,15 @@ def polish(
             return Polished(motion=start.moved(x), covariance=covariance, steps=index - 1, converged=False)
         before, settled = x, False
         for _ in range(MAX_OUTER):
-            scale_now = robust_scale(met.errors(start.moved(x)), target.spacing, reach)
-            step, inverse, sigmas = _step(_model(met, start, x, prior, scale_now), x, scale_now)
+            errors = met.errors(start.moved(x))
+            scale_now = robust_scale(errors, target.spacing, reach)
+            step, inverse, sigmas = _step(_model(met, start, errors, prior, scale_now), x, scale_now)
             x, covariance, length = x + step, inverse[:6, :6], float(np.linalg.norm(step))
             settled = scale_now > reach and (length < SETTLED or sigmas < WITHIN_NOISE)
             reach = min(reach, 4.0 * length)
             if settled:
                 break
-        if settled and float(np.linalg.norm(x - before)) < target.spacing:
+        if settled and float(np.linalg.norm(x - before)) < SCALE_FLOOR * target.spacing:
             return Polished(motion=start.moved(x), covariance=covariance, steps=index, converged=True)
     return Polished(motion=start.moved(x), covariance=covariance, steps=MAX_OUTER, converged=False)
 
@@ -129,9 +127,9 @@ def _met(source: LocalPlanes, target: Skin | LocalPlanes, motion: Similarity, re
     return _Met(rows=rows, worth=worth(own.flatness, met.flatness), each=1, redundancy=redundancy)
 
 
-def _model(met: _Met, start: Similarity, at: Array, prior: Array, scale: float) -> Callable[[Array], Linearisation]:
-    """Robust cost over the pairs, in units of their variance at a motion, and of what is known beforehand."""
-    first = met.errors(start.moved(at)) ** 2
+def _model(met: _Met, start: Similarity, errors: Array, prior: Array, scale: float) -> Callable[[Array], Linearisation]:
+    """Robust cost over the pairs, in units of the variance that their present errors [P] show, and of the prior."""
+    first = errors**2
     weights = met.worth * geman_mcclure(first, scale)
     squares = float(weights @ first) / (met.each * float(weights.sum()))
     variance = max(met.redundancy * squares, float(np.finfo(float).eps))
@@ -165,13 +163,15 @@ def _jacobian(motion: Similarity, size: int) -> Array:
 def _step(linearise: Callable[[Array], Linearisation], at: Array, scale: float) -> tuple[Array, Array, float]:
     """Gauss-Newton over what is observable: the way from x, the covariance, zero elsewhere, and the way over that.
 
-    It ends with a step below the robust scale: a smaller scale is due then.
+    It ends with a step below the robust scale: a smaller scale is due then. Motions uncertain by more than the longest
+    step of a fit are left alone: gliding along a cylinder is an example.
     """
-    values, vectors = np.linalg.eigh(linearise(at).hessian)
-    basis = vectors[:, values > max(1e-9 * values[-1], UNOBSERVABLE**-2)]
+    here = linearise(at)
+    values, vectors = np.linalg.eigh(here.hessian)
+    basis = vectors[:, values > max(1e-9 * values[-1], LONGEST**-2)]
 
     def within(y: Array) -> Linearisation:
-        full = linearise(at + basis @ y)
+        full = linearise(at + basis @ y) if y.any() else here
         return replace(full, gradient=basis.T @ full.gradient, hessian=basis.T @ full.hessian @ basis)
 
     found = minimise(within, np.zeros(basis.shape[1]), tolerance=scale)

@@ -13,29 +13,20 @@ from itertools import chain
 import numpy as np
 
 from symrefine.align.landscape import hills, landscape
-from symrefine.align.moment_fit import LONGEST, RIVAL, Fits, as_good, best_fits, covariance, exact, misfit, preference
+from symrefine.align.moment_fit import LONGEST, MISFIT, Fits, as_good, best_fits, covariance, exact, misfit
 from symrefine.align.pair import Evidence, few
 from symrefine.align.polish import Polished, Similarity, polish
-from symrefine.align.procrustes import SIGNIFICANT
 from symrefine.geometry import Array, frame_with_z, rotation
+from symrefine.moments.action import FLOOR
+from symrefine.ntuples.rank import SIGNIFICANT
+from symrefine.propose.folds import BINS_PER_ORDER, MAX_FOLD
 from symrefine.surface.skin import LocalPlanes, Skin
 
-# Hills of the landscape that are climbed, for each determinant.
-HILLS = 8
-# A rival that misses by less than this share of the limits is good, no other of its determinant is tried: clean samples
-# of true maps show 0.16 at most, a wheel off by four degrees 0.27.
-GOOD = 0.2
-# Surfaces that miss by less than this share of the limits agree, whatever their densities: noise of 2 % shows as much.
-AGREED = 0.35
-# The proper map is as good if its miss is below this many times that of the improper one: 1.2 at most for exact mirror
-# symmetry; 2.5 and more for a propeller, a camera, a posed ant.
-AS_GOOD = 2.0
-# Rivals judged for each determinant, and turns about the axis that the moments leave open.
-JUDGED = 3
-# Standard deviation that the moments' rotation is never trusted beyond, radians.
-TRUST = 1e-3
-# Turns about an axis that azimuths are compared at: half a degree apart.
-PHASES = 720
+# Hills of the landscape that are climbed, and rivals judged, for each determinant.
+RIVALS = 4
+# Share of the limits by which the misses of true maps differ: clean samples show 0.16 at most, mirror images 0.2; a
+# wheel off by four degrees misses by 0.27, the wrong hand of a posed ant by 0.6 more.
+GOOD = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,7 +52,7 @@ class Choice:
     @property
     def merit(self) -> tuple[float, float]:
         """The less the better: first that the surfaces agree, then that the moments do."""
-        return max(self.excess, AGREED), self.misfit
+        return max(self.excess, 1.0), self.misfit
 
 
 def choose(evidence: Evidence, *, reflections: bool = True) -> Choice:
@@ -71,7 +62,7 @@ def choose(evidence: Evidence, *, reflections: bool = True) -> Choice:
     the area.
     """
     first = _choose(evidence, reflections)
-    if first.merit <= (AGREED, RIVAL) or few(evidence.source.shape, evidence.target.shape):
+    if first.merit <= (1.0, MISFIT) or few(evidence.source.shape, evidence.target.shape):
         return first
     evened = replace(evidence, source=evidence.source.evened(), target=evidence.target.evened())
     return min(first, _choose(evened, reflections), key=lambda c: c.merit)
@@ -84,23 +75,11 @@ def _choose(evidence: Evidence, reflections: bool) -> Choice:
     if len(same.costs):
         best = Similarity(matrix=same.matrices[int(np.argmax(same.signs))], shift=np.zeros(3))
         return Choice(evidence=evidence, motion=best, covariance=np.zeros((3, 3)), exact=True, misfit=0.0, excess=0.0)
-    rivals, unlike, spread = _rivals(evidence, fitted), misfit(pair, fitted), covariance(pair, fitted)
+    rivals, unlike, spread = fitted[as_good(pair, fitted.matrices)], misfit(pair, fitted), covariance(pair, fitted)
     motion, excess = Similarity(matrix=rivals.matrices[0], shift=np.zeros(3)), 0.0
-    if (len(rivals.costs) > 1 or unlike > RIVAL) and evidence.has_points:
-        judged = _judged(evidence, rivals, spread)
-        motion, excess = judged.motion, judged.excess
+    if (len(rivals.costs) > 1 or unlike > MISFIT) and evidence.has_points:
+        motion, excess = _judged(evidence, rivals, spread)
     return Choice(evidence=evidence, motion=motion, covariance=spread, exact=False, misfit=unlike, excess=excess)
-
-
-def _rivals(evidence: Evidence, fitted: Fits) -> Fits:
-    """Fits that sampling noise cannot tell from the best; of the best one's determinant alone if that is decided."""
-    pair, near = evidence.harmonics, as_good(evidence.harmonics, fitted)
-    signs = near.signs
-    mirrored = np.flatnonzero(signs != signs[0])
-    noise = np.sqrt(max(1.0, misfit(pair, fitted)))
-    if len(mirrored) and preference(pair, near.matrices[0], near.matrices[mirrored[0]]) > SIGNIFICANT * noise:
-        return near[np.flatnonzero(signs == signs[0])]
-    return near
 
 
 def candidates(evidence: Evidence, determinants: tuple[int, ...]) -> Fits:
@@ -109,43 +88,33 @@ def candidates(evidence: Evidence, determinants: tuple[int, ...]) -> Fits:
     starts = [m for m in (closed.matrix, closed.flipped) if int(np.sign(np.linalg.det(m))) in determinants]
     if closed.rank > 1:
         fitted = best_fits(pair, np.array(starts))
-        if misfit(pair, fitted) < RIVAL:
+        if misfit(pair, fitted) < MISFIT:
             return fitted
     scores = dict(zip((1, -1), landscape(evidence.source.moments, evidence.target.moments), strict=True))
-    climbed = [hills(scores[d], d, count=HILLS) for d in determinants]
+    climbed = [hills(scores[d], d, count=RIVALS) for d in determinants]
     return best_fits(pair, np.concatenate([starts, *climbed]))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Judged:
-    motion: Similarity
-    excess: float
-
-
-def _judged(evidence: Evidence, rivals: Fits, covariance: Array) -> _Judged:
-    """The rival that the points confirm best; the proper one if its mirror image does no better."""
-    best: dict[int, _Judged] = {}
+def _judged(evidence: Evidence, rivals: Fits, covariance: Array) -> tuple[Similarity, float]:
+    """The rival that the points confirm best, and its excess; the proper one if its mirror image does no better."""
+    best: dict[int, tuple[Similarity, float]] = {}
     for det in dict.fromkeys(int(sign) for sign in rivals.signs):  # by cost
         of_det = rivals.matrices[rivals.signs == det]
-        among = chain(of_det[:JUDGED], _phases(evidence, of_det[0], rivals))
-        best[det] = _first_good(evidence, among, covariance)
-    if len(best) < 2:
-        return next(iter(best.values()))
-    proper, improper = best[1], best[-1]
-    as_good = proper.excess <= min(1.0, max(GOOD, AS_GOOD * improper.excess)) or proper.excess <= improper.excess
-    return proper if as_good else improper
+        best[det] = _first_good(evidence, chain(of_det[:RIVALS], _phases(evidence, of_det[0], rivals)), covariance)
+    return best[min(best, key=lambda det: best[det][1] + GOOD * (det < 0))]
 
 
-def _first_good(evidence: Evidence, matrices: Iterable[Array], covariance: Array) -> _Judged:
-    """Polish and judge one after the other until one is good, or the best of all."""
-    found: list[_Judged] = []
+def _first_good(evidence: Evidence, matrices: Iterable[Array], covariance: Array) -> tuple[Similarity, float]:
+    """Polish and judge one after the other until one is good; else the first, unless another clearly misses by less."""
+    found: list[tuple[Similarity, float]] = []
     for m in matrices:
         start = Similarity(matrix=m, shift=np.zeros(3))
-        motion = _polish(evidence, evidence.surfaces.target, start, covariance).motion
-        found.append(_Judged(motion=motion, excess=evidence.surfaces.excess(motion)))
-        if found[-1].excess <= GOOD:
-            break
-    return min(found, key=lambda f: f.excess)
+        motion = polished(evidence, evidence.judge.cloud, start, covariance).motion
+        found.append((motion, evidence.excess(motion)))
+        if found[-1][1] <= GOOD:
+            return found[-1]
+    best = min(found, key=lambda f: f[1])
+    return found[0] if found[0][1] <= best[1] + GOOD else best
 
 
 def _phases(evidence: Evidence, matrix: Array, rivals: Fits) -> Iterator[Array]:
@@ -156,23 +125,18 @@ def _phases(evidence: Evidence, matrix: Array, rivals: Fits) -> Iterator[Array]:
     axis = np.linalg.eigh(rivals.hessians[0])[1][:, 0]
     frame = frame_with_z(axis)
     source, target = evidence.source.azimuths(frame @ matrix), evidence.target.azimuths(frame)
-    spectrum = np.zeros(PHASES, complex)
+    circle = BINS_PER_ORDER * MAX_FOLD
+    spectrum = np.zeros(circle, complex)
     spectrum[1 : len(source)] = (np.conj(target) * source).sum(axis=1)[1:]
     score = np.fft.ifft(spectrum).real
-    for _ in range(JUDGED):
-        i = int(np.argmax(score))
-        yield rotation(axis, 2.0 * np.pi * i / PHASES) @ matrix
-        window = (np.arange(-6, 7) + i) % PHASES
-        score[window] = -np.inf
+    peaks = np.flatnonzero((score > np.roll(score, 1)) & (score >= np.roll(score, -1)))
+    for i in peaks[np.argsort(-score[peaks])][:RIVALS]:
+        yield rotation(axis, 2.0 * np.pi * i / circle) @ matrix
 
 
-def polished(evidence: Evidence, start: Similarity, covariance: Array) -> Polished:
+def polished(evidence: Evidence, target: Skin | LocalPlanes, start: Similarity, covariance: Array) -> Polished:
     """Polish on the points of the evidence from a start whose rotation the moments know with this covariance [3, 3]."""
-    return _polish(evidence, evidence.met, start, covariance)
-
-
-def _polish(evidence: Evidence, target: Skin | LocalPlanes, start: Similarity, covariance: Array) -> Polished:
-    error = min(3.0 * float(np.sqrt(np.trace(covariance))), LONGEST)
+    error = min(SIGNIFICANT * float(np.sqrt(np.trace(covariance))), LONGEST)
     known = _information(evidence, covariance)
     return polish(evidence.moving, target, start, error=error, known=known, scale=evidence.scale)
 
@@ -180,7 +144,7 @@ def _polish(evidence: Evidence, target: Skin | LocalPlanes, start: Similarity, c
 def _information(evidence: Evidence, covariance: Array) -> Array:
     """Inverse covariance [6, 6] of rotation and shift (RMS radii) that the moments carry."""
     known: Array = np.zeros((6, 6))
-    known[:3, :3] = np.linalg.inv(covariance + TRUST**2 * np.eye(3))
+    known[:3, :3] = np.linalg.inv(covariance + FLOOR * np.eye(3))
     counts = [np.sum(s.weights**2) for s in (evidence.source, evidence.target)]
-    known[3:, 3:] = np.eye(3) / (sum(counts) / 3.0 + TRUST**2)
+    known[3:, 3:] = np.eye(3) / (sum(counts) / 3.0 + FLOOR)
     return known

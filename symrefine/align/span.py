@@ -8,23 +8,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
-from math import factorial, prod
 
 import numpy as np
 
-from symrefine.align.moment_fit import LONGEST, SAME, Fits, MomentPair, as_good, best_fits, covariance, exact, misfit
+from symrefine.align.moment_fit import LONGEST, Fits, MomentPair, as_good, best_fits, covariance, exact, misfit
 from symrefine.align.procrustes import Procrustes, procrustes
+from symrefine.detection.measure import FLAT
 from symrefine.geometry import Array
 from symrefine.moments.action import FLOOR, Monomials, skew
-from symrefine.moments.moments import Moments, exponents
+from symrefine.moments.moments import Moments, deviations, exponents, occurrences
 from symrefine.ntuples.contract import NTuples
 
-# Variance across, as a fraction of the whole, below which points count as lying in a subspace: rounding of float32.
-FLAT = 1e-12
-# Cost per moment above which the objects differ: correlated errors of 300 numbers make 17 of it.
-MISFIT = 20.0
-# Angles tried in the plane, for each determinant; up to this dimension all signs of the principal axes are.
-ANGLES, ALL_SIGNS = 24, 5
 # A turn is not determined if its information is mostly noise: where the moments of the two, with their independent
 # errors, share less than this part of it.
 SHARED = 0.75
@@ -60,10 +54,10 @@ def span_fit(source: Moments, target: Moments, tuples: tuple[NTuples, NTuples], 
     """
     source_axes, axes = (np.linalg.eigh(m.covariance)[1] for m in (source, target))
     pair = monomial_pair(source, target)
-    starts = np.stack(_starts(tuples, procrustes(*tuples), source_axes, axes))
+    starts = np.stack(_starts(procrustes(*tuples), source_axes, axes))
     fits = best_fits(pair, starts[(np.linalg.det(axes @ starts) > 0.0) | reflections])
     same = exact(pair, fits)
-    good = same if len(same.costs) else as_good(pair, fits)
+    good = same if len(same.costs) else fits[as_good(pair, fits.matrices)]
     free = _free(pair, good, exact=bool(len(same.costs))) @ axes.T
     matrices = sorted(axes @ good.matrices, key=lambda m: -np.sign(np.linalg.det(m)))
     return SpanFit(
@@ -86,39 +80,36 @@ def monomial_pair(source: Moments, target: Moments) -> MomentPair:
     size = np.prod(np.maximum(0.5 * (widths[0] + widths[1]), FLAT) ** table, axis=1)
     own = action.turned(np.linalg.eigh(source.covariance)[1].T[None], a)[0]
     noise = _relative_variance(own[1:], size, dim, order) + _relative_variance(b[1:], size, dim, order)
-    told = table.sum(axis=1) > 1
-    weights = np.where(told, _multiplicity(dim, order) / (size * (noise + FLOOR)), 0.0)
+    # Each moment counts as often as it stands in its tensor, and all of them as many as they are.
+    often = np.where(table.sum(axis=1) > 1, _multiplicity(dim, order), 0.0)
+    weights = often / (often[often > 0.0].mean() * size * (noise + FLOOR))
     return MomentPair(source=a, target=b, weights=weights, action=action)
 
 
 @lru_cache(maxsize=16)
 def _multiplicity(dim: int, order: int) -> Array:
     """How often each moment stands in its symmetric tensor."""
-    table = exponents(dim, order).tolist()
-    return np.array([factorial(sum(p)) / prod(factorial(k) for k in p) for p in table])
+    return np.array([float(occurrences(tuple(p))) for p in exponents(dim, order).tolist()])
 
 
 def _relative_variance(replicates: Array, size: Array, dim: int, order: int) -> Array:
     """Jackknife variance [K] of moments over their size squared, averaged over each degree; zero where exact."""
-    if not len(replicates):
-        return np.zeros(len(size))
-    relative = (len(replicates) - 1) * replicates.var(axis=0) / size
+    relative = (deviations(replicates) ** 2).sum(axis=0) / size
     degree, multiplicity = exponents(dim, order).sum(axis=1), _multiplicity(dim, order)
     means = [np.average(relative[degree == d], weights=multiplicity[degree == d]) for d in range(order + 1)]
     return np.array(means)[degree]
 
 
-def _starts(tuples: tuple[NTuples, NTuples], closed: Procrustes, a: Array, b: Array) -> list[Array]:
-    """Procrustes with both determinants; principal axes signed as the tuples have it, or any way; a ring of angles."""
-    dim = len(a)
-    agreement = np.sign(np.sum((tuples[0].vectors @ a) * (tuples[1].vectors @ b), axis=0))
-    starts = [b.T @ closed.matrix, b.T @ closed.flipped, np.diag(np.where(agreement == 0.0, 1.0, agreement)) @ a.T]
-    if dim == 2:
-        angles = 2.0 * np.pi * np.arange(ANGLES) / ANGLES
+def _starts(closed: Procrustes, a: Array, b: Array) -> list[Array]:
+    """Procrustes with both determinants; principal axes [n, n], signed as the tuples have it or any way; turns."""
+    correlation = closed.target_directions.T * closed.singular_values @ closed.target_directions @ closed.matrix
+    agreement = np.einsum("ik,ij,jk->k", b, correlation, a)
+    signs = [(np.sign(v),) if abs(v) > closed.significance**2 else (1.0, -1.0) for v in agreement]
+    starts = [b.T @ closed.matrix, b.T @ closed.flipped, *(np.diag(s) @ a.T for s in product(*signs))]
+    if len(a) == 2:
+        angles = np.arange(0.0, 2.0 * np.pi, LONGEST)
         turns = np.array([[np.cos(angles), -np.sin(angles)], [np.sin(angles), np.cos(angles)]]).transpose(2, 0, 1)
         starts += [*turns, *(turns @ np.diag([1.0, -1.0]))]
-    elif closed.rank < dim - 1 and dim <= ALL_SIGNS:
-        starts += [np.diag(signs) @ a.T for signs in product([1.0, -1.0], repeat=dim)]
     return starts
 
 
@@ -144,7 +135,7 @@ def _one_for_each_part(matrices: Sequence[Array], free: Array) -> list[Array]:
     across = np.eye(free.shape[1]) - free.T @ free
     kept: list[Array] = []
     for m in matrices:
-        same = [np.linalg.norm(across @ (m - k)) < SAME and np.linalg.det(m) * np.linalg.det(k) > 0.0 for k in kept]
+        same = [np.linalg.norm(across @ (m - k)) < LONGEST and np.linalg.det(m) * np.linalg.det(k) > 0.0 for k in kept]
         if not any(same):
             kept.append(m)
     return kept

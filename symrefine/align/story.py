@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike
 
 from symrefine.align.alignment import OK, OPEN, Alignment
 from symrefine.align.coset import Coset, coset_of_group, coset_of_list, lifted
-from symrefine.align.moment_fit import ROUNDING
+from symrefine.align.moment_fit import MISFIT, ROUNDING
 from symrefine.align.pair import Evidence, Side, few
 from symrefine.align.polish import Similarity
 from symrefine.align.rivals import choose, polished
-from symrefine.align.span import FLAT, MISFIT, span_fit
+from symrefine.align.span import span_fit
 from symrefine.clock import Clock
+from symrefine.detection.measure import FLAT, PARTS
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, check_tolerance
@@ -31,8 +32,6 @@ __all__ = ["Alignment", "align"]
 
 # Highest order of the moments in so many dimensions: some 100 to 500 moments, of n^order components.
 ORDERS = {1: 8, 2: 8, 3: 8, 4: 5, 5: 5, 6: 5, 7: 3, 8: 3, 9: 3, 10: 3}
-# Parts of the jackknife, as in `detect`.
-PARTS = 16
 # Radii that differ by more than this factor are no matter of sampling.
 RADII = 1.2
 
@@ -102,11 +101,12 @@ def _check(source: Shape, target: Shape, tolerance: float) -> None:
 
 
 def _side(shape: Shape, parts: int) -> Side:
-    order = ORDERS[shape.dim]
-    if shape.faces is not None:
-        return Side(shape=shape, moments=shape_moments(shape, order), weights=np.zeros(0))
     weights = np.ones(len(shape.points)) if shape.weights is None else shape.weights
-    return Side(shape=shape, moments=shape_moments(shape, order, parts=parts), weights=weights / weights.sum())
+    return Side(
+        shape=shape,
+        moments=shape_moments(shape, ORDERS[shape.dim], parts=parts),
+        weights=weights / weights.sum() if shape.faces is None else np.zeros(0),
+    )
 
 
 def _rank(moments: Moments) -> int:
@@ -133,7 +133,7 @@ def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: boo
         with clock("planes"):
             _ = evidence.moving, evidence.met
         with clock("polish"):
-            done = polished(evidence, motion, covariance)
+            done = polished(evidence, evidence.met, motion, covariance)
             motion, covariance = done.motion, done.covariance[:3, :3]
     matrix, translation, factor = _in_input_units(evidence, motion, scale)
 
@@ -178,8 +178,8 @@ def _miss(evidence: Evidence, motion: Similarity, scale: bool, exact: bool) -> t
     status = OK if scale else _sizes(a, b)
     if status != OK or not evidence.has_points:
         return _nearest(a.shape, b.shape, *_in_input_units(evidence, motion, scale)), status
-    misses = evidence.surfaces.misses(motion)
-    rms, excess = float(np.sqrt(np.mean(misses**2))), evidence.surfaces.excess(motion)
+    misses = evidence.misses(motion)
+    rms, excess = float(np.sqrt(np.mean(misses**2))), evidence.excess(motion)
     if excess <= 1.0 or exact:
         return rms, OK
     return rms, (
@@ -246,25 +246,9 @@ def _align_moments(sides: tuple[Side, Side], scale: bool, reflections: bool, clo
 def _planar_coset(target: Shape, known: Coset, reflections: bool) -> Coset:
     """In the plane, the operations of the target that `detect_planar` finds, after the map that is known."""
     found = detect_planar(target)
-    if (
-        found.undetermined
-        or not np.isfinite(found.group.order)
-        or found.group.order <= len(known.matrices)
-        or len(known.free)
-    ):
+    if found.undetermined or np.isinf(found.group.order) or len(known.free):
         return known
-    operations = found.group.operations()
-    if not reflections:
-        operations = operations[np.linalg.det(operations) > 0]
-    first, shift = known.matrices[0], known.translations[0]
-    either = ", and the determinant is free" if np.linalg.det(operations).min() < 0 else ""
-    return Coset(
-        matrices=operations @ first,
-        translations=operations @ (shift - found.center) + found.center,
-        free=known.free,
-        symmetry=found.point_group,
-        observable=f"up to the {len(operations)} operations of {found.point_group}{either}",
-    )
+    return coset_of_group(known.matrices[0], known.translations[0], found.group, found.center, reflections=reflections)
 
 
 def _within(side: Side, basis: Array) -> Moments:

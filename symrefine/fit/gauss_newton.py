@@ -102,7 +102,6 @@ def minimise_all(
     max_steps: int = 6,
     tolerance: float = 1e-6,
     longest: float = np.inf,
-    standstill: float = 0.0,
 ) -> Solutions:
     """`minimise` from K starts [K, ...] at once; each ends where it would alone.
 
@@ -113,7 +112,6 @@ def minimise_all(
         max_steps: evaluations after the first.
         tolerance: a start has converged once its step is shorter than this.
         longest: steps are cut to this length.
-        standstill: share of its cost that a step must gain; with less a start has converged too.
     """
     x, first = np.array(starts, dtype=np.float64), linearise(starts)
     costs, gradients, hessians = first.costs.copy(), first.gradients.copy(), first.hessians.copy()
@@ -129,13 +127,12 @@ def minimise_all(
         trial = move(x[active], step)
         there = linearise(trial)
         better = there.costs <= costs[active]
-        still = (length < tolerance) | (better & (costs[active] - there.costs < standstill * there.costs))
         taken = active[better]
         x[taken], costs[taken] = trial[better], there.costs[better]
         gradients[taken], hessians[taken] = there.gradients[better], there.hessians[better]
         steps[taken] += 1
         damping[active] = np.where(better, damping[active] / 10, np.maximum(10 * damping[active], 1e-4))
-        converged[active] = still | (np.diagonal(hessians[active], axis1=1, axis2=2).max(axis=1) <= 0.0)
+        converged[active] = (length < tolerance) | (np.diagonal(hessians[active], axis1=1, axis2=2).max(axis=1) <= 0.0)
     return Solutions(x=x, costs=costs, hessians=hessians, steps=steps, converged=converged)
 
 

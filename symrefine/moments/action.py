@@ -14,11 +14,8 @@ import numpy as np
 
 from symrefine.geometry import Array, read_only
 from symrefine.moments.harmonics import generators, turn
-from symrefine.moments.moments import exponents, turned_values
+from symrefine.moments.moments import deviations, exponents, turned_values
 from symrefine.shape import Index
-
-# Entries of a generator below this are rounding; those that are not are 1 at least.
-NOTHING = 1e-9
 
 # Variance of a moment that no sample takes away: two files of one model differ by as much.
 FLOOR = 1e-8
@@ -121,10 +118,8 @@ def row_variance(replicates: Array, rows: Rows) -> Array:
 
     The mean over a row does not change when the object turns.
     """
-    if not len(replicates):
-        return np.zeros(replicates.shape[1])
     lengths = 2 * np.array(rows) + 1
-    sums = np.add.reduceat((len(replicates) - 1) * replicates.var(axis=0), np.cumsum(lengths) - lengths)
+    sums = np.add.reduceat((deviations(replicates) ** 2).sum(axis=0), np.cumsum(lengths) - lengths)
     return np.repeat(sums / lengths, lengths)
 
 
@@ -133,7 +128,7 @@ class _Layout:
     """Flat coefficients: |m| and l of each, where its partner -m stands, and the sign with which a turn mixes it in.
 
     `tip` [C, C] is D of the quarter turn about x, transposed, between which R_y(b) is R_z(b); `generators` [3C, C] are
-    the three of them on top of one another, of four entries a row at most.
+    the three of them on top of one another, of two entries a row at most.
     """
 
     m: Index
@@ -157,7 +152,7 @@ def _layout(rows: Rows) -> _Layout:
         partner=np.arange(len(m)) - 2 * m,
         sign=-np.sign(m).astype(np.float64),
         tip=read_only(block_diag(*(turn(l, 0, np.array(np.pi / 2)).T for l in rows))),
-        generators=csr_array(np.where(np.abs(stacked) > NOTHING, stacked, 0.0)),
+        generators=csr_array(stacked),
     )
 
 

@@ -12,19 +12,9 @@ from math import comb, factorial, sqrt
 import numpy as np
 
 from symrefine.geometry import Array
-from symrefine.moments.moments import Moments, exponents, monomials
+from symrefine.moments.moments import Moments, exponents, exponents_of, monomials, occurrences
 
 Polynomial = dict[tuple[int, int, int], float]
-X, Y, Z = ({e: 1.0} for e in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
-R_SQUARED: Polynomial = {(2, 0, 0): 1.0, (0, 2, 0): 1.0, (0, 0, 2): 1.0}
-
-
-def _add(*terms: tuple[float, Polynomial]) -> Polynomial:
-    total: dict[tuple[int, int, int], float] = defaultdict(float)
-    for factor, polynomial in terms:
-        for e, value in polynomial.items():
-            total[e] += factor * value
-    return dict(total)
 
 
 def _times(a: Polynomial, b: Polynomial) -> Polynomial:
@@ -35,31 +25,27 @@ def _times(a: Polynomial, b: Polynomial) -> Polynomial:
     return dict(total)
 
 
-def _power(a: Polynomial, n: int) -> Polynomial:
-    return _times(_power(a, n - 1), a) if n else {(0, 0, 0): 1.0}
+def _radial(power: int) -> Polynomial:
+    """(x^2 + y^2 + z^2)^power."""
+    return {(2 * i, 2 * j, 2 * k): occurrences((i, j, k)) for i, j, k in exponents_of(3, power)}
 
 
 def _azimuthal(m: int) -> Polynomial:
     """Re or Im of (x + i y)^|m|, the sine part for negative m."""
-    real: Polynomial = {(0, 0, 0): 1.0}
-    imaginary: Polynomial = {}
-    for _ in range(abs(m)):
-        real, imaginary = (
-            _add((1.0, _times(real, X)), (-1.0, _times(imaginary, Y))),
-            _add((1.0, _times(real, Y)), (1.0, _times(imaginary, X))),
-        )
-    return imaginary if m < 0 else real
+    k = abs(m)
+    return {(k - j, j, 0): (-1.0) ** (j // 2) * comb(k, j) for j in range(int(m < 0), k + 1, 2)}
 
 
 def solid_harmonic(l: int, m: int) -> Polynomial:
     """The real solid harmonic R_lm as a homogeneous polynomial of degree l."""
     k = abs(m)
-    terms = []
+    zonal: dict[tuple[int, int, int], float] = defaultdict(float)
+    scale = sqrt((2.0 if k else 1.0) * factorial(l - k) / factorial(l + k)) / 2**l
     for j in range((l - k) // 2 + 1):
         value = (-1) ** j * comb(l, j) * comb(2 * l - 2 * j, l) * factorial(l - 2 * j) / factorial(l - 2 * j - k)
-        terms.append((value / 2**l, _times(_power(R_SQUARED, j), _power(Z, l - 2 * j - k))))
-    scale = sqrt((2.0 if k else 1.0) * factorial(l - k) / factorial(l + k))
-    return _add((scale, _times(_add(*terms), _azimuthal(m))))
+        for (x, y, z), often in _radial(j).items():
+            zonal[x, y, z + l - 2 * j - k] += scale * value * often
+    return _times(zonal, _azimuthal(m))
 
 
 @lru_cache(maxsize=4)
@@ -74,7 +60,7 @@ def _projection(order: int) -> dict[int, Array]:
             for p in range(len(table)):
                 for e, value in polynomial.items():
                     table[p, m + l, position[e]] += value
-                polynomial = _times(polynomial, R_SQUARED)
+                polynomial = _times(polynomial, _radial(1))
         tables[l] = table
     return tables
 
@@ -97,26 +83,18 @@ def harmonic_moments(moments: Moments) -> dict[int, Array]:
 
 @lru_cache(maxsize=32)
 def generators(l: int) -> Array:
-    """Skew matrices J_x, J_y, J_z [3, 2l+1, 2l+1] with D_l(exp[w]_x) = exp(w.J)."""
-    position = {tuple(e): i for i, e in enumerate(exponents(3, l).tolist())}
-    harmonics = [solid_harmonic(l, m) for m in range(-l, l + 1)]
-    basis = np.zeros((2 * l + 1, len(position)))
-    for row, polynomial in enumerate(harmonics):
-        for e, value in polynomial.items():
-            basis[row, position[e]] = value
-    turned = np.zeros((3, *basis.shape))
-    for axis in range(3):
-        # d/dt f(exp(t [e_axis]) x) = (df/dx_k) x_j - (df/dx_j) x_k ... with (axis, j, k) cyclic.
-        j, k = (axis + 1) % 3, (axis + 2) % 3
-        for row, polynomial in enumerate(harmonics):
-            for e, value in polynomial.items():
-                for up, down, sign in ((j, k, 1.0), (k, j, -1.0)):
-                    if e[down]:
-                        moved = list(e)
-                        moved[down] -= 1
-                        moved[up] += 1
-                        turned[axis, row, position[tuple(moved)]] += sign * e[down] * value
-    return np.stack([np.linalg.lstsq(basis.T, t.T, rcond=None)[0].T for t in turned])
+    """Skew matrices J_x, J_y, J_z [3, 2l+1, 2l+1] with D_l(exp[w]_x) = exp(w.J).
+
+    Those of angular momentum, from the ladder |m> -> |m + 1>, between the real combinations of |m> and |-m>.
+    """
+    m, k = np.arange(-l, l + 1), np.arange(1, l + 1)
+    up: Array = np.diag(np.sqrt(l * (l + 1.0) - m[:-1] * m[1:]), -1)
+    real = np.zeros((2 * l + 1, 2 * l + 1), complex)
+    real[l, l] = 1.0
+    real[l + k, l + k], real[l + k, l - k] = (-1.0) ** k * np.sqrt(0.5), np.sqrt(0.5)
+    real[l - k, l + k], real[l - k, l - k] = -1j * (-1.0) ** k * np.sqrt(0.5), 1j * np.sqrt(0.5)
+    momentum = np.array([0.5 * (up + up.T), -0.5j * (up - up.T), np.diag(m)])
+    return np.real(-1j * real.conj() @ momentum @ real.T)
 
 
 @lru_cache(maxsize=32)

@@ -6,7 +6,8 @@ mass 1 and RMS radius 1, so every quantity made of them is dimensionless and com
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import product
+from itertools import combinations_with_replacement, product
+from math import comb, factorial, prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,33 +19,39 @@ from symrefine.shape import Shape
 
 # Points per block: the monomials of a block stay in the L2 cache (method.md, section 1: a factor of ten).
 BLOCK = 2048
-# Waves that the edges of a solid's surface are tested with, radians per diagonal, and the share of the area that may be
-# missing or turned round: what single precision leaves where triangles meet without sharing vertices.
-WAVES, WAVE_NUMBER, LOOSE = 6, 4.0, 1e-6
+# Waves, about a radian to a diagonal, that the edges of a solid's surface are tested with, and the share of the area
+# that may be missing or turned round: what single precision leaves where triangles meet without sharing vertices.
+WAVES, LOOSE = 6, 1e-6
+
+
+def exponents_of(dim: int, degree: int) -> list[tuple[int, ...]]:
+    """Exponent vectors of dim coordinates and this total degree, x_1 first: 20, 11, 02."""
+    return [tuple(map(c.count, range(dim))) for c in combinations_with_replacement(range(dim), degree)]
 
 
 @lru_cache(maxsize=64)
 def exponents(dim: int, order: int) -> NDArray[np.int64]:
     """Exponent vectors [K, dim] of total degree <= `order`, by degree, then x_1 first."""
-    rows = [e for e in product(range(order + 1), repeat=dim) if sum(e) <= order]
-    rows.sort(key=lambda e: (sum(e), [-k for k in e]))
-    array = np.array(rows, dtype=np.int64)
+    array = np.array([e for degree in range(order + 1) for e in exponents_of(dim, degree)], dtype=np.int64)
     array.flags.writeable = False
     return array
+
+
+def occurrences(exponent: tuple[int, ...]) -> int:
+    """How often an entry with these exponents stands in a symmetric tensor."""
+    return factorial(sum(exponent)) // prod(factorial(k) for k in exponent)
 
 
 @lru_cache(maxsize=64)
 def tensor_index(dim: int, degree: int, order: int) -> NDArray[np.int64]:
     """Where each entry of the symmetric tensor T_degree [dim]*degree stands among `exponents(dim, order)`."""
     position = {tuple(e): i for i, e in enumerate(exponents(dim, order).tolist())}
-    index = np.empty((dim,) * degree, dtype=np.int64)
-    for entry in product(range(dim), repeat=degree):
-        index[entry] = position[tuple(entry.count(axis) for axis in range(dim))]
-    return index
+    flat = [position[tuple(map(entry.count, range(dim)))] for entry in product(range(dim), repeat=degree)]
+    return np.array(flat).reshape((dim,) * degree)
 
 
 @lru_cache(maxsize=64)
-def _split(dim: int, order: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], int]:
+def _split(dim: int, order: int) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
     """Each exponent as a product of one monomial in the leading and one in the trailing coordinates."""
     lead = dim - dim // 2
     position_a = {tuple(e): i for i, e in enumerate(exponents(lead, order).tolist())}
@@ -52,7 +59,7 @@ def _split(dim: int, order: int) -> tuple[NDArray[np.int64], NDArray[np.int64], 
     table = exponents(dim, order)
     a = np.array([position_a[tuple(e)] for e in table[:, :lead].tolist()])
     b = np.array([position_b[tuple(e)] for e in table[:, lead:].tolist()])
-    return a, b, table, lead
+    return a, b, lead
 
 
 @lru_cache(maxsize=64)
@@ -81,7 +88,7 @@ def monomials(points: Array, order: int) -> Array:
 
 def raw_moments(points: Array, weights: Array, order: int) -> Array:
     """Raw moments [K] of points [N, n] with weights [N], in the order of `exponents(n, order)`."""
-    a, b, _, lead = _split(points.shape[1], order)
+    a, b, lead = _split(points.shape[1], order)
     total = np.zeros((a.max() + 1, b.max() + 1))
     for start in range(0, len(points), BLOCK):
         block = points[start : start + BLOCK]
@@ -157,6 +164,15 @@ def central_moments(points: Array, weights: Array, order: int, *, parts: int = 0
     )
 
 
+def deviations(replicates: Array) -> Array:
+    """Jackknife replicates [B, ...] less their mean, scaled so that their squares add up to variances.
+
+    Delete-a-group jackknife (Kott 2001) of B parts; B - 1 degrees of freedom, none of them where B = 0.
+    """
+    parts = len(replicates)
+    return np.asarray(np.sqrt((parts - 1) / parts) * (replicates - replicates.mean(axis=0))) if parts else replicates
+
+
 def shape_moments(shape: Shape, order: int, *, parts: int = 0) -> Moments:
     """Normalised central moments of a shape: exact for a mesh, with `parts` jackknife replicates for a cloud.
 
@@ -209,9 +225,7 @@ def _closed(shape: Shape) -> bool:
     areas, _ = triangle_areas_and_normals(shape.points, shape.faces)
     corners = (shape.points - shape.points[0])[shape.faces] / shape.diagonal
     edges, middles = np.roll(corners, -1, axis=1) - corners, 0.5 * (np.roll(corners, -1, axis=1) + corners)
-    waves, fields = (
-        np.random.default_rng(0).standard_normal((2, WAVES, 3)) * np.array([WAVE_NUMBER, 1.0])[:, None, None]
-    )
+    waves, fields = np.random.default_rng(0).standard_normal((2, WAVES, 3))
     along = edges @ fields.T * np.sinc(edges @ waves.T / (2.0 * np.pi))
     left = np.abs(np.einsum("fek,fek->k", along, np.exp(1j * (middles @ waves.T))))
     most = np.linalg.norm(waves, axis=1) * np.linalg.norm(fields, axis=1) * areas.sum() / shape.diagonal**2
@@ -223,35 +237,17 @@ def _jackknife(points: Array, weights: Array, order: int, parts: int) -> tuple[A
 
     Interleaving after a fixed shuffle keeps the parts alike even where the file orders its points.
     """
-    sums = _raw_moments_of_parts(points, weights, order, _deal(len(points), parts))
+    sums = np.stack([raw_moments(points[part], weights[part], order) for part in _deal(len(points), parts)])
     total = sums.sum(axis=0)
     rest = total - sums
     return total, recentred(rest / rest[:, :1], points.shape[1], order)
 
 
 @lru_cache(maxsize=2)
-def _deal(count: int, parts: int) -> NDArray[np.int64]:
-    """Indices [parts, M] of points dealt in turn after a fixed shuffle; -1 where a part has one point less."""
-    dealt = np.full(-(-count // parts) * parts, -1)
-    dealt[np.random.default_rng(0).permutation(count)] = np.arange(count)
-    dealt.flags.writeable = False
-    return dealt.reshape(-1, parts).T
-
-
-def _raw_moments_of_parts(points: Array, weights: Array, order: int, dealt: NDArray[np.int64]) -> Array:
-    """Raw moments [parts, K] of several parts of the points at once."""
-    a, b, _, lead = _split(points.shape[1], order)
-    parts, size = dealt.shape
-    total = np.zeros((parts, a.max() + 1, b.max() + 1))
-    step = max(1, BLOCK // parts)
-    for start in range(0, size, step):
-        index = dealt[:, start : start + step]
-        block = points[index.ravel()]
-        left = monomials(block[:, :lead], order).reshape(-1, *index.shape)
-        left *= np.where(index < 0, 0.0, weights[index])
-        right = monomials(block[:, lead:], order).reshape(-1, *index.shape)
-        total += left.transpose(1, 0, 2) @ right.transpose(1, 2, 0)
-    return total[:, a, b]
+def _deal(count: int, parts: int) -> list[NDArray[np.int64]]:
+    """Indices of the points of each part, dealt in turn after a fixed shuffle."""
+    turn = np.random.default_rng(0).permutation(count) % parts
+    return [np.flatnonzero(turn == part) for part in range(parts)]
 
 
 @lru_cache(maxsize=16)
@@ -259,8 +255,6 @@ def _binomials(dim: int, order: int) -> tuple[NDArray[np.int64], NDArray[np.int6
     """Terms of `prod (x_j - t_j)^p_j` for all p: where those of each p start, and for each term the row of the factor
     kept, the row of the power of t, and the signed coefficient.
     """
-    from math import comb, prod
-
     table = [tuple(e) for e in exponents(dim, order).tolist()]
     position = {e: i for i, e in enumerate(table)}
     starts: list[int] = []

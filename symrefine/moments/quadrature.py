@@ -18,6 +18,15 @@ def triangle_areas_and_normals(vertices: Array, faces: Index) -> tuple[Array, Ar
     return 0.5 * double_area, normals
 
 
+def _triangles(shape: Shape) -> tuple[Index, Array, Array]:
+    """Triangles of a mesh that has an area, with their areas and normals."""
+    assert shape.faces is not None
+    areas, normals = triangle_areas_and_normals(shape.points, shape.faces)
+    if areas.sum() <= 0:
+        raise DegenerateShapeError(f"{shape.source}: the mesh has no area; every triangle is degenerate")
+    return shape.faces, areas, normals
+
+
 @lru_cache(maxsize=16)
 def triangle_rule(degree: int) -> tuple[Array, Array]:
     """Barycentric nodes [Q, 3] and weights [Q] (sum 1) exact for polynomials of `degree` on a triangle.
@@ -47,12 +56,9 @@ def mesh_nodes(shape: Shape, degree: int) -> tuple[Array, Array]:
     Returns: nodes [F*Q, 3] relative to the first vertex and weights [F*Q].
     Raises:  DegenerateShapeError: the mesh has no area.
     """
-    assert shape.faces is not None
-    areas, normals = triangle_areas_and_normals(shape.points, shape.faces)
-    if areas.sum() <= 0:
-        raise DegenerateShapeError(f"{shape.source}: the mesh has no area; every triangle is degenerate")
+    faces, areas, normals = _triangles(shape)
     bary, weights = triangle_rule(degree)
-    corners = (shape.points - shape.points[0])[shape.faces]
+    corners = (shape.points - shape.points[0])[faces]
     nodes = np.einsum("qk,fkd->fqd", bary, corners)
     if shape.measure == "solid":
         areas = areas * np.einsum("fd,fd->f", corners[:, 0], normals)
@@ -67,14 +73,11 @@ def sample_surface(shape: Shape, count: int, rng: np.random.Generator) -> tuple[
 
     Returns: points [count, 3], unit normals [count, 3], face index [count].
     """
-    assert shape.faces is not None
-    areas, normals = triangle_areas_and_normals(shape.points, shape.faces)
-    if areas.sum() <= 0:
-        raise DegenerateShapeError(f"{shape.source}: the mesh has no area; every triangle is degenerate")
+    faces, areas, normals = _triangles(shape)
     cumulative = np.cumsum(areas) / areas.sum()
     position = (np.arange(count) + rng.random(count)) / count
     face = np.minimum(np.searchsorted(cumulative, position), len(areas) - 1)
     r1, r2 = np.sqrt(rng.random(count)), rng.random(count)
     bary = np.stack([1.0 - r1, r1 * (1.0 - r2), r1 * r2], axis=1)
-    points = np.einsum("ik,ikd->id", bary, shape.points[shape.faces[face]])
+    points = np.einsum("ik,ikd->id", bary, shape.points[faces[face]])
     return points, normals[face], face.astype(np.int64)

@@ -8,13 +8,12 @@ section 2). `derive` finds the same space exactly; the tests compare the two.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import factorial, prod
 
 import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array, read_only
-from symrefine.moments.moments import Moments, exponents
+from symrefine.moments.moments import Moments, deviations, exponents, occurrences
 from symrefine.shape import Index
 
 # The 3-D orders of the paper's experiments: 17 triplets from moments to order 5.
@@ -44,25 +43,24 @@ class NTuples:
     @property
     def noise(self) -> Array:
         """Standard deviation [T] of each tuple's components from the sampling of the points (jackknife)."""
-        return np.asarray(np.sqrt((self._deviations() ** 2).sum(axis=0).mean(axis=-1)))
+        return np.asarray(np.sqrt((deviations(self.replicates) ** 2).sum(axis=0).mean(axis=-1)))
 
     def noise_along(self, directions: Array, weights: Array) -> Array:
         """Standard deviation [K] of the weighted n-tuples, all together, along directions [K, n]; weights [T].
 
         That of the singular values where the directions are the singular ones.
         """
-        along = np.einsum("btn,kn->btk", self._deviations() * weights[:, None], directions)
+        along = np.einsum("btn,kn->btk", deviations(self.replicates) * weights[:, None], directions)
         return np.asarray(np.sqrt((along**2).sum(axis=(0, 1))))
 
     @property
     def covariance(self) -> Array:
         """Covariance [T, n, n] of each tuple's components from the sampling of the points; zero for exact moments.
 
-        Delete-a-group jackknife (Kott 2001) of B parts: `(B - 1) / B sum_b (v_b - v)(v_b - v)'`. It has B - 1 degrees
-        of freedom: entries scatter by `sqrt(2 / (B - 1))` of their size (a third for B = 16), and with B <= n it is
-        singular. It turns with the object: R C R'.
+        By the jackknife, `(B - 1) / B sum_b (v_b - v)(v_b - v)'`: entries scatter by `sqrt(2 / (B - 1))` of their size
+        (a third for B = 16), and with B <= n it is singular. It turns with the object: R C R'.
         """
-        spread = self._deviations()
+        spread = deviations(self.replicates)
         return np.asarray(np.einsum("bti,btj->tij", spread, spread))
 
     @property
@@ -71,7 +69,7 @@ class NTuples:
 
         Of rank B - 1 at most.
         """
-        flat = self._deviations().reshape(len(self.replicates), self.vectors.size)
+        flat = deviations(self.replicates).reshape(len(self.replicates), self.vectors.size)
         return flat.T @ flat
 
     def whitened(self) -> Array:
@@ -89,13 +87,6 @@ class NTuples:
         values, axes = np.linalg.eigh(self.covariance)
         root = np.sqrt(np.maximum(values, np.finfo(float).tiny))
         return np.asarray(np.einsum("tij,tj,tkj,tk->ti", axes, 1.0 / root, axes, self.vectors))
-
-    def _deviations(self) -> Array:
-        """Replicates [B, T, n] less their mean, scaled so that their squares add up to variances."""
-        parts = len(self.replicates)
-        if not parts:
-            return self.replicates
-        return np.asarray(np.sqrt((parts - 1) / parts) * (self.replicates - self.replicates.mean(axis=0)))
 
 
 def ntuples(moments: Moments, orders: Sequence[Sequence[int]] = PAPER_ORDERS) -> NTuples:
@@ -207,11 +198,6 @@ class _Entries:
         """Places and occurrences of the entries of T_degree traced to each rank."""
         every = [self(degree, rank) for rank in range(1, degree + 1, 2)]
         return tuple((np.array(list(e.values())), np.array([occurrences(k) for k in e], float)) for e in every)
-
-
-def occurrences(exponent: tuple[int, ...]) -> int:
-    """How often an entry with these exponents stands in a symmetric tensor."""
-    return factorial(sum(exponent)) // prod(factorial(k) for k in exponent)
 
 
 @lru_cache(maxsize=32)

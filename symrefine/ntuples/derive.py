@@ -31,7 +31,8 @@ from itertools import combinations_with_replacement, product
 from operator import index
 
 from symrefine.errors import InputError
-from symrefine.ntuples.notation import Component, Exponents, Kind, NTuple, NTupleBasis, shortened
+from symrefine.moments.moments import exponents_of
+from symrefine.ntuples.notation import Component, Exponents, Kind, NTuple, NTupleBasis, primitive, shortened
 from symrefine.ntuples.nullspace import Row, null_space
 
 # Listing 200,000 monomials takes a second or two; dense elimination of 2,500 unknowns some seconds and about 150 MB.
@@ -121,7 +122,7 @@ class MomentSpace:
 
     def __init__(self, dim: int, orders: tuple[int, ...]) -> None:
         self.dim, self.orders = dim, orders
-        self.moments = [e for p in sorted(set(orders)) for e in _exponents(dim, p)]
+        self.moments = [e for p in sorted(set(orders)) for e in exponents_of(dim, p)]
         self._number = {e: k for k, e in enumerate(self.moments)}
         self._moves: dict[tuple[int, int], list[tuple[int, int]]] = {}
 
@@ -160,14 +161,6 @@ class MomentSpace:
             target = [p + (k == j) - (k == i) for k, p in enumerate(e)]
             moves.append((e[i], self._number[tuple(target)] if e[i] else 0))
         return moves
-
-
-def _exponents(dim: int, order: int) -> Iterator[Exponents]:
-    if dim == 1:
-        yield (order,)
-        return
-    for first in range(order, -1, -1):
-        yield from ((first, *rest) for rest in _exponents(dim - 1, order - first))
 
 
 def _exchanged(exponents: Exponents, i: int, j: int) -> Exponents:
@@ -270,15 +263,9 @@ def _rows(orbits: list[Orbit], law: Law) -> list[Row]:
             for equation, c in law.conditions(word):
                 row = rows.setdefault(equation, {})
                 row[column] = row.get(column, 0) + sign * c
-    distinct = {_primitive(tuple(sorted((k, c) for k, c in row.items() if c))) for row in rows.values()}
+    ascending = [sorted((k, c) for k, c in row.items() if c) for row in rows.values()]
+    distinct = {tuple(zip([k for k, _ in row], primitive([c for _, c in row]), strict=True)) for row in ascending}
     return [dict(row) for row in sorted(distinct) if row]
-
-
-def _primitive(row: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
-    if not row:
-        return row
-    scale = math.gcd(*(c for _, c in row)) * (1 if row[0][1] > 0 else -1)
-    return tuple((k, c // scale) for k, c in row)
 
 
 def _expanded(vector: list[int], orbits: list[Orbit]) -> list[tuple[int, Word]]:

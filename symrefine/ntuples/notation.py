@@ -22,8 +22,8 @@ Component = tuple[tuple[int, Monomial], ...]
 NTuple = tuple[Component, ...]
 Kind = Literal["polar", "axial", "affine"]
 
-# Moments to a line: a text line stays below 120 characters, a LaTeX line within the page.
-_TEXT_WIDTH, _LATEX_WIDTH = 12, 8
+# Moments to a line: in LaTeX it stays within the page.
+_WIDTH = 8
 # Vectors up to which a basis is worth shortening for the eye (about a second).
 _READABLE = 40
 
@@ -71,15 +71,8 @@ class NTupleBasis:
         values = np.zeros((len(self.tuples), self.dim))
         for row, ntuple in enumerate(self.tuples):
             for column, component in enumerate(ntuple):
-                values[row, column] = sum(c * _product(monomial, moments) for c, monomial in component)
+                values[row, column] = sum(c * math.prod(moments[e] for e in monomial) for c, monomial in component)
         return values
-
-
-def _product(monomial: Monomial, moments: Mapping[Exponents, float]) -> float:
-    value = 1.0
-    for exponents in monomial:
-        value *= moments[exponents]
-    return value
 
 
 def law(basis: NTupleBasis, kind: Kind) -> str:
@@ -170,16 +163,22 @@ def to_text(basis: NTupleBasis) -> str:
         lines += ["", f"x_v{number} ({kind})"]
         for axis, component in enumerate(ntuple, start=1):
             head = f"  [{axis}] "
-            lines += _wrapped(_signed_terms(component, _text_monomial), head, " " * len(head), _TEXT_WIDTH // factors)
+            lines += _wrapped(_signed_terms(component, _text_monomial), head, " " * len(head), _WIDTH // factors)
     return "\n".join(lines) + "\n"
 
 
-def _text_monomial(monomial: Monomial) -> str:
-    return " ".join(_text_moment(e) + (f"^{k}" if k > 1 else "") for e, k in Counter(monomial).items())
+def _written(monomial: Monomial, moment: Callable[[Exponents], str], power: str, times: str = " ") -> str:
+    """A product of moments, repeated ones as powers."""
+    return times.join(moment(e) + (power.format(k) if k > 1 else "") for e, k in Counter(monomial).items())
 
 
 def _text_moment(exponents: Exponents) -> str:
+    # A letter of its own and the separator "_": in Python no exponents can collide with each other or with a parameter.
     return "m" + ("" if max(exponents) < 10 else "_").join(map(str, exponents))
+
+
+def _text_monomial(monomial: Monomial) -> str:
+    return _written(monomial, _text_moment, "^{}")
 
 
 def _signed_terms(component: Component, write: Callable[[Monomial], str], times: str = " ") -> list[str]:
@@ -265,11 +264,11 @@ def _latex_preamble(basis: NTupleBasis) -> str:
 def _latex_component(component: Component, number: int, axis: int) -> list[str]:
     head = f"x_{{\\mathrm{{v}}{number},{axis}}} &= "
     factors = len(component[0][1])
-    return _wrapped(_signed_terms(component, _latex_monomial), head, r"&\quad ", _LATEX_WIDTH // factors)
+    return _wrapped(_signed_terms(component, _latex_monomial), head, r"&\quad ", _WIDTH // factors)
 
 
 def _latex_monomial(monomial: Monomial) -> str:
-    return " ".join(_latex_moment(e) + (f"^{{{k}}}" if k > 1 else "") for e, k in Counter(monomial).items())
+    return _written(monomial, _latex_moment, "^{{{}}}")
 
 
 def _latex_moment(exponents: Exponents) -> str:
@@ -286,20 +285,15 @@ def to_python(basis: NTupleBasis, *, name: str = "ntuples") -> str:
     thousands of terms would exceed the depth that Python's compiler accepts.
     """
     lines, factors = [f"def {name}(m):", f'    """{title(basis)}."""'], len(basis.orders)
-    lines += [f"    {_python_moment(e)} = m[{', '.join(map(str, e))}]" for e in basis.moments]
+    lines += [f"    {_text_moment(e)} = m[{', '.join(map(str, e))}]" for e in basis.moments]
     names = [[f"x{k}_{axis}" for axis in range(1, basis.dim + 1)] for k in range(1, len(basis) + 1)]
     for ntuple, row in zip(basis.tuples, names, strict=True):
         for component, variable in zip(ntuple, row, strict=True):
             terms = _signed_terms(component, _python_monomial, times=" * ")
-            lines += _wrapped(terms, f"    {variable} = ", f"    {variable} = {variable} ", _TEXT_WIDTH // factors)
+            lines += _wrapped(terms, f"    {variable} = ", f"    {variable} = {variable} ", _WIDTH // factors)
     lines += ["    return [", *(f"        [{', '.join(row)}]," for row in names), "    ]"]
     return "\n".join(lines) + "\n"
 
 
 def _python_monomial(monomial: Monomial) -> str:
-    return " * ".join(_python_moment(e) + (f"**{k}" if k > 1 else "") for e, k in Counter(monomial).items())
-
-
-def _python_moment(exponents: Exponents) -> str:
-    # A letter of its own and the separator "_": no exponents can collide with each other or with the parameter m.
-    return "m" + ("" if max(exponents) < 10 else "_").join(map(str, exponents))
+    return _written(monomial, _text_moment, "**{}", " * ")
