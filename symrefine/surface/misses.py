@@ -54,21 +54,20 @@ NO_MISS = Deviation(mean=0.0, p95=0.0, p99=0.0, max=0.0)
 def needs(misses: Array, noise: Array) -> Array:
     """The smallest tolerances [...], fractions of the diagonal, at which misses [..., N] still count as symmetric.
 
-    What noise alone explains is taken away: from the mean in squares, as noise and miss add up; from the share of the
-    surface that misses by more than some distance, the share of noise that does, and what such shares are uncertain by.
+    What noise alone explains is taken away, with what samples leave uncertain: from the mean in squares, as noise and
+    miss add up; from the share of the surface that misses by more than some distance, the share of noise that does.
 
     Args:
         misses: distances, fractions of the diagonal.
         noise: [M] misses that noise alone shows, in ascending order; none if empty.
     """
-    farthest = -np.sort(-misses, axis=-1)
-    beyond = np.arange(1, misses.shape[-1] + 1) / misses.shape[-1]
-    mean = misses.mean(axis=-1)
+    farthest, count = -np.sort(-misses, axis=-1), misses.shape[-1]
+    mean, beyond = misses.mean(axis=-1), np.arange(1, count + 1) / count
     if noise.size:
+        sampled = SIGNIFICANT * np.sqrt(1.0 / count + 1.0 / noise.size)
         chance = 1.0 - np.searchsorted(noise, farthest, side="right") / noise.size
-        error = np.sqrt(chance * (1.0 - chance) * (1.0 / misses.shape[-1] + 1.0 / noise.size))
-        beyond = beyond - chance - SIGNIFICANT * error
-        mean = np.sqrt(np.maximum(mean**2 - noise.mean() ** 2, 0.0))
+        beyond = beyond - chance - sampled * np.sqrt(chance * (1.0 - chance))
+        mean = np.sqrt(np.maximum(mean**2 - (noise.mean() + sampled * noise.std()) ** 2, 0.0))
     found = [mean / LIMITS[0]]
     for share, limit in zip(SHARES, LIMITS[1:], strict=True):
         found.append((farthest * (beyond > share)).max(axis=-1) / limit)

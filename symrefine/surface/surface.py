@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from symrefine.surface.skin import LocalPlanes
 
 # Standard deviation over mean of the distance to the nearest of random points in a volume (Weibull, shape 3).
 NEAREST_SPREAD = 0.363
-NONE = read_only(np.empty(0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -27,7 +26,7 @@ class Surface:
 
     cloud: LocalPlanes
     diagonal: float
-    noise: Array = NONE
+    noise: Array = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "noise", read_only(np.sort(self.noise)))
@@ -81,4 +80,4 @@ class Surface:
         if not self.noise.size:
             return 0.0
         share = NEAREST_SPREAD if self.cloud.body == "volume" else 1.0
-        return share * float(needs(self.noise, NONE))
+        return share * float(needs(self.noise, np.empty(0)))
