@@ -175,7 +175,7 @@ def _join(surface: Surface, parts: list[Hypothesis], known: Iterable[Hypothesis]
     if placed is None:
         return None
     for h in (*parts, *known):
-        if _same(h.placed, placed):
+        if h.history and _same(h.placed, placed):
             return h
     return fitted(surface, placed, before=max(h.iterations for h in parts))
 

@@ -14,7 +14,7 @@ import numpy as np
 from symrefine.errors import DegenerateShapeError
 from symrefine.fit.placed import Operations, Placed, common_center, elements
 from symrefine.fit.refine import Iterate, refine
-from symrefine.geometry import Array
+from symrefine.geometry import Array, Isometry
 from symrefine.groups import PointGroup, from_elements, is_subgroup
 from symrefine.surface.misses import LIMITS, Deviation
 from symrefine.surface.surface import Surface
@@ -103,18 +103,19 @@ def fitted(surface: Surface, start: Placed, *, error: float = START_ERROR, befor
     stride = surface.stride(_moved_each(len(state.standard)))
     history = tuple(refine(surface.cloud, state, start_error_rad=error, stride=stride))
     placed = start.moved(history[-1].state)
-    parts = elements(placed.group)
-    found = tuple(_judged(surface, part, placed.center, _moved_each(len(parts))) for part in parts)
-    return Hypothesis(placed=placed, elements=found, need=max(e.need for e in found), history=history, before=before)
+    parts = [(part, part.motions(placed.center)) for part in elements(placed.group)]
+    misses = [surface.misses(motions, sources=_moved_each(len(parts))) for _, motions in parts]
+    found = tuple(_judged(surface, *p, m, placed.center) for p, m in zip(parts, misses, strict=True))
+    # A part out of place is met by all operations: together they tell it from noise where none does alone.
+    need = max(surface.needed_by_all(misses), *(e.need for e in found))
+    return Hypothesis(placed=placed, elements=found, need=need, history=history, before=before)
 
 
 def _moved_each(operations: int) -> int:
     return min(max(MOVED_EACH, MOVED // operations), MOVED // 4)
 
 
-def _judged(surface: Surface, part: Operations, center: Array, sources: int) -> Element:
-    motions = part.motions(center)
-    misses = surface.misses(motions, sources=sources)
+def _judged(surface: Surface, part: Operations, motions: Sequence[Isometry], misses: Array, center: Array) -> Element:
     worst = reduce(Deviation.at_least, map(Deviation.of, misses))
     return Element(operations=part, center=center, deviation=worst, need=float(surface.needed(misses, motions).max()))
 

@@ -63,6 +63,12 @@ class Surface:
         own = np.cov(self.cloud.points.T)
         return np.maximum(found, [spread_distance(own, m) / (self.diagonal * LIMITS[0]) for m in motions])
 
+    def needed_by_all(self, misses: Sequence[Array]) -> float:
+        """The smallest tolerance at which a surface holds that operations together miss so, each [K, N]."""
+        if self.cloud.body != "surface":
+            return 0.0
+        return float(needs(np.concatenate([m.ravel() for m in misses]), self.noise))
+
     def needs(self, motions: Sequence[Isometry], *, sources: int = 10**9, bound: float = math.inf) -> Array:
         """The smallest tolerances [K] at which each of K operations holds; arguments as of `misses`."""
         return self.needed(self.misses(motions, sources=sources, bound=bound), motions)
