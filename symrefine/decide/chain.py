@@ -64,10 +64,8 @@ class Pool:
         return [*((h.placed, h.need) for h in self.small), *self.looked]
 
     def has(self, placed: Placed, needs: float) -> bool:
-        """Whether a group is in the largest one, or is one of those fitted, and they need no more than it does."""
-        if self.largest.need <= ALIKE * needs and self.largest.holds(placed):
-            return True
-        return any(h.need <= ALIKE * needs and _same(placed, h.placed) for h in self.small)
+        """Whether a group is in one that was fitted and needs no more than it does."""
+        return any(h.need <= ALIKE * needs and h.holds(placed) for h in (self.largest, *self.small))
 
 
 def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
@@ -145,14 +143,17 @@ def _grown(surface: Surface, pool: Pool, found: Hypothesis, limit: float) -> Poo
     """The pool with what was fitted, and its largest group joined to it, if both hold together, or else the larger."""
     if pool.has(found.placed, max(found.need, _exact(surface))):
         return pool
-    pool = replace(pool, small=(*pool.small, found))
     if found.need > limit:
-        return pool
+        return replace(pool, small=(*pool.small, found))
     both = _join(surface, [pool.largest, found], pool.failed)
     if both is not None and both.need <= limit:
-        return replace(pool, largest=both)
-    failed = pool.failed if both is None else (*pool.failed, both)
-    return replace(pool, failed=failed, largest=max(pool.largest, found, key=lambda h: _size(h.placed)))
+        largest, failed = both, pool.failed
+    else:
+        largest = max(pool.largest, found, key=lambda h: _size(h.placed))
+        failed = pool.failed if both is None else (*pool.failed, both)
+    # What is replaced may hold better than what takes its place.
+    kept = [pool.largest] if largest is not pool.largest and pool.largest.elements else []
+    return replace(pool, small=(*pool.small, *kept, found), largest=largest, failed=failed)
 
 
 def _is_image(start: Placed, glance: float, pool: Pool) -> bool:

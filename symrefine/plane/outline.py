@@ -10,7 +10,7 @@ import numpy as np
 from symrefine.geometry import Array, Isometry
 from symrefine.plane.raster import Raster, between, coarser, outlines, raster_of
 from symrefine.shape import Index
-from symrefine.surface.misses import Deviation, disc_distances
+from symrefine.surface.misses import LIMITS, SHARES, Deviation, disc_distances
 from symrefine.surface.neighbourhoods import NEIGHBOURS
 from symrefine.surface.noise import ASKED, noise_distances
 from symrefine.surface.skin import FEW, LocalPlanes, isolated_points, local_planes
@@ -44,7 +44,7 @@ class Outlines:
         found = [s.misses(motions) for s in self.surfaces]
         worst = reduce(Deviation.at_least, (Deviation.of(d) for misses in found for d in misses))
         pairs = list(zip(self.surfaces, found, strict=True))
-        return worst, tuple(max(float(s.with_noise(n).needed(d, motions).max()) for s, d in pairs) for n in NOISES)
+        return worst, tuple(max(_needed(s, misses, n) for s, misses in pairs) for n in NOISES)
 
     def need(self, motions: Sequence[Isometry]) -> float:
         """The smallest tolerance, a fraction of the diagonal, at which operations hold."""
@@ -68,6 +68,22 @@ class Outlines:
     def floor(self) -> float:
         """The smallest tolerance at which noise alone would still count as symmetric."""
         return max(s.floor for s in self.surfaces)
+
+
+def _needed(surface: Surface, misses: Array, factor: float) -> float:
+    """The smallest tolerance at which operations hold that miss so [K, N], if noise were so many times as large.
+
+    Its scale is uncertain, and what pixels do is no random draw: noise and miss add up in squares, limit by limit.
+    """
+    if surface.cloud.isolated or not surface.noise.size:
+        return float(surface.needed(misses, []).max())
+    beyond = np.square(_limited(misses)) - np.square(factor * _limited(surface.noise))
+    return float((np.sqrt(np.maximum(beyond, 0.0)) / LIMITS).max())
+
+
+def _limited(misses: Array) -> Array:
+    """What has limits of misses [..., N]: the mean, and what a share of the outline misses by at least, [..., 5]."""
+    return np.stack([misses.mean(axis=-1), *np.quantile(misses, 1.0 - np.array(SHARES), axis=-1)], axis=-1)
 
 
 def make_outlines(
@@ -98,12 +114,16 @@ def _of_raster(raster: Raster, pixels: int, rng: np.random.Generator) -> Outline
 
 
 def _seen(line: Array, aside: Array, diagonal: float, least: float, rng: np.random.Generator) -> Surface:
-    """The outline [M, 2] of a picture; its noise is how far off pixels half a step aside would have put it."""
+    """The outline [M, 2] of a picture; its noise is how far off pixels half a step aside would have put it.
+
+    Of the share of the outline that counts first, corners, at least by `least`.
+    """
     cloud = local_planes(line, ASKED, rng)
-    if not _tells(aside):
-        return Surface(cloud=cloud, diagonal=diagonal, noise=np.array([least]))
-    across = disc_distances(cloud, local_planes(aside, ASKED, rng).points)
-    return Surface(cloud=cloud, diagonal=diagonal, noise=np.maximum(across / diagonal, least))
+    across = disc_distances(cloud, local_planes(aside, ASKED, rng).points) if _tells(aside) else np.zeros(len(line))
+    noise = np.sort(across / diagonal)
+    corners = noise[int((1.0 - SHARES[0] - SHARES[-1]) * len(noise)) :]
+    np.maximum(corners, least, out=corners)
+    return Surface(cloud=cloud, diagonal=diagonal, noise=noise)
 
 
 def _telling(raster: Raster) -> Array:

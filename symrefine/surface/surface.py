@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -30,10 +30,6 @@ class Surface:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "noise", read_only(np.sort(self.noise)))
-
-    def with_noise(self, factor: float) -> "Surface":
-        """The same surface, if noise were so many times as large."""
-        return replace(self, noise=factor * self.noise)
 
     def stride(self, sources: int) -> int:
         """Stride that leaves about `sources` local planes."""
