@@ -10,7 +10,7 @@ from symrefine.clock import Clock
 from symrefine.decide.alternatives import BEYOND, NEAR, Alternative, alternatives
 from symrefine.decide.posterior import PICTURE, Decision, Link, decide
 from symrefine.errors import InputError
-from symrefine.geometry import Array, Plane, check_tolerance, read_only
+from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance
 from symrefine.groups import PointGroup2D
 from symrefine.moments.moments import Moments, shape_moments
 from symrefine.ntuples.contract import NTuples
@@ -57,7 +57,7 @@ class PlanarNearMiss:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PlanarDetection:
+class PlanarDetection(ReadOnly):
     """Everything `detect_planar` found, in the frame and units of the input.
 
     Attributes:
@@ -92,9 +92,6 @@ class PlanarDetection:
     diagonal: float
     undetermined: str
     timings: dict[str, float] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "center", read_only(self.center))
 
 
 def detect_planar(

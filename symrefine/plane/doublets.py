@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from symrefine.geometry import Array, read_only
+from symrefine.geometry import Array, ReadOnly
 from symrefine.moments.moments import Moments
 from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import FLOOR, fixed_subspace
@@ -19,7 +19,7 @@ _KINDS: tuple[DoubletKind, ...] = ("centre", "line", "none")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class VectorDoublets:
+class VectorDoublets(ReadOnly):
     """The doublets of one vector of moments.
 
     Attributes:
@@ -34,10 +34,6 @@ class VectorDoublets:
     singular_values: Array
     vanish: bool
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "doublets", read_only(self.doublets))
-        object.__setattr__(self, "singular_values", read_only(self.singular_values))
-
     @property
     def ratio(self) -> float:
         """Larger over smaller singular value: the larger, the closer the doublets are to a line; inf on a line."""
@@ -47,7 +43,7 @@ class VectorDoublets:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class DoubletClass:
+class DoubletClass(ReadOnly):
     """What all doublets together say.
 
     Attributes:
@@ -64,10 +60,6 @@ class DoubletClass:
     significance: Array
     angle_rad: float
     vectors: tuple[VectorDoublets, ...]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "singular_values", read_only(self.singular_values))
-        object.__setattr__(self, "significance", read_only(self.significance))
 
 
 def planar_doublets(moments: Moments) -> NTuples:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.geometry import Array, read_only
+from symrefine.geometry import Array, ReadOnly
 from symrefine.shape import Index
 from symrefine.surface.noise import ASKED
 
@@ -17,17 +17,13 @@ _OFF = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Raster:
+class Raster(ReadOnly):
     """Weights [H, W] on a square grid; the cell (row, column) is centred at `origin + column * step + row * turned`,
     where `turned` is `step` turned by +90 degrees."""
 
     values: Array
     origin: Array
     step: Array
-
-    def __post_init__(self) -> None:
-        for name in ("values", "origin", "step"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def pitch(self) -> float:

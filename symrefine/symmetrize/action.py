@@ -1,5 +1,6 @@
 """How a finite group permutes points: counterparts that agree with one another, so that orbits close exactly."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,10 +27,12 @@ class Action:
 
     def mean(self, points: Array, operations: Array) -> Array:
         """Means [N, 3] over the group of g^-1 (counterpart of g p)."""
-        total = np.zeros_like(points)
-        for g, image in zip(operations, self.images, strict=True):
-            total += points[image] @ g
-        return total / len(operations)
+        return mean_back((points[image] for image in self.images), operations)
+
+
+def mean_back(counterparts: Iterable[Array], operations: Array) -> Array:
+    """Means [N, 3] over the group of g^-1 c, the counterparts c [N, 3] given for one operation after the other."""
+    return np.asarray(sum(c @ g for g, c in zip(operations, counterparts, strict=True)) / len(operations))
 
 
 def act(points: Array, operations: Array, labels: Index | None, reach: float) -> Action:
