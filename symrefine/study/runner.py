@@ -9,7 +9,7 @@ from typing import Any
 
 from symrefine.errors import InputError
 from symrefine.files import replacing
-from symrefine.study.claims import Verdict, check_claims, claims_table, judge, verdict_rows
+from symrefine.study.claims import Verdict, claims_table, judge, verdict_rows
 from symrefine.study.document import Node
 from symrefine.study.experiment import Row
 from symrefine.study.figures import check_figures, draw
@@ -60,12 +60,9 @@ def run_study(
     """Run what is not done yet and write what the config asks for.
 
     Args:
-        plan: from `make_plan`.
         folder: to write to; made if it is not there.
-        workers: processes.
         limit: the first so many runs of the sweep only.
         replace: whether rows of another config or code version in the folder are dropped instead of refused.
-        progress: a sign of life.
 
     Raises:
         InputError: something in the config does not fit, or the folder holds other rows.
@@ -90,7 +87,7 @@ def run_study(
 def _check(plan: Plan) -> list[Measure]:
     """The measures of everything that is made of the rows, after a look at the names in the config."""
     study, experiment = plan.study, plan.experiment
-    measures = [*check_tables(study, experiment), *check_figures(study, experiment), *check_claims(study)]
+    measures = [*check_tables(study, experiment), *check_figures(study, experiment), *(c.value for c in study.claims)]
     if study.record and experiment.record is None:
         raise study.record[0].error(f"{experiment.name} has no `record`")
     selections = [*study.record, *(table.where for table in study.tables), *(figure.where for figure in study.figures)]
@@ -170,8 +167,9 @@ def _figures(
         path = folder / f"{_slug(figure.title)}.png"
         source = iterations if figure.kind == "convergence" else rows
         known = {name: None for row in source for name in row}
-        for key in ("x", "y") if figure.kind == "convergence" and source else ():
-            if (name := getattr(figure, key)) not in known:
+        needed = {"x": figure.x, "y": figure.y.node.value} if figure.kind == "convergence" and source else {}
+        for key, name in needed.items():
+            if name not in known:
                 raise figure.node.at(key).error(f"no iteration has {name!r}; there are {' '.join(known)}")
         with replacing(path) as draft:
             draw(figure, source, plan.experiment, draft)

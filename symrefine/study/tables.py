@@ -8,7 +8,7 @@ from itertools import groupby
 from symrefine.study.experiment import Experiment, Row
 from symrefine.study.plan import chosen
 from symrefine.study.schema import Study, Table
-from symrefine.study.summary import Measure, read_measure, short, summarise
+from symrefine.study.summary import Measure, short, summarise
 from symrefine.study.typed import Scalar
 
 
@@ -33,32 +33,29 @@ def check_tables(study: Study, experiment: Experiment) -> list[Measure]:
     """The measures of all tables.
 
     Raises:
-        InputError: fields or aggregates that do not exist.
+        InputError: fields that do not exist.
     """
     for table in study.tables:
         for i, name in enumerate(table.groups):
             experiment.field(name, table.node.at("groups", i))
-    return [measure for table in study.tables for measure in _measures(table).values()]
-
-
-def _measures(table: Table) -> dict[str, Measure]:
-    return {head: read_measure(table.node.at("values", head), text) for head, text in table.values.items()}
+    return [measure for table in study.tables for measure in table.values.values()]
 
 
 def markdown(table: Table, rows: Sequence[Row], experiment: Experiment) -> str:
     """A table under its title, with the number of runs that failed."""
     picked = chosen(rows, table.where, experiment)
-    measures = _measures(table)
     lines = []
     # Groups in the order in which the sweep came upon them.
     order = {key: i for i, key in enumerate(dict.fromkeys(_key(row, table.groups) for row in picked))}
     picked = sorted(picked, key=lambda row: order[_key(row, table.groups)])
     for key, group in groupby(picked, key=lambda row: _key(row, table.groups)):
         members = list(group)
-        lines.append([*map(short, key), *(summarise(members, m).text for m in measures.values()), str(len(members))])
+        lines.append(
+            [*map(short, key), *(summarise(members, m).text for m in table.values.values()), str(len(members))]
+        )
     failed = sum(row["error"] is not None for row in picked)
     note = f"\n{failed} of {len(picked)} runs failed and are left out of the figures.\n" if failed else ""
-    return f"## {table.title}\n\n{grid([*table.groups, *measures, 'runs'], lines)}{note}"
+    return f"## {table.title}\n\n{grid([*table.groups, *table.values, 'runs'], lines)}{note}"
 
 
 def _key(row: Row, groups: Sequence[str]) -> tuple[Scalar | None, ...]:
