@@ -1,15 +1,14 @@
 """Fields of a file to classes that a symmetry must keep, and to weights."""
 
+from typing import Literal
+
 import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.colours import colour_classes
-from symrefine.load.content import Content, Values
+from symrefine.load.content import Content, Values, are_whole
 from symrefine.shape import Index
-
-# Whole numbers up to here are exact as float64.
-_LARGEST = 2.0**53
 
 
 def point_classes(content: Content, name: str) -> Index:
@@ -20,7 +19,7 @@ def point_classes(content: Content, name: str) -> Index:
     """
     key = _key(content, name, "labels")
     weights = np.ones(len(content.points)) if content.weights is None else content.weights
-    return _classes(content, key, False, weights)
+    return _classes(content, key, "point", weights)
 
 
 def triangle_classes(content: Content, name: str, owner: Index, corners: Index) -> Index:
@@ -40,9 +39,9 @@ def triangle_classes(content: Content, name: str, owner: Index, corners: Index) 
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     if key in content.face_fields:
         covered = _sums(owner, areas, len(content.face_fields[key]))
-        return _classes(content, key, True, covered)[owner]
+        return _classes(content, key, "face", covered)[owner]
     covered = _sums(corners.ravel(), np.repeat(areas, 3), len(content.points))
-    first, second, third = _classes(content, key, False, covered)[corners].T
+    first, second, third = _classes(content, key, "point", covered)[corners].T
     chosen: Index = np.where(second == third, second, first)
     return chosen
 
@@ -72,12 +71,11 @@ def _key(content: Content, name: str, what: str) -> str:
     raise InputError(f"no {what} {name!r}; {told}")
 
 
-def _classes(content: Content, key: str, of_faces: bool, weights: Array) -> Index:
-    values = (content.face_fields if of_faces else content.point_fields)[key]
+def _classes(content: Content, key: str, kind: Literal["point", "face"], weights: Array) -> Index:
+    values = (content.face_fields if kind == "face" else content.point_fields)[key]
     if values.dtype.kind not in "US" and (row := _unfit(values)) is not None:
-        where = content.face_name(row) if of_faces else content.point_name(row)
         right = "whole numbers" if values.ndim == 1 else "finite colours from 0 on"
-        raise InputError(f"{key} of {where} is {values[row].tolist()}; labels are {right}")
+        raise InputError(f"{key} of {content.name(kind, row)} is {values[row].tolist()}; labels are {right}")
     if values.ndim == 2:
         return colour_classes(values, weights)
     if values.dtype.kind in "US":
@@ -95,7 +93,7 @@ def _unfit(values: Values) -> int | None:
         if values.ndim == 2:
             fit = (np.isfinite(values) & (values >= 0) & (values <= 65535)).all(axis=1)
         elif values.dtype.kind == "f":
-            fit = (values == np.rint(values)) & (np.abs(values) <= _LARGEST)
+            fit = are_whole(values)
         else:
             fit = np.ones(len(values), dtype=bool)
     bad = np.flatnonzero(~fit)

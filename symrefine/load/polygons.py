@@ -26,7 +26,7 @@ def triangulate(content: Content, faces: Polygons) -> tuple[Index, Index]:
     few = np.flatnonzero(faces.counts < 3)
     if few.size:
         row = int(few[0])
-        raise InputError(f"{content.face_name(row)} has {faces.counts[row]} corners; expected at least 3")
+        raise InputError(f"{content.name('face', row)} has {faces.counts[row]} corners; expected at least 3")
     triples = np.flatnonzero(faces.counts == 3)
     quads = np.flatnonzero(faces.counts == 4)
     pieces = [_gather(faces, triples, 3), _quads(content, faces, quads)]
@@ -149,4 +149,6 @@ def _cross(u: Array, v: Array) -> Array:
 
 
 def _crossing(content: Content, row: int) -> InputError:
-    return InputError(f"the outline of {content.face_name(row)} crosses or folds over itself; split it into triangles")
+    return InputError(
+        f"the outline of {content.name('face', row)} crosses or folds over itself; split it into triangles"
+    )
