@@ -72,9 +72,7 @@ def detection_record(
                 "kind": m.kind,
                 "direction": _direction(m.direction),
                 "point": numbers(m.point, scale),
-                "order": _order(m.order),
-                "residual": _residual(m.residual),
-                "excess": number(m.excess),
+                **_turned_down(m),
             }
             for m in d.near_misses
         ],
@@ -106,9 +104,7 @@ def planar_record(
                 "kind": "rotation" if m.line is None else "line",
                 **(nowhere if m.line is None else _placed(m.line, scale)),
                 "center": numbers(m.center, scale),
-                "order": _order(m.order),
-                "residual": _residual(m.residual),
-                "excess": number(m.excess),
+                **_turned_down(m),
             }
             for m in d.near_misses
         ],
@@ -273,6 +269,11 @@ def _direction(direction: Array) -> list[float | str | None]:
 def _held(found: Any) -> Record:
     """How well what was found holds."""
     return {"residual": _residual(found.residual), "confidence": number(found.confidence)}
+
+
+def _turned_down(miss: Any) -> Record:
+    """What a near miss would be, and by how much it is none."""
+    return {"order": _order(miss.order), "residual": _residual(miss.residual), "excess": number(miss.excess)}
 
 
 def _sigma(direction_rad: float, place: str, length: float) -> Record:

@@ -4,7 +4,6 @@ import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
-from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -97,13 +96,8 @@ def _end_with(parent: "BaseProcess") -> None:
 
 def _unpack(parcel: _Parcel) -> Entry:
     name, root, index, fields = parcel
-    experiment = _loaded(name, root)
+    experiment = load_experiment(name, Path(root))
     return attempt(experiment, index, experiment.case(**fields))
-
-
-@lru_cache(maxsize=1)
-def _loaded(name: str, root: str) -> Experiment:
-    return load_experiment(name, Path(root))
 
 
 def attempt(experiment: Experiment, index: int, case: Any) -> Entry:
