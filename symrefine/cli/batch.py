@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from symrefine import journal
 from symrefine.cli.outputs import check_beside, check_outputs, console, note, progress, text_writer, write_all
-from symrefine.cli.values import add_class_options, add_detection_options, count, positive
+from symrefine.cli.values import add_class_options, add_detection_options, count, detection_options, positive
 from symrefine.errors import InputError, SymrefineError
 from symrefine.files import naming
 
@@ -57,8 +57,7 @@ def run(args: argparse.Namespace) -> int:
     check_outputs({"--out": args.out, "--bop": args.bop}, [Path(args.dir, name) for name in files])
     check_beside("--bop", args.bop, {"--bop-scale": args.bop_scale})
     scale = _check_bop(args, files)
-    options = {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed}
-    options |= {name: given for name in ("labels", "weights") if (given := getattr(args, name)) is not None}
+    options = detection_options(args)
     from symrefine.study.work import in_processes
 
     with opened(Path(args.out)) if args.out else nullcontext() as out:
@@ -182,7 +181,7 @@ def examine_file(job: Job) -> Row:
     if row["error"] is not None:
         return row
     try:
-        shape, detection, record = examine(str(path), **options)
+        shape, detection, record = examine(str(path), options)
         return row | record | ({} if scale is None else {"bop": _bop(detection, shape, scale)})
     except (SymrefineError, OSError) as error:
         return row | {"error": " ".join(str(error).split())}

@@ -18,7 +18,7 @@ from symrefine.cli.outputs import (
     waiting,
     write_all,
 )
-from symrefine.cli.values import add_class_options, add_detection_options, grey, natural, positive
+from symrefine.cli.values import add_class_options, add_detection_options, detection_options, grey, natural, positive
 from symrefine.errors import InputError
 
 if TYPE_CHECKING:
@@ -76,10 +76,8 @@ def run(args: argparse.Namespace) -> int:
 
         read_models_info(Path(args.bop))
     with waiting("detecting"):
-        shape, detection, record = examine(
-            args.path, args.measure, args.tolerance, args.seed, labels=args.labels, weights=args.weights,
-            threshold=args.threshold, invert=args.invert,
-        )  # fmt: skip
+        options = detection_options(args)
+        shape, detection, record = examine(args.path, options, threshold=args.threshold, invert=args.invert)
         writers = json_writer(args.json, record) | _writers(args, shape, detection)
         write_all(writers)
     if args.bop is not None:
@@ -99,17 +97,9 @@ def _lines(record: dict[str, Any]) -> Iterable[Any]:
 
 
 def examine(
-    path: str,
-    measure: Literal["surface", "solid"] | None,
-    tolerance: float,
-    seed: int,
-    *,
-    labels: str | None = None,
-    weights: str | None = None,
-    threshold: float | Literal["otsu"] | None = None,
-    invert: bool = False,
+    path: str, options: dict[str, Any], *, threshold: float | Literal["otsu"] | None = None, invert: bool = False
 ) -> tuple["Shape", Any, dict[str, Any]]:
-    """Shape, detection and JSON record of a file.
+    """Shape, detection and JSON record of a file, with `detection_options`, and those of a picture.
 
     The detection is a `PlanarDetection`, a `Detection` or a `SubspaceDetection`, as the points have two, three or more
     coordinates.
@@ -117,10 +107,10 @@ def examine(
     from symrefine.load import IMAGES, load
 
     start = time.perf_counter()
-    shape = load(path, measure=measure, labels=labels, weights=weights, threshold=threshold, invert=invert)
+    how = {name: chosen for name, chosen in options.items() if name in ("measure", "labels", "weights")}
+    shape = load(path, **how, threshold=threshold, invert=invert)
     load_s = time.perf_counter() - start
-    options: dict[str, Any] = {"tolerance": tolerance, "measure": measure, "seed": seed}
-    options |= {name: given for name, given in (("labels", labels), ("weights", weights)) if given is not None}
+    tolerance, seed = options["tolerance"], options["seed"]
     if shape.labels is not None and shape.dim != 3:
         raise InputError(
             f"{path}: points have {shape.dim} coordinates; labels are for objects in space, leave them out"
@@ -131,7 +121,7 @@ def examine(
 
         flat = detect_planar(shape, tolerance=tolerance, seed=seed)
         if Path(path).suffix.lower() in IMAGES:
-            options |= {"threshold": threshold, "invert": invert}
+            options = options | {"threshold": threshold, "invert": invert}
         return shape, flat, planar_record(flat, shape, options=options, load_s=load_s)
     if shape.dim > 3:
         from symrefine.export.records import subspace_record

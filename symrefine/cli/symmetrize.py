@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from symrefine.cli.export import detected
 from symrefine.cli.outputs import bytes_writer, check_outputs, json_writer, note, tell, waiting, write_all
-from symrefine.cli.values import add_detection_options
+from symrefine.cli.values import add_detection_options, detection_options
 from symrefine.errors import InputError
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def _record(args: argparse.Namespace, shape: "Shape", detection: "Detection", ma
     return {
         "schema": "symrefine.symmetrized/1",
         "source": shape.source,
-        "options": {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed, "group": args.group},
+        "options": detection_options(args) | {"group": args.group},
         "found": detection.point_group,
         "point_group": made.group.name,
         "center": numbers(made.center, made.diagonal),

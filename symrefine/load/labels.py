@@ -38,9 +38,9 @@ def triangle_classes(content: Content, name: str, owner: Index, corners: Index) 
     a, b, c = (content.points[corners[:, k]] for k in range(3))
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     if key in content.face_fields:
-        covered = _sums(owner, areas, len(content.face_fields[key]))
+        covered = np.bincount(owner, areas, minlength=len(content.face_fields[key])).astype(np.float64)
         return _classes(content, key, "face", covered)[owner]
-    covered = _sums(corners.ravel(), np.repeat(areas, 3), len(content.points))
+    covered = np.bincount(corners.ravel(), np.repeat(areas, 3), minlength=len(content.points)).astype(np.float64)
     first, second, third = _classes(content, key, "point", covered)[corners].T
     chosen: Index = np.where(second == third, second, first)
     return chosen
@@ -81,10 +81,6 @@ def _classes(content: Content, key: str, kind: Literal["point", "face"], weights
     if values.dtype.kind in "US":
         return np.unique(values, return_inverse=True)[1].reshape(-1).astype(np.int64)
     return values.astype(np.int64)
-
-
-def _sums(places: Index, amounts: Array, count: int) -> Array:
-    return np.bincount(places, amounts, minlength=count).astype(np.float64)
 
 
 def _unfit(values: Values) -> int | None:

@@ -13,9 +13,9 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance
 from symrefine.groups import PointGroup2D
 from symrefine.moments.moments import Moments, shape_moments
-from symrefine.ntuples.contract import NTuples
+from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.plane.chain import Hypothesis, chain, explore
-from symrefine.plane.doublets import ORDER, DoubletClass, classify_doublets, planar_doublets
+from symrefine.plane.doublets import ORDER, PLANAR_ORDERS, DoubletClass, classify_doublets
 from symrefine.plane.outline import NOISES, Outlines, make_outlines
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE, Deviation
@@ -209,7 +209,7 @@ def _report(
             for e in _turned_down(pool, chosen)
         ),
         doublets=doublets,
-        vectors=planar_doublets(moments),
+        vectors=ntuples(moments, PLANAR_ORDERS),
         tolerance=tolerance,
         diagonal=outlines.diagonal * scale,
         undetermined=reason,

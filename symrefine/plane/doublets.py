@@ -7,7 +7,7 @@ import numpy as np
 
 from symrefine.geometry import Array, ReadOnly
 from symrefine.moments.moments import Moments
-from symrefine.ntuples.contract import NTuples, ntuples
+from symrefine.ntuples.contract import ntuples
 from symrefine.ntuples.rank import FLOOR, fixed_subspace
 from symrefine.surface.misses import TOLERANCE
 
@@ -62,11 +62,6 @@ class DoubletClass(ReadOnly):
     vectors: tuple[VectorDoublets, ...]
 
 
-def planar_doublets(moments: Moments) -> NTuples:
-    """All doublets of the paper's ten vectors."""
-    return ntuples(moments, PLANAR_ORDERS)
-
-
 def classify_doublets(moments: Moments, tolerance: float, pixel_noise: float) -> DoubletClass:
     """Rank of the doublets against sampling noise (jackknife), or against tolerance and pixels where they are exact.
 
@@ -76,7 +71,7 @@ def classify_doublets(moments: Moments, tolerance: float, pixel_noise: float) ->
         pixel_noise: what pixels add to a moment, as a fraction of its bound; 0 for other points.
     """
     floor = float(np.hypot(FLOOR * tolerance / TOLERANCE, pixel_noise))
-    fixed = fixed_subspace(planar_doublets(moments), floor=floor)
+    fixed = fixed_subspace(ntuples(moments, PLANAR_ORDERS), floor=floor)
     along = fixed.directions[0]
     each = [(orders, ntuples(moments, [orders])) for orders in PLANAR_ORDERS]
     owns = [fixed_subspace(tuples, floor=floor) for _, tuples in each]

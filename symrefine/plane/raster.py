@@ -40,11 +40,8 @@ def raster_of(points: Array, weights: Array | None) -> Raster | None:
     """The grid that points [N, 2] stand on, upright or turned, or None: they are samples or stand for themselves."""
     if len(points) < FEWEST:
         return None
-    step = _upright_step(points)
-    found = None if step is None else _on_grid(points, step)
-    if found is None:
-        step = _turned_step(points)
-        found = None if step is None else _on_grid(points, step)
+    steps = (step for find in (_upright_step, _turned_step) if (step := find(points)) is not None)
+    found = next((grid for step in steps if (grid := _on_grid(points, step)) is not None), None)
     if found is None:
         return None
     row, column, origin, step = found

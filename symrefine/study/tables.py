@@ -18,15 +18,9 @@ def csv_text(rows: Sequence[Row]) -> str:
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows([_field(row.get(name)) for name in columns] for row in rows)
+    values = [[row.get(name) for name in columns] for row in rows]
+    writer.writerows([str(v).lower() if isinstance(v, bool) else v for v in row] for row in values)
     return stream.getvalue()
-
-
-def _field(value: object) -> str:
-    """Text that reads back as the same value."""
-    if value is None:
-        return ""
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def check_tables(study: Study, experiment: Experiment) -> list[Measure]:
