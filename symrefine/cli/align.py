@@ -9,7 +9,6 @@ from typing import Any
 from symrefine.cli.outputs import check_outputs, json_writer, tell, waiting, write_all
 from symrefine.cli.values import add_detection_options
 
-NAME = "align"
 HELP = "find the map that takes one object onto another, reflections included"
 DESCRIPTION = (
     "Find the orthogonal matrix M and the translation t that take the mesh or cloud A onto B, b = M a + t, without "

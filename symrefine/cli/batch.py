@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from symrefine.plane import PlanarDetection
     from symrefine.shape import Shape
 
-NAME = "batch"
 HELP = "detect the symmetries of every file in a directory"
 DESCRIPTION = (
     "Detect the symmetries of every mesh and cloud in DIR and print a line for each. With --out, also append a JSON "

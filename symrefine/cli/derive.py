@@ -10,7 +10,6 @@ from symrefine.errors import InputError
 if TYPE_CHECKING:
     from symrefine.ntuples.notation import NTupleBasis
 
-NAME = "derive"
 HELP = "derive n-tuples of moments exactly, in any dimension"
 DESCRIPTION = (
     "Derive all vectors made of moments that turn with the object (n-tuples: doublets in 2-D, triplets in 3-D), as "

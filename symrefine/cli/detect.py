@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from symrefine.detection.result import Detection
     from symrefine.shape import Shape
 
-NAME = "detect"
 # Exit status of `--strict` where nothing is decided.
 UNDETERMINED = 3
 HELP = "find the planes, axes and point group of a mesh, cloud or picture"

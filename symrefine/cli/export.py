@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from symrefine.export.packages import Package
     from symrefine.shape import Shape
 
-NAME = "export"
 HELP = "write the symmetries as BOP, FoundationPose, MegaPose, DOPE or Isaac read them, or a canonical model"
 DESCRIPTION = (
     "Find the symmetries of the mesh or cloud in PATH and write them for another program. bop: an entry in "

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from symrefine.shape import Shape
     from symrefine.symmetrize import Symmetrized
 
-NAME = "symmetrize"
 HELP = "write the nearest exactly symmetric mesh or cloud"
 DESCRIPTION = (
     "Find the symmetry of the mesh or cloud in PATH and write the nearest shape that has it exactly: points that "

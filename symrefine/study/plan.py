@@ -42,7 +42,6 @@ def make_plan(path: Path, settings: Sequence[str] = (), *, quick: bool = False) 
     """Read a config, put in its quick version and what the command line sets, and list the cases.
 
     Args:
-        path: of the YAML file.
         settings: `KEY.KEY=VALUE`, applied after the quick version.
         quick: whether the config's `quick` section is applied.
 
