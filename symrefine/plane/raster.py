@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from symrefine.geometry import Array, ReadOnly
 from symrefine.shape import Index
@@ -58,8 +59,6 @@ def _upright_step(points: Array) -> Array | None:
 
 def _turned_step(points: Array) -> Array | None:
     """The step whose direction and length the nearest neighbours agree on."""
-    from scipy.spatial import cKDTree
-
     some = points[:: max(1, len(points) // ASKED)]
     distance, near = cKDTree(points).query(some, k=2)
     pitch = float(np.median(distance[:, 1]))

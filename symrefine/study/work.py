@@ -6,15 +6,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from symrefine.errors import SymrefineError
 from symrefine.study.experiment import Experiment, load_experiment
 from symrefine.study.journal import Entry
 from symrefine.study.versions import LIBRARIES
-
-if TYPE_CHECKING:
-    from multiprocessing.process import BaseProcess
 
 P = TypeVar("P")
 R = TypeVar("R")
@@ -85,13 +82,14 @@ def _start_worker() -> None:
     warnings.simplefilter("ignore")
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     parent = parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    if parent is None:
+        return
 
+    def end_with_parent() -> None:
+        parent.join()
+        os._exit(1)
 
-def _end_with(parent: "BaseProcess") -> None:
-    parent.join()
-    os._exit(1)
+    threading.Thread(target=end_with_parent, daemon=True).start()
 
 
 def _unpack(parcel: _Parcel) -> Entry:

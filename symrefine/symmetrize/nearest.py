@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from symrefine.errors import DegenerateShapeError, InputError
+from symrefine.fit.placed import Placed
 from symrefine.geometry import Array, ReadOnly, orthogonal_factor, tight_diagonal, unit
 from symrefine.groups import PointGroup
 from symrefine.shape import Index, Shape
@@ -138,20 +139,13 @@ def _corresponds(points: Array, action: Action, few: bool) -> bool:
     return bool(np.sqrt(np.mean(action.miss**2)) <= SPACED * spacing and action.miss.max() <= WORST * spacing)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Place:
-    """Where the group stands: operations x -> center + g (x - center)."""
-
-    group: PointGroup
-    center: Array
-
-    def towards(self, points: Array, wanted: Array) -> tuple["_Place", float]:
-        """The place to which the best rigid motion from `points` to `wanted` [N, 3] belongs, and how far it turns."""
-        a, b = points.mean(axis=0), wanted.mean(axis=0)
-        turn = orthogonal_factor((wanted - b).T @ (points - a), proper=True)
-        center = a + turn.T @ (self.center - b)
-        step = float(np.abs(turn - np.eye(3)).max() + np.abs(center - self.center).max())
-        return _Place(group=PointGroup(name=self.group.name, frame=self.group.frame @ turn), center=center), step
+def _towards(place: Placed, points: Array, wanted: Array) -> tuple[Placed, float]:
+    """The place to which the best rigid motion from `points` to `wanted` [N, 3] belongs, and how far it turns."""
+    a, b = points.mean(axis=0), wanted.mean(axis=0)
+    turn = orthogonal_factor((wanted - b).T @ (points - a), proper=True)
+    center = a + turn.T @ (place.center - b)
+    step = float(np.abs(turn - np.eye(3)).max() + np.abs(center - place.center).max())
+    return Placed(group=PointGroup(name=place.group.name, frame=place.group.frame @ turn), center=center), step
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -168,7 +162,7 @@ class _Work:
     rows: Index
     back: Index
     labels: Index | None
-    place: _Place
+    place: Placed
     rng: np.random.Generator
 
     def by_vertices(self, action: Action) -> Symmetrized:
@@ -176,7 +170,7 @@ class _Work:
         place = self.place
         for _ in range(ROUNDS):
             wanted = self._means(action, place)
-            nearer, step = place.towards(self.points, wanted)
+            nearer, step = _towards(place, self.points, wanted)
             if step < _STILL:
                 break
             place = nearer
@@ -222,7 +216,7 @@ class _Work:
         return self._made(made, place, "surface", wanted, paired=share, residual=residual)
 
     def _made(
-        self, shape: Shape, place: _Place, method: Method, wanted: Array, *, paired: float, residual: float
+        self, shape: Shape, place: Placed, method: Method, wanted: Array, *, paired: float, residual: float
     ) -> Symmetrized:
         """The result in the units of the input; `wanted` [M, 3] is where the distinct points belong."""
         moved = np.linalg.norm(wanted - self.points, axis=1)
@@ -238,15 +232,15 @@ class _Work:
             diagonal=self.diagonal,
         )
 
-    def _means(self, action: Action, place: _Place) -> Array:
+    def _means(self, action: Action, place: Placed) -> Array:
         return place.center + action.mean(self.points - place.center, place.group.operations())
 
-    def _fitted(self, closest: Closest) -> _Place:
+    def _fitted(self, closest: Closest) -> Placed:
         """The group's place, fitted to where some of the points belong."""
         place = self.place
         some = self.points[:: max(1, len(self.points) // FITTED)]
         for _ in range(4):
-            place, _ = place.towards(some, _on_symmetric_surface(some, place, closest))
+            place, _ = _towards(place, some, _on_symmetric_surface(some, place, closest))
         return place
 
     def _even_weights(self, action: Action) -> Array | None:
@@ -257,7 +251,7 @@ class _Work:
         even = np.mean([mass[image] for image in action.images], axis=0)
         return np.asarray((even / np.bincount(self.back))[self.back])
 
-    def _mean_normals(self, action: Action, place: _Place) -> Array | None:
+    def _mean_normals(self, action: Action, place: Placed) -> Array | None:
         """Normals averaged like the points, each with the sign of the normal that it joins."""
         if self.shape.normals is None:
             return None
@@ -282,7 +276,7 @@ def _start(shape: Shape, center: Array, group: PointGroup, *, copied: bool, seed
         rows=rows,
         back=back.reshape(-1),
         labels=None if of_points is None else of_points[rows],
-        place=_Place(group=finite_group(group, local[rows], copied=copied), center=np.zeros(3)),
+        place=Placed(group=finite_group(group, local[rows], copied=copied), center=np.zeros(3)),
         rng=np.random.default_rng(seed),
     )
 
@@ -296,7 +290,7 @@ def _counterparts(work: _Work, reach: float) -> tuple[_Work, Action]:
         if action.closed.all() or action.closed.sum() < FEWEST:
             break
         wanted = place.center + action.mean(points - place.center, operations)
-        place, _ = place.towards(points[action.closed], wanted[action.closed])
+        place, _ = _towards(place, points[action.closed], wanted[action.closed])
     action = with_leftovers(points - place.center, place.group.operations(), action, work.labels, reach)
     return replace(work, place=place), action
 
@@ -306,7 +300,7 @@ def _turned(operations: Array, vectors: Array) -> Array:
     return np.asarray(np.einsum("kij,nj->kni", operations, vectors).reshape(-1, 3))
 
 
-def _on_symmetric_surface(points: Array, place: _Place, closest: Closest) -> Array:
+def _on_symmetric_surface(points: Array, place: Placed, closest: Closest) -> Array:
     """Means [N, 3] over the group of g^-1 (closest point to g p): a map of space that commutes with the group."""
     local, operations = points - place.center, place.group.operations()
     found = (closest(place.center + local @ g.T) - place.center for g in operations)
@@ -330,7 +324,7 @@ def _once(points: Array, owners: Index | None) -> Index:
     return np.flatnonzero(keep)
 
 
-def _miss(points: Array, place: _Place, closest: Closest | None = None) -> float:
+def _miss(points: Array, place: Placed, closest: Closest | None = None) -> float:
     """Largest distance of an image under a generator to the surface, or else to the nearest point."""
     local, operations = points - place.center, place.group.operations()
     images = [local @ operations[h].T for h, _ in generators(operations)]
