@@ -2,7 +2,6 @@
 
 import argparse
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -32,13 +31,7 @@ def run(args: argparse.Namespace) -> int:
     with waiting("aligning"):
         record = _record(args)
     write_all(writers := json_writer(args.json, record))
-
-    def lines() -> Iterator[str]:
-        from symrefine.cli.tables import alignment_lines
-
-        return alignment_lines(record)
-
-    tell(args.json, record, lines, writers)
+    tell(args.json, record, None, writers)
     return 0
 
 

@@ -2,7 +2,6 @@
 
 import argparse
 import time
-from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -84,15 +83,8 @@ def run(args: argparse.Namespace) -> int:
 
         if limits := bop_limits(detection):
             note(limits)
-    tell(args.json, record, partial(_lines, record), writers)
+    tell(args.json, record, None, writers)
     return UNDETERMINED if args.strict and record["undetermined"] else 0
-
-
-def _lines(record: dict[str, Any]) -> Iterable[Any]:
-    from symrefine.cli.tables import detection_lines, hyperplane_lines, planar_lines
-
-    lines = planar_lines if "lines" in record else hyperplane_lines if "hyperplanes" in record else detection_lines
-    return lines(record)
 
 
 def examine(

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         _check_files(args, package)
         with _folder(args):
             write_all({str(path): bytes_writer(data) for path, data in package.files.items()})
-    tell(None, {}, lambda: [f"{args.path}: {detection.point_group}"], map(str, package.files))
+    tell(None, {}, [f"{args.path}: {detection.point_group}"], map(str, package.files))
     for text in package.notes:
         note(text)
     return 0

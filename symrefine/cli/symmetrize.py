@@ -1,7 +1,6 @@
 """`symrefine symmetrize`: the nearest exactly symmetric mesh or cloud."""
 
 import argparse
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
         record = _record(args, shape, detection, made)
         writers = {args.out: bytes_writer(data)} | json_writer(args.json, record)
         write_all(writers)
-    tell(args.json, record, partial(_lines, record), writers)
+    tell(args.json, record, _lines(record), writers)
     if shape.labels is not None:
         note("labels are not written")
     if not detection.group.is_finite and args.group is None:

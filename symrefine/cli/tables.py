@@ -22,6 +22,14 @@ _DOUBLETS = {
 _REFINED = "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows"
 
 
+def record_lines(record: Record) -> Iterator[Table | str]:
+    """Everything to be said about a detection in any dimension, or an alignment."""
+    if "matrix" in record:
+        return alignment_lines(record)
+    tell = planar_lines if "lines" in record else hyperplane_lines if "hyperplanes" in record else detection_lines
+    return tell(record)
+
+
 def detection_lines(record: Record) -> Iterator[Table | str]:
     """Everything a table can say about one detection."""
     yield f"{record['source']}: {headline(record)}"

@@ -7,13 +7,4 @@ from symrefine.groups.names import MAX_FOLD
 from symrefine.groups.plane import PointGroup2D
 from symrefine.groups.point_group import PointGroup, is_subgroup, point_group
 
-__all__ = [
-    "MAX_FOLD",
-    "PointGroup",
-    "PointGroup2D",
-    "close",
-    "from_elements",
-    "identify",
-    "is_subgroup",
-    "point_group",
-]
+__all__ = ["MAX_FOLD", "PointGroup", "PointGroup2D", "close", "from_elements", "identify", "is_subgroup", "point_group"]

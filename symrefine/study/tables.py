@@ -3,7 +3,6 @@
 import csv
 import io
 from collections.abc import Sequence
-from itertools import groupby
 
 from symrefine.study.experiment import Experiment, Row
 from symrefine.study.plan import chosen
@@ -38,22 +37,17 @@ def check_tables(study: Study, experiment: Experiment) -> list[Measure]:
 def markdown(table: Table, rows: Sequence[Row], experiment: Experiment) -> str:
     """A table under its title, with the number of runs that failed."""
     picked = chosen(rows, table.where, experiment)
-    lines = []
-    # Groups in the order in which the sweep came upon them.
-    order = {key: i for i, key in enumerate(dict.fromkeys(_key(row, table.groups) for row in picked))}
-    picked = sorted(picked, key=lambda row: order[_key(row, table.groups)])
-    for key, group in groupby(picked, key=lambda row: _key(row, table.groups)):
-        members = list(group)
-        lines.append(
-            [*map(short, key), *(summarise(members, m).text for m in table.values.values()), str(len(members))]
-        )
+    # In the order in which the sweep came upon them.
+    groups: dict[tuple[Scalar | None, ...], list[Row]] = {}
+    for row in picked:
+        groups.setdefault(tuple(row[name] for name in table.groups), []).append(row)
+    lines = [
+        [*map(short, key), *(summarise(members, m).text for m in table.values.values()), str(len(members))]
+        for key, members in groups.items()
+    ]
     failed = sum(row["error"] is not None for row in picked)
     note = f"\n{failed} of {len(picked)} runs failed and are left out of the figures.\n" if failed else ""
     return f"## {table.title}\n\n{grid([*table.groups, *table.values, 'runs'], lines)}{note}"
-
-
-def _key(row: Row, groups: Sequence[str]) -> tuple[Scalar | None, ...]:
-    return tuple(row[name] for name in groups)
 
 
 def grid(head: Sequence[str], lines: Sequence[Sequence[str]]) -> str:

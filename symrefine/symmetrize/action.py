@@ -45,9 +45,10 @@ def act(points: Array, operations: Array, labels: Index | None, reach: float) ->
     closed = miss <= reach
     for h, table in generators(operations):
         closed &= (images[table] == images[:, images[h]]).all(axis=0)
-    for image in images:
-        closed &= closed[image]
-    return Action(images=images, closed=_whole(images, closed), miss=miss)
+    # Only the points all of whose orbit is closed.
+    while ((whole := closed & closed[images].all(axis=0)) != closed).any():
+        closed = whole
+    return Action(images=images, closed=closed, miss=miss)
 
 
 def _labelled(points: Array, labels: Index | None) -> tuple[cKDTree, Array]:
@@ -55,15 +56,6 @@ def _labelled(points: Array, labels: Index | None) -> tuple[cKDTree, Array]:
     size = 0.0 if labels is None else 4.0 * float(np.abs(points).max())
     shifted = np.zeros(len(points)) if labels is None else np.unique(labels, return_inverse=True)[1] * size
     return cKDTree(np.column_stack([points, shifted])), shifted
-
-
-def _whole(images: Index, closed: Mask) -> Mask:
-    """Only the points all of whose orbit is closed."""
-    while True:
-        smaller = closed & closed[images].all(axis=0)
-        if (smaller == closed).all():
-            return closed
-        closed = smaller
 
 
 def generators(operations: Array) -> list[tuple[int, Index]]:
