@@ -2,8 +2,7 @@
 
 import argparse
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -60,6 +59,8 @@ def run(args: argparse.Namespace) -> int:
     from symrefine.study.work import in_processes
 
     with opened(Path(args.out)) if args.out else nullcontext() as out:
+        if out and out.torn:
+            note(f"{args.out}: the last row is incomplete; it is removed and done again")
         latest = {row["file"]: row for row in out.rows if row["file"] in files} if out else {}
         rows = {name: row for name, row in latest.items() if _holds(row, args.dir, options, scale)}
         jobs = [(args.dir, name, options, scale) for name in files if name not in rows]
@@ -102,18 +103,14 @@ def _check_bop(args: argparse.Namespace, files: list[str]) -> float | None:
     return float(args.bop_scale or 1.0)
 
 
-@contextmanager
-def opened(path: Path) -> Iterator[journal.Journal]:
-    """The journal of a batch, which is told if its last row was incomplete.
+def opened(path: Path) -> AbstractContextManager[journal.Journal]:
+    """The journal of a batch.
 
     Raises:
         InputError: another batch is writing to it, or it holds something else than rows of a batch.
     """
     busy = f"{path}: another `symrefine batch` is writing to it"
-    with journal.opened(path, ("file",), busy=busy, rows_of="`symrefine batch`", other="another file") as found:
-        if found.torn:
-            note(f"{path}: the last row is incomplete; it is removed and done again")
-        yield found
+    return journal.opened(path, ("file",), busy=busy, rows_of="`symrefine batch`", other="another file")
 
 
 def _holds(row: Row, folder: str, options: dict[str, Any], scale: float | None) -> bool:

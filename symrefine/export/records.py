@@ -68,12 +68,7 @@ def detection_record(
         "staircase": [{"tolerance": number(s.tolerance), "point_group": s.point_group} for s in d.staircase],
         # `excess` is the miss over what the tolerance allows, the worst of its statistics.
         "near_misses": [
-            {
-                "kind": m.kind,
-                "direction": _direction(m.direction),
-                "point": numbers(m.point, scale),
-                **_turned_down(m),
-            }
+            {"kind": m.kind, "direction": _direction(m.direction), "point": numbers(m.point, scale), **_turned_down(m)}
             for m in d.near_misses
         ],
         "iterations": int(d.iterations),

@@ -10,7 +10,7 @@ from symrefine.detection.result import Detection
 from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.picture.measures import rms_series, series, turn_series_deg
 from symrefine.picture.rows import found_rows, near_miss_rows
-from symrefine.picture.words import coordinates, fit, headline, meaning, percent, symbol, tuples_meaning
+from symrefine.picture.words import TUPLES, coordinates, fit, headline, meaning, percent, symbol
 from symrefine.report.charts import bar_chart, line_chart
 from symrefine.report.style import STYLE
 from symrefine.shape import Shape
@@ -164,7 +164,7 @@ def _tuples(d: Detection) -> str:
     ]
     told = (
         f"{len(d.vectors.vectors)} vectors made of moments (n-tuples) turn with the shape, so a symmetry leaves all of "
-        f"them in place. Here they {tuples_meaning(d.tuples.kind)}. The bars are their singular values over the noise "
+        f"them in place. Here they {TUPLES[d.tuples.kind]}. The bars are their singular values over the noise "
         "that sampling leaves."
     )
     chart = bar_chart("Singular values of the n-tuples over their noise", rows, SIGNIFICANT, "significant from here")

@@ -12,13 +12,9 @@ from symrefine.study.tables import grid
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """A claim with its figures.
+    """A claim with our figure and those of others, by name.
 
-    Attributes:
-        claim: as the config states it.
-        ours: our figure.
-        peers: those of others, by name.
-        met: whether ours is as expected; None where nothing is expected or nothing was run.
+    `met` is whether ours is as expected; None where nothing is expected or nothing was run.
     """
 
     claim: Claim

@@ -25,8 +25,7 @@ class Plan:
 
     Attributes:
         study: the config, with what the command line put in.
-        experiment: the module.
-        cases: instances of its `Case`, in the order of the sweep.
+        cases: instances of the experiment's `Case`, in the order of the sweep.
         config_hash: of the experiment's name and all cases: what decides the rows.
         changed: whether the quick version or the command line changed the config.
     """

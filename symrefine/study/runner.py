@@ -27,16 +27,8 @@ Progress = Callable[[str, int, int], AbstractContextManager[Callable[[], None]]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What a study came to.
-
-    Attributes:
-        folder: where everything was written.
-        rows: of the finished runs, in the order of the sweep.
-        verdicts: of the claims.
-        tables: Markdown, as in tables.md.
-        figures: titles and files.
-        resumed: how many of the runs had been done before.
-        failed: how many of the runs have an error.
+    """What a study came to, and where it was written: rows of the finished runs, in the order of the sweep, Markdown as
+    in tables.md, figures by title; how many of the runs had been done before, and how many have an error.
     """
 
     folder: Path

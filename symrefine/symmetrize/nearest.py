@@ -185,9 +185,7 @@ class _Work:
 
     def by_orbits(self) -> Symmetrized:
         """A cloud of a surface: its points on the symmetric surface, of which one sector is copied to the others."""
-        closest = closest_on(replace(self.shape, points=self.points[self.back]), self.rng)
-        place = self._fitted(closest)
-        wanted = _on_symmetric_surface(self.points, place, closest)
+        place, wanted = self._onto_surface()
         rows = _sector(wanted - place.center, place.group)
         operations, owners = place.group.operations(), self.rows[rows]
         copies = _turned(operations, wanted[rows] - place.center)
@@ -204,9 +202,7 @@ class _Work:
 
     def by_surface(self, action: Action) -> Symmetrized:
         """A mesh: vertices with counterparts go to their means, the others onto the symmetric surface."""
-        closest = closest_on(replace(self.shape, points=self.points[self.back]), self.rng)
-        place = self._fitted(closest)
-        wanted = _on_symmetric_surface(self.points, place, closest)
+        place, wanted = self._onto_surface()
         own = action.miss < OWN * cKDTree(self.points).query(self.points, k=2)[0][:, 1]
         paired = action.closed & own & own[action.images].all(axis=0)
         wanted[paired] = self._means(action, place)[paired]
@@ -235,13 +231,14 @@ class _Work:
     def _means(self, action: Action, place: Placed) -> Array:
         return place.center + action.mean(self.points - place.center, place.group.operations())
 
-    def _fitted(self, closest: Closest) -> Placed:
-        """The group's place, fitted to where some of the points belong."""
+    def _onto_surface(self) -> tuple[Placed, Array]:
+        """The group's place, fitted to where some of the points belong, and where all of them do."""
+        closest = closest_on(replace(self.shape, points=self.points[self.back]), self.rng)
         place = self.place
         some = self.points[:: max(1, len(self.points) // FITTED)]
         for _ in range(4):
             place, _ = _towards(place, some, _on_symmetric_surface(some, place, closest))
-        return place
+        return place, _on_symmetric_surface(self.points, place, closest)
 
     def _even_weights(self, action: Action) -> Array | None:
         """Weights that are equal over each orbit, their sum kept; copies of one point share its mean."""
