@@ -50,10 +50,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _basis(args: argparse.Namespace) -> "NTupleBasis":
-    if args.affine:
-        from symrefine.ntuples.affine import derive_affine
-
-        return derive_affine(args.dim, args.orders)
+    from symrefine.ntuples.affine import derive_affine
     from symrefine.ntuples.derive import derive
 
-    return derive(args.dim, args.orders)
+    return (derive_affine if args.affine else derive)(args.dim, args.orders)

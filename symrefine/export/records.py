@@ -35,7 +35,6 @@ def detection_record(
     """What `symrefine detect --json` writes; equal input, options and version give equal records but for `timings`.
 
     Args:
-        shape: what it was detected on.
         options: what the caller chose, for the record.
         load_s: seconds that reading took, for `timings`.
 

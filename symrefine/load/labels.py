@@ -42,8 +42,7 @@ def triangle_classes(content: Content, name: str, owner: Index, corners: Index) 
         return _classes(content, key, "face", covered)[owner]
     covered = np.bincount(corners.ravel(), np.repeat(areas, 3), minlength=len(content.points)).astype(np.float64)
     first, second, third = _classes(content, key, "point", covered)[corners].T
-    chosen: Index = np.where(second == third, second, first)
-    return chosen
+    return np.asarray(np.where(second == third, second, first))
 
 
 def point_weights(content: Content, name: str) -> Array:

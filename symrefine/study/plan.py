@@ -3,7 +3,7 @@
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields
 from itertools import product
 from pathlib import Path
@@ -158,8 +158,8 @@ def _case(nodes: Mapping[str, Node], root: Node, experiment: Experiment) -> Any:
     return case
 
 
-def select(where: Node, experiment: Experiment) -> Mapping[str, frozenset[Any]]:
-    """Which values of which fields a `where` picks.
+def select(where: Node, experiment: Experiment) -> Callable[[Row], bool]:
+    """Whether a `where` picks a row, or the fields of a case.
 
     Raises:
         InputError: an unknown field, a value of the wrong type.
@@ -168,15 +168,9 @@ def select(where: Node, experiment: Experiment) -> Mapping[str, frozenset[Any]]:
     for name, node in mapping(where).items():
         kind = experiment.field(name, node)
         picked[name] = frozenset(scalar(inner, kind) for inner in spread(node))
-    return picked
-
-
-def matches(row: Row, picked: Mapping[str, frozenset[Any]]) -> bool:
-    """Whether a row, or the fields of a case, is among those picked."""
-    return all(row[name] in values for name, values in picked.items())
+    return lambda row: all(row[name] in values for name, values in picked.items())
 
 
 def chosen(rows: Sequence[Row], where: Node, experiment: Experiment) -> list[Row]:
     """The rows that a `where` picks."""
-    picked = select(where, experiment)
-    return [row for row in rows if matches(row, picked)]
+    return list(filter(select(where, experiment), rows))

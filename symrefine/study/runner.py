@@ -14,7 +14,7 @@ from symrefine.study.document import Node
 from symrefine.study.experiment import Row
 from symrefine.study.figures import check_figures, draw
 from symrefine.study.journal import Entry, Stamp, opened
-from symrefine.study.plan import Plan, matches, select
+from symrefine.study.plan import Plan, select
 from symrefine.study.summary import Measure, check_columns
 from symrefine.study.tables import check_tables, csv_text, markdown
 from symrefine.study.versions import code_version, library_versions
@@ -98,7 +98,7 @@ def _check(plan: Plan) -> list[Measure]:
 def _must_pick(where: Node, plan: Plan, *common: Node) -> None:
     """Refuse what picks no run, which is a slip of the pen; the command line may leave runs out on purpose."""
     picks = [select(node, plan.experiment) for node in (where, *common)]
-    if not plan.changed and not any(all(matches(asdict(case), p) for p in picks) for case in plan.cases):
+    if not plan.changed and not any(all(pick(asdict(case)) for pick in picks) for case in plan.cases):
         raise where.error("picks no run of the sweep")
 
 
@@ -186,7 +186,7 @@ def _trace(plan: Plan, chosen: Sequence[Any], progress: Progress) -> list[Row]:
 def _picked(plan: Plan, cases: Sequence[Any], wheres: Sequence[Node]) -> list[Any]:
     """The cases that one of the selections picks."""
     picks = [select(where, plan.experiment) for where in wheres]
-    return [case for case in cases if any(matches(asdict(case), picked) for picked in picks)]
+    return [case for case in cases if any(pick(asdict(case)) for pick in picks)]
 
 
 def _record(plan: Plan, folder: Path, chosen: Sequence[Any], progress: Progress) -> None:
