@@ -169,15 +169,11 @@ def line_angle_rad(a: ArrayLike, b: ArrayLike) -> float:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Isometry:
+class Isometry(ReadOnly):
     """Map x -> matrix x + shift with an orthogonal matrix of determinant +1 or -1."""
 
     matrix: Array
     shift: Array
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "matrix", read_only(self.matrix))
-        object.__setattr__(self, "shift", read_only(self.shift))
 
     @classmethod
     def about(cls, center: ArrayLike, matrix: ArrayLike) -> "Isometry":

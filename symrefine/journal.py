@@ -43,7 +43,6 @@ def opened(path: Path, keys: Sequence[str], *, busy: str, rows_of: str, other: s
     """The journal in a file, made if it is not there; nobody else can write to it until the end of this process.
 
     Args:
-        path: of the file.
         keys: that every row has, the one first that it begins with.
         busy: what to say if another process is writing.
         rows_of: what such rows belong to, for messages.

@@ -637,7 +637,7 @@ def test_batch_without_out_writes_nothing(
 def test_a_bug_in_one_file_does_not_end_the_others(
     run: Run, shelf: Path, tmp_path: Path, record: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def examine(path: str, **_: object) -> tuple[None, None, dict[str, Any]]:
+    def examine(path: str, _: dict[str, Any]) -> tuple[None, None, dict[str, Any]]:
         if path.endswith("b.ply"):
             raise ZeroDivisionError("oh")
         return None, None, record

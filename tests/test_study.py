@@ -17,7 +17,7 @@ from symrefine.study import journal, runner, versions
 from symrefine.study.document import Node
 from symrefine.study.plan import Plan, make_plan
 from symrefine.study.runner import Outcome, run_study
-from symrefine.study.summary import Measure, Summary, read_expectation, read_measure, short, summarise
+from symrefine.study.summary import Expectation, Measure, Summary, short, summarise
 
 TOY = """
 import os
@@ -238,9 +238,8 @@ def test_what_is_made_of_the_rows_is_checked_before_the_runs(
     make: Make, lab: Path, old: str, new: str, message: str
 ) -> None:
     (lab / "lab" / "bare.py").write_text(TOY.split("def trace")[0])
-    plan = make((old, new))
     with pytest.raises(InputError, match=message):
-        run_study(plan, lab / "out")
+        run_study(make((old, new)), lab / "out")
     assert not (lab / "out").exists()
 
 
@@ -470,12 +469,14 @@ def test_rows_are_appended_whole(make: Make, lab: Path) -> None:
 
 # --- summaries --------------------------------------------------------------------------------------------------------
 
-NODE = Node(value="", place="x.yaml:1", path="value")
+
+def node(text: str) -> Node:
+    return Node(value=text, place="x.yaml:1", path="value")
 
 
 def summary(how: str, *values: Any) -> Summary:
     rows = [{"error": None, "v": v} for v in values] + [{"error": "failed", "v": 1000}]
-    return summarise(rows, read_measure(NODE, f"{how} v".strip()))
+    return summarise(rows, Measure.read(node(f"{how} v".strip())))
 
 
 @pytest.mark.parametrize(
@@ -519,7 +520,7 @@ def test_summaries(how: str, values: tuple[Any, ...], text: str) -> None:
     ],
 )
 def test_expectations(text: str, fits: tuple[Any, ...], does_not: Any) -> None:
-    expected = read_expectation(NODE, text)
+    expected = Expectation.read(node(text))
     assert expected.holds(Summary(text="", values=fits))
     assert not expected.holds(Summary(text="", values=(*fits, does_not)))
     assert not expected.holds(Summary(text="-", values=()))
@@ -531,9 +532,9 @@ def test_short_texts() -> None:
 
 
 def test_measures_name_their_place() -> None:
-    assert read_measure(NODE, "found") == Measure(how="", column="found", node=NODE)
+    assert Measure.read(node("found")) == Measure(how="", column="found", node=node("found"))
     with pytest.raises(InputError, match=r"x.yaml:1: value: expected COLUMN or AGGREGATE COLUMN"):
-        read_measure(NODE, "mean of found")
+        Measure.read(node("mean of found"))
 
 
 def test_code_version_knows_changes(tmp_path: Path) -> None:

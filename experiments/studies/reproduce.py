@@ -188,7 +188,7 @@ def _miss(verdict: "Verdict") -> str:
     claim = verdict.claim
     unit = f" {claim.unit}" if claim.unit else ""
     note = f" ({claim.note})" if claim.note else ""
-    return f"{claim.claim}: ours {verdict.ours.text}{unit}, expected {claim.expect}; paper: {claim.paper}{note}"
+    return f"{claim.claim}: ours {verdict.ours.text}{unit}, expected {claim.expect.said}; paper: {claim.paper}{note}"
 
 
 def _chapter(part: Part) -> str:

@@ -2,14 +2,12 @@
 
 import argparse
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from symrefine.cli.outputs import check_outputs, json_writer, tell, waiting, write_all
 from symrefine.cli.values import add_detection_options
 
-NAME = "align"
 HELP = "find the map that takes one object onto another, reflections included"
 DESCRIPTION = (
     "Find the orthogonal matrix M and the translation t that take the mesh or cloud A onto B, b = M a + t, without "
@@ -33,13 +31,7 @@ def run(args: argparse.Namespace) -> int:
     with waiting("aligning"):
         record = _record(args)
     write_all(writers := json_writer(args.json, record))
-
-    def lines() -> Iterator[str]:
-        from symrefine.cli.tables import alignment_lines
-
-        return alignment_lines(record)
-
-    tell(args.json, record, lines, writers)
+    tell(args.json, record, None, writers)
     return 0
 
 

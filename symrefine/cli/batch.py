@@ -2,14 +2,13 @@
 
 import argparse
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from symrefine import journal
 from symrefine.cli.outputs import check_beside, check_outputs, console, note, progress, text_writer, write_all
-from symrefine.cli.values import add_class_options, add_detection_options, count, positive
+from symrefine.cli.values import add_class_options, add_detection_options, count, detection_options, positive
 from symrefine.errors import InputError, SymrefineError
 from symrefine.files import naming
 
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
     from symrefine.plane import PlanarDetection
     from symrefine.shape import Shape
 
-NAME = "batch"
 HELP = "detect the symmetries of every file in a directory"
 DESCRIPTION = (
     "Detect the symmetries of every mesh and cloud in DIR and print a line for each. With --out, also append a JSON "
@@ -57,11 +55,12 @@ def run(args: argparse.Namespace) -> int:
     check_outputs({"--out": args.out, "--bop": args.bop}, [Path(args.dir, name) for name in files])
     check_beside("--bop", args.bop, {"--bop-scale": args.bop_scale})
     scale = _check_bop(args, files)
-    options = {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed}
-    options |= {name: given for name in ("labels", "weights") if (given := getattr(args, name)) is not None}
+    options = detection_options(args)
     from symrefine.study.work import in_processes
 
     with opened(Path(args.out)) if args.out else nullcontext() as out:
+        if out and out.torn:
+            note(f"{args.out}: the last row is incomplete; it is removed and done again")
         latest = {row["file"]: row for row in out.rows if row["file"] in files} if out else {}
         rows = {name: row for name, row in latest.items() if _holds(row, args.dir, options, scale)}
         jobs = [(args.dir, name, options, scale) for name in files if name not in rows]
@@ -104,18 +103,14 @@ def _check_bop(args: argparse.Namespace, files: list[str]) -> float | None:
     return float(args.bop_scale or 1.0)
 
 
-@contextmanager
-def opened(path: Path) -> Iterator[journal.Journal]:
-    """The journal of a batch, which is told if its last row was incomplete.
+def opened(path: Path) -> AbstractContextManager[journal.Journal]:
+    """The journal of a batch.
 
     Raises:
         InputError: another batch is writing to it, or it holds something else than rows of a batch.
     """
     busy = f"{path}: another `symrefine batch` is writing to it"
-    with journal.opened(path, ("file",), busy=busy, rows_of="`symrefine batch`", other="another file") as found:
-        if found.torn:
-            note(f"{path}: the last row is incomplete; it is removed and done again")
-        yield found
+    return journal.opened(path, ("file",), busy=busy, rows_of="`symrefine batch`", other="another file")
 
 
 def _holds(row: Row, folder: str, options: dict[str, Any], scale: float | None) -> bool:
@@ -182,7 +177,7 @@ def examine_file(job: Job) -> Row:
     if row["error"] is not None:
         return row
     try:
-        shape, detection, record = examine(str(path), **options)
+        shape, detection, record = examine(str(path), options)
         return row | record | ({} if scale is None else {"bop": _bop(detection, shape, scale)})
     except (SymrefineError, OSError) as error:
         return row | {"error": " ".join(str(error).split())}

@@ -10,7 +10,6 @@ from symrefine.errors import InputError
 if TYPE_CHECKING:
     from symrefine.ntuples.notation import NTupleBasis
 
-NAME = "derive"
 HELP = "derive n-tuples of moments exactly, in any dimension"
 DESCRIPTION = (
     "Derive all vectors made of moments that turn with the object (n-tuples: doublets in 2-D, triplets in 3-D), as "
@@ -51,10 +50,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _basis(args: argparse.Namespace) -> "NTupleBasis":
-    if args.affine:
-        from symrefine.ntuples.affine import derive_affine
-
-        return derive_affine(args.dim, args.orders)
+    from symrefine.ntuples.affine import derive_affine
     from symrefine.ntuples.derive import derive
 
-    return derive(args.dim, args.orders)
+    return (derive_affine if args.affine else derive)(args.dim, args.orders)

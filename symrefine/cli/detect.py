@@ -2,7 +2,6 @@
 
 import argparse
 import time
-from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -18,14 +17,13 @@ from symrefine.cli.outputs import (
     waiting,
     write_all,
 )
-from symrefine.cli.values import add_class_options, add_detection_options, grey, natural, positive
+from symrefine.cli.values import add_class_options, add_detection_options, detection_options, grey, natural, positive
 from symrefine.errors import InputError
 
 if TYPE_CHECKING:
     from symrefine.detection.result import Detection
     from symrefine.shape import Shape
 
-NAME = "detect"
 # Exit status of `--strict` where nothing is decided.
 UNDETERMINED = 3
 HELP = "find the planes, axes and point group of a mesh, cloud or picture"
@@ -76,10 +74,8 @@ def run(args: argparse.Namespace) -> int:
 
         read_models_info(Path(args.bop))
     with waiting("detecting"):
-        shape, detection, record = examine(
-            args.path, args.measure, args.tolerance, args.seed, labels=args.labels, weights=args.weights,
-            threshold=args.threshold, invert=args.invert,
-        )  # fmt: skip
+        options = detection_options(args)
+        shape, detection, record = examine(args.path, options, threshold=args.threshold, invert=args.invert)
         writers = json_writer(args.json, record) | _writers(args, shape, detection)
         write_all(writers)
     if args.bop is not None:
@@ -87,29 +83,14 @@ def run(args: argparse.Namespace) -> int:
 
         if limits := bop_limits(detection):
             note(limits)
-    tell(args.json, record, partial(_lines, record), writers)
+    tell(args.json, record, None, writers)
     return UNDETERMINED if args.strict and record["undetermined"] else 0
 
 
-def _lines(record: dict[str, Any]) -> Iterable[Any]:
-    from symrefine.cli.tables import detection_lines, hyperplane_lines, planar_lines
-
-    lines = planar_lines if "lines" in record else hyperplane_lines if "hyperplanes" in record else detection_lines
-    return lines(record)
-
-
 def examine(
-    path: str,
-    measure: Literal["surface", "solid"] | None,
-    tolerance: float,
-    seed: int,
-    *,
-    labels: str | None = None,
-    weights: str | None = None,
-    threshold: float | Literal["otsu"] | None = None,
-    invert: bool = False,
+    path: str, options: dict[str, Any], *, threshold: float | Literal["otsu"] | None = None, invert: bool = False
 ) -> tuple["Shape", Any, dict[str, Any]]:
-    """Shape, detection and JSON record of a file.
+    """Shape, detection and JSON record of a file, with `detection_options`, and those of a picture.
 
     The detection is a `PlanarDetection`, a `Detection` or a `SubspaceDetection`, as the points have two, three or more
     coordinates.
@@ -117,10 +98,10 @@ def examine(
     from symrefine.load import IMAGES, load
 
     start = time.perf_counter()
-    shape = load(path, measure=measure, labels=labels, weights=weights, threshold=threshold, invert=invert)
+    how = {name: chosen for name, chosen in options.items() if name in ("measure", "labels", "weights")}
+    shape = load(path, **how, threshold=threshold, invert=invert)
     load_s = time.perf_counter() - start
-    options: dict[str, Any] = {"tolerance": tolerance, "measure": measure, "seed": seed}
-    options |= {name: given for name, given in (("labels", labels), ("weights", weights)) if given is not None}
+    tolerance, seed = options["tolerance"], options["seed"]
     if shape.labels is not None and shape.dim != 3:
         raise InputError(
             f"{path}: points have {shape.dim} coordinates; labels are for objects in space, leave them out"
@@ -131,7 +112,7 @@ def examine(
 
         flat = detect_planar(shape, tolerance=tolerance, seed=seed)
         if Path(path).suffix.lower() in IMAGES:
-            options |= {"threshold": threshold, "invert": invert}
+            options = options | {"threshold": threshold, "invert": invert}
         return shape, flat, planar_record(flat, shape, options=options, load_s=load_s)
     if shape.dim > 3:
         from symrefine.export.records import subspace_record

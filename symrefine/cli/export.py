@@ -1,8 +1,7 @@
 """`symrefine export`: the symmetries of a file as other programs read them."""
 
 import argparse
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,6 @@ if TYPE_CHECKING:
     from symrefine.export.packages import Package
     from symrefine.shape import Shape
 
-NAME = "export"
 HELP = "write the symmetries as BOP, FoundationPose, MegaPose, DOPE or Isaac read them, or a canonical model"
 DESCRIPTION = (
     "Find the symmetries of the mesh or cloud in PATH and write them for another program. bop: an entry in "
@@ -63,9 +61,13 @@ def run(args: argparse.Namespace) -> int:
         shape, detection = detected(args)
         package = _package(args, shape, detection)
         _check_files(args, package)
-        with _folder(args):
+        with ExitStack() as undo:
+            if args.to in _FOLDERS and not Path(args.out).exists():
+                Path(args.out).mkdir()
+                undo.callback(Path(args.out).rmdir)
             write_all({str(path): bytes_writer(data) for path, data in package.files.items()})
-    tell(None, {}, lambda: [f"{args.path}: {detection.point_group}"], map(str, package.files))
+            undo.pop_all()
+    tell(None, {}, [f"{args.path}: {detection.point_group}"], map(str, package.files))
     for text in package.notes:
         note(text)
     return 0
@@ -145,18 +147,3 @@ def _package(args: argparse.Namespace, shape: "Shape", detection: "Detection") -
     if args.to == "canonical":
         return packages.canonical_package(out, detection, shape, transform=_transform(args))
     return packages.consumer_package(args.to, out, detection, shape, number=number, scale=scale)
-
-
-@contextmanager
-def _folder(args: argparse.Namespace) -> Iterator[None]:
-    """The folder of a consumer, made if need be, gone again after an error."""
-    out = Path(args.out)
-    fresh = args.to in _FOLDERS and not out.exists()
-    if fresh:
-        out.mkdir()
-    try:
-        yield
-    except BaseException:
-        if fresh:
-            out.rmdir()
-        raise

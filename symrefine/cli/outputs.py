@@ -74,15 +74,19 @@ def json_writer(name: str | None, record: Mapping[str, Any]) -> dict[str, Writer
     return {} if name in (None, STDOUT) else {str(name): text_writer(json_text(record))}
 
 
-def tell(
-    json_to: str | None, record: Mapping[str, Any], lines: Callable[[], Iterable[Any]], written: Iterable[str]
-) -> None:
-    """Print a record: as JSON if stdout is asked for, else as lines and tables, and the names of the files written."""
+def tell(json_to: str | None, record: dict[str, Any], lines: Iterable[Any] | None, written: Iterable[str]) -> None:
+    """Print a record: as JSON if stdout is asked for, else as lines and tables, and the names of the files written.
+
+    Args:
+        lines: to print; those that tables has for such a record if None.
+    """
     if json_to == STDOUT:
         say(json_text(record))
         return
+    from symrefine.cli.tables import record_lines
+
     out = console()
-    for line in (*lines(), *(f"wrote {name}" for name in written)):
+    for line in (*(record_lines(record) if lines is None else lines), *(f"wrote {name}" for name in written)):
         out.print(line, soft_wrap=isinstance(line, str))
     sys.stdout.flush()
 

@@ -7,7 +7,6 @@ from symrefine.cli.outputs import console, note, progress, say
 from symrefine.cli.values import count
 from symrefine.files import naming
 
-NAME = "run"
 HELP = "run the experiment of a YAML config and write its rows, tables and figures"
 DESCRIPTION = (
     "Run an experiment for every case of the sweep in CONFIG.yaml. Every finished run is on disk at once; run again, "

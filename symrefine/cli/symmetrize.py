@@ -1,13 +1,12 @@
 """`symrefine symmetrize`: the nearest exactly symmetric mesh or cloud."""
 
 import argparse
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from symrefine.cli.export import detected
 from symrefine.cli.outputs import bytes_writer, check_outputs, json_writer, note, tell, waiting, write_all
-from symrefine.cli.values import add_detection_options
+from symrefine.cli.values import add_detection_options, detection_options
 from symrefine.errors import InputError
 
 if TYPE_CHECKING:
@@ -15,7 +14,6 @@ if TYPE_CHECKING:
     from symrefine.shape import Shape
     from symrefine.symmetrize import Symmetrized
 
-NAME = "symmetrize"
 HELP = "write the nearest exactly symmetric mesh or cloud"
 DESCRIPTION = (
     "Find the symmetry of the mesh or cloud in PATH and write the nearest shape that has it exactly: points that "
@@ -53,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
         record = _record(args, shape, detection, made)
         writers = {args.out: bytes_writer(data)} | json_writer(args.json, record)
         write_all(writers)
-    tell(args.json, record, partial(_lines, record), writers)
+    tell(args.json, record, _lines(record), writers)
     if shape.labels is not None:
         note("labels are not written")
     if not detection.group.is_finite and args.group is None:
@@ -88,7 +86,7 @@ def _record(args: argparse.Namespace, shape: "Shape", detection: "Detection", ma
     return {
         "schema": "symrefine.symmetrized/1",
         "source": shape.source,
-        "options": {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed, "group": args.group},
+        "options": detection_options(args) | {"group": args.group},
         "found": detection.point_group,
         "point_group": made.group.name,
         "center": numbers(made.center, made.diagonal),

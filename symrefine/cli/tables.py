@@ -8,7 +8,7 @@ from typing import Any
 from rich.table import Table
 
 from symrefine.groups import point_group
-from symrefine.picture.words import kind_name, meaning, tuples_meaning
+from symrefine.picture.words import TUPLES, kind_name, meaning
 
 Record = dict[str, Any]
 
@@ -22,10 +22,18 @@ _DOUBLETS = {
 _REFINED = "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows"
 
 
+def record_lines(record: Record) -> Iterator[Table | str]:
+    """Everything to be said about a detection in any dimension, or an alignment."""
+    if "matrix" in record:
+        return alignment_lines(record)
+    tell = planar_lines if "lines" in record else hyperplane_lines if "hyperplanes" in record else detection_lines
+    return tell(record)
+
+
 def detection_lines(record: Record) -> Iterator[Table | str]:
     """Everything a table can say about one detection."""
     yield f"{record['source']}: {headline(record)}"
-    yield f"n-tuples {tuples_meaning(record['ntuples']['kind'])}"
+    yield f"n-tuples {TUPLES[record['ntuples']['kind']]}"
     yield _place(record)
     if record["classes"]:
         yield f"labels: {_count(record['classes']['count'], 'class', 'classes')}"

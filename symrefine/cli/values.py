@@ -2,7 +2,7 @@
 
 import argparse
 import math
-from typing import Literal
+from typing import Any, Literal
 
 # The same as `verify.TOLERANCE` and the range that `detect` takes, which are too heavy to import for `--help`.
 TOLERANCE, LARGEST_TOLERANCE = 0.02, 0.2
@@ -26,6 +26,12 @@ def add_detection_options(parser: argparse.ArgumentParser, counts_as: str = "sym
     parser.add_argument(
         "--seed", type=natural, default=0, metavar="N", help="of the random samples (default: %(default)s)"
     )
+
+
+def detection_options(args: argparse.Namespace) -> dict[str, Any]:
+    """What was chosen of the options of a detection, for its record; names of fields only where one is given."""
+    named = {name: given for name in ("labels", "weights") if (given := getattr(args, name, None)) is not None}
+    return {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed} | named
 
 
 def add_class_options(parser: argparse.ArgumentParser) -> None:

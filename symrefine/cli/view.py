@@ -3,7 +3,6 @@
 import argparse
 from pathlib import Path
 
-NAME = "view"
 HELP = "open a recording of `detect --recording` in the viewer"
 DESCRIPTION = "Open a recording that `symrefine detect --recording FILE.rrd` wrote: the shape and every iteration."
 

@@ -12,7 +12,6 @@ which `bop_toolkit` samples a continuous symmetry.
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -74,8 +73,11 @@ def placed_entry(group: PointGroup, center: Array, points: Array) -> Entry:
     entry: Entry = {"diameter": size}
     entry |= {f"min_{k}": float(v) for k, v in zip("xyz", low, strict=True)}
     entry |= {f"size_{k}": float(v) for k, v in zip("xyz", high - low, strict=True)}
-    placed = _Placed(group=_snapped(group.proper_subgroup()), center=center, size=size)
-    discrete, continuous = placed.discrete(), placed.continuous()
+    proper = _snapped(group.proper_subgroup())
+    discrete = [_motion(matrix, center, size) for matrix in _discrete(proper)]
+    # Three axes for a sphere, see `bop_limits`.
+    axes = np.eye(3) if proper.name == "K" else proper.continuous_axes()
+    continuous = [_turning(toward_positive(u) * u, center, size) for u in axes]
     entry |= {"symmetries_discrete": discrete} if discrete else {}
     entry |= {"symmetries_continuous": continuous} if continuous else {}
     return entry
@@ -161,38 +163,26 @@ def _snapped(group: PointGroup) -> PointGroup:
     return PointGroup(name=group.name, frame=nearest if np.abs(nearest - frame).max() <= _SNAP else frame)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Placed:
-    """Proper rotations about a centre, lengths in millimetres, with the diameter of what they turn."""
+def _discrete(group: PointGroup) -> Array:
+    """Rotations [k, 3, 3] of a proper group but for the identity, to be multiplied with the continuous ones."""
+    if group.is_finite:
+        return group.operations()[1:]
+    if group.symbol.family != "D":
+        return np.zeros((0, 3, 3))
+    return rotation(frame_with_z(group.continuous_axes()[0])[1], math.pi)[None]
 
-    group: PointGroup
-    center: Array
-    size: float
 
-    def discrete(self) -> list[list[float]]:
-        """Rotations other than the identity, to be multiplied with the continuous ones."""
-        if self.group.is_finite:
-            return [self._motion(r) for r in self.group.operations()[1:]]
-        if self.group.symbol.family != "D":
-            return []
-        across = frame_with_z(self.group.continuous_axes()[0])[1]
-        return [self._motion(rotation(across, math.pi))]
+def _turning(axis: Array, center: Array, size: float) -> Entry:
+    """All turns about an axis through the centre of something of that diameter."""
+    foot = center - (center @ axis) * axis
+    return {"axis": _clean(axis, _ROUNDING), "offset": _clean(foot, _SNAP * size)}
 
-    def continuous(self) -> list[Entry]:
-        """Axes about which every angle is a symmetry; three for a sphere, see `bop_limits`."""
-        axes = np.eye(3) if self.group.name == "K" else self.group.continuous_axes()
-        return [self._turning(toward_positive(u) * u) for u in axes]
 
-    def _turning(self, axis: Array) -> Entry:
-        foot = self.center - (self.center @ axis) * axis
-        return {"axis": _clean(axis, _ROUNDING), "offset": _clean(foot, _SNAP * self.size)}
-
-    def _motion(self, matrix: Array) -> list[float]:
-        """The rotation about the centre as a 4 x 4 matrix, row by row."""
-        center = np.array(_clean(self.center, _SNAP * self.size))
-        shift = _clean(Isometry.about(center, matrix).shift, _ROUNDING * self.size)
-        rows = [[*_clean(row, _ROUNDING), t] for row, t in zip(matrix, shift, strict=True)]
-        return [x for row in [*rows, [0.0, 0.0, 0.0, 1.0]] for x in row]
+def _motion(matrix: Array, center: Array, size: float) -> list[float]:
+    """A rotation about the centre as a 4 x 4 matrix, row by row."""
+    shift = _clean(Isometry.about(_clean(center, _SNAP * size), matrix).shift, _ROUNDING * size)
+    rows = [[*_clean(row, _ROUNDING), t] for row, t in zip(matrix, shift, strict=True)]
+    return [x for row in [*rows, [0.0, 0.0, 0.0, 1.0]] for x in row]
 
 
 def _clean(values: Array, negligible: float) -> list[float]:

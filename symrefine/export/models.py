@@ -5,7 +5,7 @@ materials, polygons, comments, the order of everything. `model_bytes` writes wha
 """
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -91,12 +91,8 @@ def _moved_ply(data: bytes, matrix: Array) -> bytes | None:
 def _moved_ply_binary(data: bytes, header: Header, vertex: Element, matrix: Array) -> bytes:
     rows = np.dtype([(p.name, header.byte_order + p.type) for p in vertex.properties])
     table = np.frombuffer(data, rows, count=vertex.count, offset=header.size).copy()
-    assert table.dtype.names is not None
-    for names in (_POSITION, _NORMAL):
-        if set(names) <= set(table.dtype.names):
-            new = _transformed(np.stack([table[n] for n in names], axis=1).astype(np.float64), names, matrix)
-            for name, column in zip(names, new.T, strict=True):
-                table[name] = column
+    for name, column in _moved_columns({p.name: table[p.name] for p in vertex.properties}, matrix).items():
+        table[name] = column
     return data[: header.size] + table.tobytes() + data[header.size + table.nbytes :]
 
 
@@ -104,42 +100,45 @@ def _moved_ply_text(data: bytes, header: Header, vertex: Element, matrix: Array)
     lines = data[header.size :].splitlines(keepends=True)
     rows = lines[: vertex.count]
     table = [row.split() for row in rows]
-    columns = [p.name for p in vertex.properties]
-    if any(len(row) != len(columns) for row in table):
+    if any(len(row) != len(vertex.properties) for row in table):
         return None  # blank lines between rows
-    short = {p.name: p.type == "f4" for p in vertex.properties}
-    for names in (_POSITION, _NORMAL):
-        if not set(names) <= set(columns):
-            continue
-        where = [columns.index(n) for n in names]
-        new = _transformed(np.array([[float(row[w]) for w in where] for row in table]), names, matrix)
-        for row, values in zip(table, new, strict=True):
-            for w, name, value in zip(where, names, values, strict=True):
-                row[w] = (f"{value:.9g}" if short[name] else repr(float(value))).encode()
+    places = {p.name: (k, p.type == "f4") for k, p in enumerate(vertex.properties) if p.name in (*_POSITION, *_NORMAL)}
+    given = {name: np.array([float(row[k]) for row in table]) for name, (k, _) in places.items()}
+    for name, column in _moved_columns(given, matrix).items():
+        k, short = places[name]
+        for row, value in zip(table, column.tolist(), strict=True):
+            row[k] = (f"{value:.9g}" if short else repr(value)).encode()
     ends = [row[len(row.rstrip(b"\r\n")) :] for row in rows]
     return data[: header.size] + b"".join(
         [b" ".join(r) + e for r, e in zip(table, ends, strict=True)] + lines[len(rows) :]
     )
 
 
-def _transformed(values: Array, names: tuple[str, ...], matrix: Array) -> Array:
-    if names == _NORMAL:
-        return np.asarray(values @ _directions(matrix).T)
-    return np.asarray(values @ matrix[:3, :3].T + matrix[:3, 3])
+def _moved_columns(columns: Mapping[str, Array], matrix: Array) -> dict[str, Array]:
+    """The columns [N] of positions moved and those of normals turned, of such as are there."""
+    new: dict[str, Array] = {}
+    for names, turn, shift in ((_POSITION, matrix[:3, :3], matrix[:3, 3]), (_NORMAL, _directions(matrix), np.zeros(3))):
+        if set(names) <= set(columns):
+            values = np.stack([columns[name] for name in names], axis=1).astype(np.float64)
+            new |= dict(zip(names, (values @ turn.T + shift).T, strict=True))
+    return new
+
+
+def _table(shape: Shape) -> Array:
+    """[N, 3] points, or [N, 6] with their normals."""
+    return shape.points if shape.normals is None else np.column_stack([shape.points, shape.normals])
 
 
 def _ply(shape: Shape) -> bytes:
-    columns = [*_POSITION, *(_NORMAL if shape.normals is not None else ())]
-    faces = 0 if shape.faces is None else len(shape.faces)
-    head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(shape.points)}"]
-    head += [f"property double {name}" for name in columns]
-    head += [f"element face {faces}", "property list uchar int vertex_indices"] if faces else []
-    rows = shape.points if shape.normals is None else np.column_stack([shape.points, shape.normals])
-    body = np.ascontiguousarray(rows, dtype="<f8").tobytes()
+    table = np.ascontiguousarray(_table(shape), dtype="<f8")
+    head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(table)}"]
+    head += [f"property double {name}" for name in (*_POSITION, *_NORMAL)[: table.shape[1]]]
+    body = table.tobytes()
     if shape.faces is not None:
-        table = np.zeros(faces, dtype=[("count", "u1"), ("corners", "<i4", (3,))])
-        table["count"], table["corners"] = 3, shape.faces
-        body += table.tobytes()
+        head += [f"element face {len(shape.faces)}", "property list uchar int vertex_indices"]
+        faces = np.zeros(len(shape.faces), dtype=[("count", "u1"), ("corners", "<i4", (3,))])
+        faces["count"], faces["corners"] = 3, shape.faces
+        body += faces.tobytes()
     return "\n".join([*head, "end_header", ""]).encode("ascii") + body
 
 
@@ -161,8 +160,7 @@ def _off(shape: Shape) -> bytes:
 
 
 def _xyz(shape: Shape) -> bytes:
-    rows = shape.points if shape.normals is None else np.column_stack([shape.points, shape.normals])
-    return "\n".join([*_rows(rows), ""]).encode("ascii")
+    return "\n".join([*_rows(_table(shape)), ""]).encode("ascii")
 
 
 def _npy(shape: Shape) -> bytes:

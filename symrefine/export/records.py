@@ -35,7 +35,6 @@ def detection_record(
     """What `symrefine detect --json` writes; equal input, options and version give equal records but for `timings`.
 
     Args:
-        shape: what it was detected on.
         options: what the caller chose, for the record.
         load_s: seconds that reading took, for `timings`.
 
@@ -68,14 +67,7 @@ def detection_record(
         "staircase": [{"tolerance": number(s.tolerance), "point_group": s.point_group} for s in d.staircase],
         # `excess` is the miss over what the tolerance allows, the worst of its statistics.
         "near_misses": [
-            {
-                "kind": m.kind,
-                "direction": _direction(m.direction),
-                "point": numbers(m.point, scale),
-                "order": _order(m.order),
-                "residual": _residual(m.residual),
-                "excess": number(m.excess),
-            }
+            {"kind": m.kind, "direction": _direction(m.direction), "point": numbers(m.point, scale), **_turned_down(m)}
             for m in d.near_misses
         ],
         "iterations": int(d.iterations),
@@ -106,9 +98,7 @@ def planar_record(
                 "kind": "rotation" if m.line is None else "line",
                 **(nowhere if m.line is None else _placed(m.line, scale)),
                 "center": numbers(m.center, scale),
-                "order": _order(m.order),
-                "residual": _residual(m.residual),
-                "excess": number(m.excess),
+                **_turned_down(m),
             }
             for m in d.near_misses
         ],
@@ -273,6 +263,11 @@ def _direction(direction: Array) -> list[float | str | None]:
 def _held(found: Any) -> Record:
     """How well what was found holds."""
     return {"residual": _residual(found.residual), "confidence": number(found.confidence)}
+
+
+def _turned_down(miss: Any) -> Record:
+    """What a near miss would be, and by how much it is none."""
+    return {"order": _order(miss.order), "residual": _residual(miss.residual), "excess": number(miss.excess)}
 
 
 def _sigma(direction_rad: float, place: str, length: float) -> Record:

@@ -36,10 +36,6 @@ class Closure:
     error_rad: float
     message: str
 
-    def operations(self) -> Array:
-        """The exact operations [order, 3, 3] of the group; [0, 3, 3] unless `finite`."""
-        return self.group.operations() if self.finite else np.zeros((0, 3, 3))
-
 
 def close(
     generators: ArrayLike,

@@ -34,13 +34,6 @@ class _Found:
         turn = [rotation if det > 0.0 else rotoreflection for det in self.dets]
         return np.array([f(u, a) for f, u, a in zip(turn, self.directions, angles, strict=True)])
 
-    def worst(self, errors_rad: Array) -> str:
-        """The element that fits worst and by how much, in words."""
-        i = int(np.argmax(errors_rad))
-        kind = "mirror" if self.orders[i] == 1 else f"{'C' if self.dets[i] > 0 else 'S'}{self.orders[i]:g} axis"
-        where = ", ".join(f"{x:.3f}" for x in self.directions[i])
-        return f"the {kind} along ({where}) is off by {np.degrees(errors_rad[i]):.2g} degrees"
-
 
 def from_elements(
     *,
@@ -137,8 +130,12 @@ def _revolution_axis(found: _Found) -> Array:
 
 
 def _check(found: _Found, errors_rad: Array, tolerance_rad: float, name: str) -> None:
-    if errors_rad.max() > tolerance_rad:
+    """Name the element that fits worst, if it is too far off."""
+    i = int(np.argmax(errors_rad))
+    if errors_rad[i] > tolerance_rad:
+        kind = "mirror" if found.orders[i] == 1 else f"{'C' if found.dets[i] > 0 else 'S'}{found.orders[i]:g} axis"
+        where = ", ".join(f"{x:.3f}" for x in found.directions[i])
         raise DegenerateShapeError(
             f"the elements do not generate {name} within {np.degrees(tolerance_rad):.2g} degrees: "
-            f"{found.worst(errors_rad)}"
+            f"the {kind} along ({where}) is off by {np.degrees(errors_rad[i]):.2g} degrees"
         )

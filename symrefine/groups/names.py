@@ -67,15 +67,10 @@ def _axial(text: str) -> tuple[str, float]:
         return "", 0
     letter, number, suffix = match.groups()
     fold = math.inf if number in ("inf", "∞") else int(number)
-    if letter == "s":
-        return _rotoreflection_family(fold, suffix)
+    if letter == "s":  # S_k generates C_kh for odd k, and the group S_2n of k = 2n elements for even k
+        if suffix or math.isinf(fold):
+            return "", 0
+        return ("Ch", fold) if fold % 2 else ("S", fold // 2)
     if suffix == "i":  # Cni is Cn with an inversion: S2n for odd n, and no name of its own for even n
         return ("S", fold) if letter == "c" and fold % 2 == 1 else ("", fold)
     return letter.upper() + suffix, fold
-
-
-def _rotoreflection_family(order: float, suffix: str) -> tuple[str, float]:
-    """S_k generates C_kh for odd k, and the group S_2n of k = 2n elements for even k."""
-    if suffix or math.isinf(order):
-        return "", 0
-    return ("Ch", order) if order % 2 else ("S", order // 2)

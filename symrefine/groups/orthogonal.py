@@ -119,7 +119,8 @@ def fit_frame(sources: Array, targets: Array, start: Array) -> Array:
     overlap = np.einsum("k,kji,kjl->il", sign, right, left)
     values, vectors = np.linalg.eigh(overlap + overlap.T)
     top = vectors[:, values > values[-1] - EXACT * (1.0 + abs(values[-1]))]
-    return rotation_matrix(nearest_in_span(top, q_start))
+    q = nearest_in_span(top, q_start)[None]
+    return np.asarray((_left(q)[0] @ _right(q * [1.0, -1.0, -1.0, -1.0])[0])[1:, 1:])
 
 
 def nearest_in_span(basis: Array, vector: Array) -> Array:
@@ -143,11 +144,6 @@ def register(operations: Array, group: Array, start: Array) -> tuple[Array, Arra
         if np.array_equal(index, previous):
             break
     return frame, errors
-
-
-def rotation_matrix(q: Array) -> Array:
-    """Rotation [3, 3], determinant +1, of the unit quaternion `q`."""
-    return np.asarray((_left(q[None])[0] @ _right(q[None] * [1.0, -1.0, -1.0, -1.0])[0])[1:, 1:])
 
 
 def _left(q: Array) -> Array:

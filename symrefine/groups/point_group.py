@@ -169,17 +169,6 @@ def point_group(name: str, frame: ArrayLike | None = None) -> PointGroup:
     return PointGroup(name=name, frame=np.eye(3) if frame is None else np.asarray(frame, dtype=np.float64))
 
 
-def fixed_subspace(group: PointGroup) -> Array:
-    """Orthonormal basis [d, 3] of the vectors every operation leaves alone; d is the rank of the n-tuple matrix.
-
-    C1 has d = 3, Cs has 2 (its plane), Cn and Cnv with n >= 2 have 1 (the axis), all others 0.
-    """
-    family, fold = group.symbol.family, group.symbol.fold
-    if fold == 1 and family in ("C", "Ch"):
-        return group.frame.copy() if family == "C" else group.frame[:2].copy()
-    return group.frame[2:].copy() if family in ("C", "Cv") else np.zeros((0, 3))
-
-
 def is_subgroup(a: PointGroup, b: PointGroup, tolerance_rad: float = EXACT) -> bool:
     """Whether every operation of `a` is, within `tolerance_rad`, an operation of `b`, both where they stand."""
     if b.is_finite and not a.is_finite:

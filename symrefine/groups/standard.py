@@ -5,7 +5,6 @@ include x. T, Td, Th, O, Oh have the cube axes along x, y, z; I and Ih have thre
 along (0, 1, golden ratio) and its cyclic permutations.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import permutations, product
@@ -67,12 +66,8 @@ def _polyhedral(family: str) -> Array:
     if family in keep:
         return np.asarray(signed[keep[family]])
     fifths = [rotation([0.0, 1.0, GOLDEN], 2.0 * np.pi * k / 5) for k in range(5)]
-    rotations = _products(signed[keep["T"]], fifths)
+    rotations = np.concatenate([fifth @ signed[keep["T"]] for fifth in fifths])
     return rotations if family == "I" else np.concatenate([rotations, -rotations])
-
-
-def _products(first: Array | Sequence[Array], second: Sequence[Array]) -> Array:
-    return np.asarray(np.asarray(second)[:, None] @ np.asarray(first)[None]).reshape(-1, 3, 3)
 
 
 @lru_cache(maxsize=512)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,13 +72,10 @@ class Content:
     first_index: int = 0
     split: bool = False
 
-    def point_name(self, row: int) -> str:
-        """Point as a message calls it: `point 7 (line 12)`, numbered as the format does."""
-        return _name("point", row + self.first_index, self.point_lines, row)
-
-    def face_name(self, row: int) -> str:
-        """Face as a message calls it: `face 7 (line 12)`, numbered as the format does."""
-        return _name("face", row + self.first_index, self.face_lines, row)
+    def name(self, kind: Literal["point", "face"], row: int) -> str:
+        """A point or a face as a message calls it: `point 7 (line 12)`, numbered as the format does."""
+        lines = self.point_lines if kind == "point" else self.face_lines
+        return f"{kind} {row + self.first_index}" + (f" (line {lines[row]})" if lines is not None else "")
 
 
 def polygons(rows: Iterable[Sequence[int]]) -> Polygons:
@@ -87,6 +84,11 @@ def polygons(rows: Iterable[Sequence[int]]) -> Polygons:
     corners = [corner for face in faces for corner in face]
     counts = [len(face) for face in faces]
     return Polygons(corners=np.array(corners, dtype=np.int64), counts=np.array(counts, dtype=np.int64))
+
+
+def are_whole(values: Values) -> NDArray[np.bool_]:
+    """Which values are whole numbers that float64 holds exactly."""
+    return (values == np.rint(values)) & (np.abs(values) <= 2.0**53)
 
 
 def as_float64(values: NDArray[Any]) -> Array:
@@ -100,7 +102,7 @@ def check_finite(content: Content) -> None:
     bad = np.flatnonzero(~(np.abs(content.points) <= LARGEST).all(axis=1))
     if bad.size:
         raise InputError(
-            f"{content.point_name(int(bad[0]))} is {content.points[bad[0]].tolist()} "
+            f"{content.name('point', int(bad[0]))} is {content.points[bad[0]].tolist()} "
             f"({bad.size} such of {len(content.points)}); coordinates must be finite and at most {LARGEST:g}: "
             "remove these points"
         )
@@ -118,7 +120,3 @@ def check_distinct(content: Content) -> None:
         raise InputError(
             f"coordinates differ by {spread:.3g} at most; a shape needs {SMALLEST:g}: give them in a smaller unit"
         )
-
-
-def _name(kind: str, number: int, lines: Sequence[int] | None, row: int) -> str:
-    return f"{kind} {number}" + (f" (line {lines[row]})" if lines is not None else "")

@@ -39,7 +39,6 @@ def read_image(data: bytes, suffix: str, *, threshold: Threshold | None, invert:
     """Pixels of the object in a picture, with their weights; what weighs nothing is left out.
 
     Args:
-        data: bytes of the file.
         suffix: one of `FORMATS`, which the content has to agree with.
         threshold: make the picture binary: the grey value that parts dark from light, or "otsu" to choose it.
         invert: exchange object and background.

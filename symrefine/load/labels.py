@@ -1,15 +1,14 @@
 """Fields of a file to classes that a symmetry must keep, and to weights."""
 
+from typing import Literal
+
 import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.colours import colour_classes
-from symrefine.load.content import Content, Values
+from symrefine.load.content import Content, Values, are_whole
 from symrefine.shape import Index
-
-# Whole numbers up to here are exact as float64.
-_LARGEST = 2.0**53
 
 
 def point_classes(content: Content, name: str) -> Index:
@@ -20,7 +19,7 @@ def point_classes(content: Content, name: str) -> Index:
     """
     key = _key(content, name, "labels")
     weights = np.ones(len(content.points)) if content.weights is None else content.weights
-    return _classes(content, key, False, weights)
+    return _classes(content, key, "point", weights)
 
 
 def triangle_classes(content: Content, name: str, owner: Index, corners: Index) -> Index:
@@ -39,12 +38,11 @@ def triangle_classes(content: Content, name: str, owner: Index, corners: Index) 
     a, b, c = (content.points[corners[:, k]] for k in range(3))
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     if key in content.face_fields:
-        covered = _sums(owner, areas, len(content.face_fields[key]))
-        return _classes(content, key, True, covered)[owner]
-    covered = _sums(corners.ravel(), np.repeat(areas, 3), len(content.points))
-    first, second, third = _classes(content, key, False, covered)[corners].T
-    chosen: Index = np.where(second == third, second, first)
-    return chosen
+        covered = np.bincount(owner, areas, minlength=len(content.face_fields[key])).astype(np.float64)
+        return _classes(content, key, "face", covered)[owner]
+    covered = np.bincount(corners.ravel(), np.repeat(areas, 3), minlength=len(content.points)).astype(np.float64)
+    first, second, third = _classes(content, key, "point", covered)[corners].T
+    return np.asarray(np.where(second == third, second, first))
 
 
 def point_weights(content: Content, name: str) -> Array:
@@ -72,21 +70,16 @@ def _key(content: Content, name: str, what: str) -> str:
     raise InputError(f"no {what} {name!r}; {told}")
 
 
-def _classes(content: Content, key: str, of_faces: bool, weights: Array) -> Index:
-    values = (content.face_fields if of_faces else content.point_fields)[key]
+def _classes(content: Content, key: str, kind: Literal["point", "face"], weights: Array) -> Index:
+    values = (content.face_fields if kind == "face" else content.point_fields)[key]
     if values.dtype.kind not in "US" and (row := _unfit(values)) is not None:
-        where = content.face_name(row) if of_faces else content.point_name(row)
         right = "whole numbers" if values.ndim == 1 else "finite colours from 0 on"
-        raise InputError(f"{key} of {where} is {values[row].tolist()}; labels are {right}")
+        raise InputError(f"{key} of {content.name(kind, row)} is {values[row].tolist()}; labels are {right}")
     if values.ndim == 2:
         return colour_classes(values, weights)
     if values.dtype.kind in "US":
         return np.unique(values, return_inverse=True)[1].reshape(-1).astype(np.int64)
     return values.astype(np.int64)
-
-
-def _sums(places: Index, amounts: Array, count: int) -> Array:
-    return np.bincount(places, amounts, minlength=count).astype(np.float64)
 
 
 def _unfit(values: Values) -> int | None:
@@ -95,7 +88,7 @@ def _unfit(values: Values) -> int | None:
         if values.ndim == 2:
             fit = (np.isfinite(values) & (values >= 0) & (values <= 65535)).all(axis=1)
         elif values.dtype.kind == "f":
-            fit = (values == np.rint(values)) & (np.abs(values) <= _LARGEST)
+            fit = are_whole(values)
         else:
             fit = np.ones(len(values), dtype=bool)
     bad = np.flatnonzero(~fit)

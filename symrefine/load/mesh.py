@@ -35,7 +35,7 @@ def mesh_arrays(content: Content, faces: Polygons, labels: str | None, source: s
     flat = negligible(points, triangles)
     if flat.all():
         raise InputError(
-            f"no face has an area (first: {content.face_name(int(owner[0]))}, corners "
+            f"no face has an area (first: {content.name('face', int(owner[0]))}, corners "
             f"{points[triangles[0]].tolist()}); a mesh needs faces that are not collapsed to a line or a point"
         )
     used, compact = np.unique(triangles[~flat], return_inverse=True)
@@ -53,7 +53,7 @@ def _check_range(content: Content, faces: Polygons) -> None:
         row = int(np.searchsorted(faces.starts, bad[0], side="right")) - 1
         first = content.first_index
         raise InputError(
-            f"{content.face_name(row)} refers to vertex {faces.corners[bad[0]] + first}; the file has "
+            f"{content.name('face', row)} refers to vertex {faces.corners[bad[0]] + first}; the file has "
             f"{len(content.points)} vertices, numbered {first} to {len(content.points) - 1 + first}"
         )
 

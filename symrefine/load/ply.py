@@ -4,7 +4,7 @@ import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
-from symrefine.load.content import Content, Polygons, Values, as_float64
+from symrefine.load.content import Content, Polygons, Values, are_whole, as_float64
 from symrefine.load.ply_body import Rows, read_rows
 from symrefine.load.ply_header import Element, parse_header
 
@@ -81,8 +81,7 @@ def _fields(element: Element, rows: Rows) -> dict[str, Values]:
 def _typed(values: Values, type_: str) -> Values:
     if values.dtype.kind != "f" or type_[0] not in "iu":
         return values
-    whole = (values == np.rint(values)) & (np.abs(values) < 2.0**53)
-    return values.astype(np.int64) if whole.all() else values
+    return values.astype(np.int64) if are_whole(values).all() else values
 
 
 def _stack(rows: Rows, names: tuple[str, ...]) -> Array:
@@ -94,8 +93,7 @@ def _polygons(rows: Rows, name: str) -> Polygons:
     counts = column.counts if column.counts is not None else np.empty(0, dtype=np.int64)
     corners = column.values
     # Text, and some binary files, give indices as floating-point numbers.
-    whole = (corners == np.rint(corners)) & (np.abs(corners) < 2.0**53) if corners.dtype.kind == "f" else True
-    if (bad := np.flatnonzero(np.logical_not(whole))).size:
+    if corners.dtype.kind == "f" and (bad := np.flatnonzero(~are_whole(corners))).size:
         row = int(np.searchsorted(np.cumsum(counts), bad[0], side="right"))
         at = f" (line {rows.lines[row]})" if rows.lines else ""
         raise InputError(f"face {row}{at} refers to vertex {corners[bad[0]]}; expected whole numbers")

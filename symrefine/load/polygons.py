@@ -26,7 +26,7 @@ def triangulate(content: Content, faces: Polygons) -> tuple[Index, Index]:
     few = np.flatnonzero(faces.counts < 3)
     if few.size:
         row = int(few[0])
-        raise InputError(f"{content.face_name(row)} has {faces.counts[row]} corners; expected at least 3")
+        raise InputError(f"{content.name('face', row)} has {faces.counts[row]} corners; expected at least 3")
     triples = np.flatnonzero(faces.counts == 3)
     quads = np.flatnonzero(faces.counts == 4)
     pieces = [_gather(faces, triples, 3), _quads(content, faces, quads)]
@@ -51,13 +51,11 @@ def negligible(points: Array, triangles: Index) -> Flags:
     reach = np.abs(np.stack([a, b, c])).max(axis=(0, 2))
     doubled_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     # |da x e| <= |e| |da|, da the rounding of the coordinates and of their differences.
-    small: Flags = doubled_area <= 8.0 * np.finfo(np.float64).eps * longest * (longest + reach)
-    return small
+    return np.asarray(doubled_area <= 8.0 * np.finfo(np.float64).eps * longest * (longest + reach))
 
 
 def _gather(faces: Polygons, rows: Index, corners: int) -> Index:
-    gathered: Index = faces.corners[faces.starts[rows][:, None] + np.arange(corners)]
-    return gathered
+    return np.asarray(faces.corners[faces.starts[rows][:, None] + np.arange(corners)])
 
 
 def _quads(content: Content, faces: Polygons, rows: Index) -> Index:
@@ -87,8 +85,7 @@ def _inside(points: Array, halves: Index, normal: Array) -> Flags:
     # The halves of a symmetric bow tie cancel: its normal is zero, though it has area.
     cancels = np.linalg.norm(normal, axis=1) <= FLAT * size.sum(axis=1)
     empty = negligible(points, halves.reshape(-1, 3)).reshape(-1, 2)
-    inside: Flags = (agrees | empty).all(axis=1) & (~cancels | empty.all(axis=1))
-    return inside
+    return np.asarray((agrees | empty).all(axis=1) & (~cancels | empty.all(axis=1)))
 
 
 def _polygon(points: Array) -> Index:
@@ -139,14 +136,14 @@ def _ears(a: Array, b: Array, c: Array) -> Flags:
     ab, bc, ca = (_cross((v - u)[:, None], b[None] - u[:, None]) for u, v in ((a, b), (b, c), (c, a)))
     # A corner on the diagonal would pinch what is left; one on the two sides belongs to a bridge to a hole.
     occupied = ((ab > tolerance) & (bc > tolerance) & (ca > -tolerance)).any(axis=1)
-    ears: Flags = (_cross(b - a, c - b) >= -tolerance) & ~occupied
-    return ears
+    return np.asarray((_cross(b - a, c - b) >= -tolerance) & ~occupied)
 
 
 def _cross(u: Array, v: Array) -> Array:
-    product: Array = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
-    return product
+    return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
 
 
 def _crossing(content: Content, row: int) -> InputError:
-    return InputError(f"the outline of {content.face_name(row)} crosses or folds over itself; split it into triangles")
+    return InputError(
+        f"the outline of {content.name('face', row)} crosses or folds over itself; split it into triangles"
+    )

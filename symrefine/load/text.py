@@ -42,7 +42,6 @@ def parse_table(
     """Rows of numbers as [N, n] float64, each as precise as it is written.
 
     Args:
-        lines: the rows.
         columns: numbers of columns that are right; any, if empty, as long as all rows agree.
         layout: what would be right, for messages.
         delimiter: between the columns; white space if None.

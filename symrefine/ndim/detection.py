@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from symrefine.decide.alternatives import NEAR
 from symrefine.errors import InputError
-from symrefine.geometry import Array, Plane, check_tolerance, read_only
+from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance
 from symrefine.moments.moments import shape_moments
 from symrefine.ndim import sampled as samples
 from symrefine.ndim.matched import Points
@@ -42,7 +42,7 @@ class Hyperplane:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SubspaceDetection:
+class SubspaceDetection(ReadOnly):
     """What `detect_nd` found.
 
     Attributes:
@@ -65,9 +65,6 @@ class SubspaceDetection:
     undetermined: str
     incomplete: str
     reflection_group_order: int | None
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "center", read_only(self.center))
 
 
 def detect_nd(

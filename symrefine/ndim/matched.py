@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.fit.refine import MAX_OUTER
-from symrefine.geometry import Array, read_only
+from symrefine.geometry import Array, ReadOnly
 from symrefine.moments.moments import BLOCK
 from symrefine.ndim.roots import MOST
 
@@ -26,16 +26,12 @@ FIRST = 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Points:
+class Points(ReadOnly):
     """Points [N, n] about the centre with masses [N], and the diameter that misses are measured by."""
 
     points: Array
     masses: Array
     diameter: float
-
-    def __post_init__(self) -> None:
-        for name in ("points", "masses"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def foreign(self) -> Array:

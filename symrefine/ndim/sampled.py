@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from symrefine.decide.hypotheses import MOVED, MOVED_EACH
 from symrefine.geometry import Array
@@ -157,8 +158,6 @@ class Neighbours:
 
     def __init__(self, points: Array, diameter: float, rng: np.random.Generator) -> None:
         """Split points [N, n] about the centre into some to ask about and others to find nearby."""
-        from scipy.spatial import cKDTree
-
         order = rng.permutation(len(points))
         asked = min(MOVED_EACH, len(points) // 2)
         self.asked = points[order[:asked]]

@@ -23,15 +23,7 @@ HIGH_DIM = 6
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Search:
-    """Unit normals of hyperplanes through the centre.
-
-    Attributes:
-        holds: those that hold.
-        rejected: those that do not.
-        incomplete: reasons why there may be others that hold.
-        order: of the group that the reflections generate; None if they generate others that do not hold.
-        undetermined: why nothing is decided; empty if it is.
-    """
+    """Unit normals of the hyperplanes through the centre that hold, and of others; the rest as `SubspaceDetection`."""
 
     holds: list[Array]
     rejected: list[Array]

@@ -34,12 +34,7 @@ class Label:
 def picture_png(
     detection: Detection, shape: Shape, *, width: int = 1200, height: int = 900, title: bool = True
 ) -> bytes:
-    """PNG of the shape with the planes and axes that were found.
-
-    Args:
-        width, height: in pixels.
-        title: whether the picture says above what it shows.
-    """
+    """PNG of `width` x `height` pixels: the shape with the planes and axes that were found, told above with `title`."""
     scene = _shown(make_scene(detection, shape))
     top = 76 if title else 0
     camera = look_at(scene, aspect=width / (height - top), fov_rad=FOV_RAD, fill=0.88)

@@ -116,20 +116,13 @@ def _lit(raster: Raster, depth: Array, surface: Surface, camera: Camera) -> Arra
 def _crease(depth: Array, scale: float) -> Array:
     """Eye-dome lighting [H, W]: a pixel is darker the farther it lies behind those around it."""
     steps = np.where(np.isfinite(depth), depth / scale, 1e9)
-    dark = np.zeros(depth.shape)
+    dark, (height, width) = np.zeros(depth.shape), depth.shape
     for reach, weight in ((2 * FINER, 1.0), (5 * FINER, 0.5)):
+        beside = np.pad(steps, reach, constant_values=np.inf)  # behind everything
         for dy, dx in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
-            to, source = _overlap(depth.shape, dy * reach, dx * reach)
-            dark[to] += weight * np.clip(steps[to] - steps[source], 0.0, 1.0)
+            other = beside[(1 + dy) * reach :, (1 + dx) * reach :][:height, :width]
+            dark += weight * np.clip(steps - other, 0.0, 1.0)
     return np.asarray(np.exp(-0.13 * dark))
-
-
-def _overlap(shape: tuple[int, ...], dy: int, dx: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-    """The pixels that have a neighbour at (dy, dx), and these neighbours."""
-    h, w = shape
-    to = slice(max(0, -dy), h - max(0, dy)), slice(max(0, -dx), w - max(0, dx))
-    source = slice(max(0, dy), h + min(0, dy)), slice(max(0, dx), w + min(0, dx))
-    return to, source
 
 
 def _trace(picture: Array, depth: Array, quad: Quad, pixels: Pixels) -> None:

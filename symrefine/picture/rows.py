@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from symrefine.detection.result import Detection, FoundAxis, FoundPlane
+from symrefine.detection.result import Detection
 from symrefine.picture.scene import AXIS, MISS, Colour, plane_colour
 from symrefine.picture.words import direction, kind_name, order_name
 from symrefine.surface.misses import Deviation
@@ -26,21 +26,21 @@ class Row:
 def found_rows(detection: Detection) -> list[Row]:
     """Planes, then axes, then the inversion."""
     rows = [
-        _row(str(k + 1), plane_colour(k), kind_name("plane"), direction(p.plane.normal), p)
+        _row(str(k + 1), plane_colour(k), kind_name("plane"), direction(p.plane.normal), p.residual, p.confidence)
         for k, p in enumerate(detection.planes)
     ]
     for a in detection.axes:
         kind = kind_name("improper" if a.improper else "axis", a.order)
-        rows.append(_row(order_name(a.order, a.improper), AXIS, kind, direction(a.axis.direction), a))
+        name = order_name(a.order, a.improper)
+        rows.append(_row(name, AXIS, kind, direction(a.axis.direction), a.residual, a.confidence))
     miss, sure = detection.inversion_residual, detection.inversion_confidence
     if miss is None or sure is None:
         return rows
-    about = "about the centre"
-    return [*rows, Row(name="i", colour=AXIS, kind=kind_name("inversion"), vector=about, residual=miss, score=sure)]
+    return [*rows, _row("i", AXIS, kind_name("inversion"), "about the centre", miss, sure)]
 
 
-def _row(name: str, colour: Colour, kind: str, vector: str, found: FoundPlane | FoundAxis) -> Row:
-    return Row(name=name, colour=colour, kind=kind, vector=vector, residual=found.residual, score=found.confidence)
+def _row(name: str, colour: Colour, kind: str, vector: str, residual: Deviation, score: float) -> Row:
+    return Row(name=name, colour=colour, kind=kind, vector=vector, residual=residual, score=score)
 
 
 def near_miss_rows(detection: Detection) -> list[Row]:
@@ -48,6 +48,6 @@ def near_miss_rows(detection: Detection) -> list[Row]:
     rows = []
     for k, m in enumerate(detection.near_misses, start=1):
         order = f" {order_name(m.order, m.kind == 'improper')}" if m.kind in ("axis", "improper") else ""
-        kind, where = kind_name(m.kind, m.order) + order, direction(m.direction)
-        rows.append(Row(name=str(k), colour=MISS, kind=kind, vector=where, residual=m.residual, score=m.excess))
+        kind = kind_name(m.kind, m.order) + order
+        rows.append(_row(str(k), MISS, kind, direction(m.direction), m.residual, m.excess))
     return rows

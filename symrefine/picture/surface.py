@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from symrefine.geometry import Array, ReadOnly
 from symrefine.moments.quadrature import triangle_areas_and_normals
@@ -75,8 +76,6 @@ def _tinted(points: Array, planes: tuple[Quad, ...], width: float) -> Array:
 
 def _spacing(points: Array) -> float:
     """Typical distance from a point to its fourth neighbour, as a fraction of the diagonal, within reason."""
-    from scipy.spatial import cKDTree
-
     distance, _ = cKDTree(points).query(points[:: max(1, len(points) // 2000)], k=min(5, len(points)))
     return float(np.clip(np.median(distance[:, -1]), 0.003, 0.02))
 
@@ -85,8 +84,6 @@ def _normals(points: Array) -> Array:
     """Unit normals [N, 3] of planes fitted to neighbours; zero for clouds too thin to tell."""
     if len(points) < FEWEST_FOR_NORMALS:
         return np.zeros(points.shape)
-    from scipy.spatial import cKDTree
-
     _, near = cKDTree(points).query(points, k=NEIGHBOURS)
     spread = points[near] - points[near].mean(axis=1, keepdims=True)
     return np.asarray(np.linalg.eigh(np.einsum("nki,nkj->nij", spread, spread))[1][:, :, 0])

@@ -35,7 +35,8 @@ _AXIAL = {
     "Dd": "{mirrors} through {axis}, {half_turns} between them",
 }
 _COUNTS = "no one two three four five six seven eight nine ten eleven twelve".split()
-_TUPLES = {
+# What the rank of the n-tuples allows.
+TUPLES = {
     "none": "span space: no mirror plane and no axis is possible",
     "plane": "lie in one plane, within their noise: a mirror plane at most",
     "axis": "lie on one line, within their noise: where to look first",
@@ -88,11 +89,6 @@ def fit(detection: Detection) -> str:
         f"Under {each}, 95 % of the surface meets itself within {percent(max(*misses, 1e-4))} of the diagonal; "
         f"{percent(detection.tolerance)} is allowed."
     )
-
-
-def tuples_meaning(kind: str) -> str:
-    """What the rank of the n-tuples allows."""
-    return _TUPLES[kind]
 
 
 def kind_name(kind: str, order: float = 0.0) -> str:

@@ -10,12 +10,12 @@ from symrefine.clock import Clock
 from symrefine.decide.alternatives import BEYOND, NEAR, Alternative, alternatives
 from symrefine.decide.posterior import PICTURE, Decision, Link, decide
 from symrefine.errors import InputError
-from symrefine.geometry import Array, Plane, check_tolerance, read_only
+from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance
 from symrefine.groups import PointGroup2D
 from symrefine.moments.moments import Moments, shape_moments
-from symrefine.ntuples.contract import NTuples
+from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.plane.chain import Hypothesis, chain, explore
-from symrefine.plane.doublets import ORDER, DoubletClass, classify_doublets, planar_doublets
+from symrefine.plane.doublets import ORDER, PLANAR_ORDERS, DoubletClass, classify_doublets
 from symrefine.plane.outline import NOISES, Outlines, make_outlines
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE, Deviation
@@ -57,7 +57,7 @@ class PlanarNearMiss:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PlanarDetection:
+class PlanarDetection(ReadOnly):
     """Everything `detect_planar` found, in the frame and units of the input.
 
     Attributes:
@@ -92,9 +92,6 @@ class PlanarDetection:
     diagonal: float
     undetermined: str
     timings: dict[str, float] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "center", read_only(self.center))
 
 
 def detect_planar(
@@ -212,7 +209,7 @@ def _report(
             for e in _turned_down(pool, chosen)
         ),
         doublets=doublets,
-        vectors=planar_doublets(moments),
+        vectors=ntuples(moments, PLANAR_ORDERS),
         tolerance=tolerance,
         diagonal=outlines.diagonal * scale,
         undetermined=reason,

@@ -5,9 +5,9 @@ from typing import Literal
 
 import numpy as np
 
-from symrefine.geometry import Array, read_only
+from symrefine.geometry import Array, ReadOnly
 from symrefine.moments.moments import Moments
-from symrefine.ntuples.contract import NTuples, ntuples
+from symrefine.ntuples.contract import ntuples
 from symrefine.ntuples.rank import FLOOR, fixed_subspace
 from symrefine.surface.misses import TOLERANCE
 
@@ -19,7 +19,7 @@ _KINDS: tuple[DoubletKind, ...] = ("centre", "line", "none")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class VectorDoublets:
+class VectorDoublets(ReadOnly):
     """The doublets of one vector of moments.
 
     Attributes:
@@ -34,10 +34,6 @@ class VectorDoublets:
     singular_values: Array
     vanish: bool
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "doublets", read_only(self.doublets))
-        object.__setattr__(self, "singular_values", read_only(self.singular_values))
-
     @property
     def ratio(self) -> float:
         """Larger over smaller singular value: the larger, the closer the doublets are to a line; inf on a line."""
@@ -47,7 +43,7 @@ class VectorDoublets:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class DoubletClass:
+class DoubletClass(ReadOnly):
     """What all doublets together say.
 
     Attributes:
@@ -65,15 +61,6 @@ class DoubletClass:
     angle_rad: float
     vectors: tuple[VectorDoublets, ...]
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "singular_values", read_only(self.singular_values))
-        object.__setattr__(self, "significance", read_only(self.significance))
-
-
-def planar_doublets(moments: Moments) -> NTuples:
-    """All doublets of the paper's ten vectors."""
-    return ntuples(moments, PLANAR_ORDERS)
-
 
 def classify_doublets(moments: Moments, tolerance: float, pixel_noise: float) -> DoubletClass:
     """Rank of the doublets against sampling noise (jackknife), or against tolerance and pixels where they are exact.
@@ -84,7 +71,7 @@ def classify_doublets(moments: Moments, tolerance: float, pixel_noise: float) ->
         pixel_noise: what pixels add to a moment, as a fraction of its bound; 0 for other points.
     """
     floor = float(np.hypot(FLOOR * tolerance / TOLERANCE, pixel_noise))
-    fixed = fixed_subspace(planar_doublets(moments), floor=floor)
+    fixed = fixed_subspace(ntuples(moments, PLANAR_ORDERS), floor=floor)
     along = fixed.directions[0]
     each = [(orders, ntuples(moments, [orders])) for orders in PLANAR_ORDERS]
     owns = [fixed_subspace(tuples, floor=floor) for _, tuples in each]

@@ -151,7 +151,9 @@ def _of_points(points: Array, weights: Array | None, rng: np.random.Generator) -
     diagonal = smallest_diagonal(points)
     parts = [p for p in _levels(points, masses) if few or len(p) > FEW]
     if few:
-        surfaces = [Surface(cloud=isolated_points(_two(p)), diagonal=diagonal) for p in parts]
+        # A single point counts twice, so that it has a neighbour.
+        clouds = [isolated_points(p if len(p) > 1 else np.repeat(p, 2, axis=0)) for p in parts]
+        surfaces = [Surface(cloud=cloud, diagonal=diagonal) for cloud in clouds]
     else:
         surfaces = [_sampled(p, diagonal, rng) for p in parts]
     return Outlines(surfaces=tuple(surfaces), sampled=not few, pixel_noise=0.0)
@@ -170,11 +172,6 @@ def _levels(points: Array, weights: Array) -> list[Array]:
     heavy = weights / np.quantile(weights, 0.95)
     by_count = {int(c.sum()): points[c] for c in (heavy >= level for level in (0.0, *sorted(LEVELS)))}
     return [some for count, some in by_count.items() if count]
-
-
-def _two(points: Array) -> Array:
-    """A single point twice, so that it has a neighbour."""
-    return points if len(points) > 1 else np.repeat(points, 2, axis=0)
 
 
 def smallest_diagonal(points: Array) -> float:

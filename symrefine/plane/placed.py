@@ -11,22 +11,19 @@ from symrefine.fit.gauss_newton import Linearisation, minimise
 from symrefine.fit.matching import match, pair_equations
 from symrefine.fit.placed import FITTED, FREE_TURNS, evenly, wide_angle_rad
 from symrefine.fit.refine import MAX_OUTER, SETTLED
-from symrefine.geometry import Array, Isometry, Plane, read_only
+from symrefine.geometry import Array, Isometry, Plane, ReadOnly
 from symrefine.groups import PointGroup2D
 from symrefine.plane.outline import Outlines
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Placed:
+class Placed(ReadOnly):
     """Cn, Dn (`mirrored`) or, for fold inf, O(2) about a centre, one mirror line at `angle_rad` to the x axis."""
 
     fold: float
     mirrored: bool
     center: Array
     angle_rad: float = 0.0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "center", read_only(self.center))
 
     @property
     def group(self) -> PointGroup2D:

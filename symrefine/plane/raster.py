@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from symrefine.geometry import Array, read_only
+from symrefine.geometry import Array, ReadOnly
 from symrefine.shape import Index
 from symrefine.surface.noise import ASKED
 
@@ -17,17 +18,13 @@ _OFF = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Raster:
+class Raster(ReadOnly):
     """Weights [H, W] on a square grid; the cell (row, column) is centred at `origin + column * step + row * turned`,
     where `turned` is `step` turned by +90 degrees."""
 
     values: Array
     origin: Array
     step: Array
-
-    def __post_init__(self) -> None:
-        for name in ("values", "origin", "step"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def pitch(self) -> float:
@@ -44,11 +41,8 @@ def raster_of(points: Array, weights: Array | None) -> Raster | None:
     """The grid that points [N, 2] stand on, upright or turned, or None: they are samples or stand for themselves."""
     if len(points) < FEWEST:
         return None
-    step = _upright_step(points)
-    found = None if step is None else _on_grid(points, step)
-    if found is None:
-        step = _turned_step(points)
-        found = None if step is None else _on_grid(points, step)
+    steps = (step for find in (_upright_step, _turned_step) if (step := find(points)) is not None)
+    found = next((grid for step in steps if (grid := _on_grid(points, step)) is not None), None)
     if found is None:
         return None
     row, column, origin, step = found
@@ -65,8 +59,6 @@ def _upright_step(points: Array) -> Array | None:
 
 def _turned_step(points: Array) -> Array | None:
     """The step whose direction and length the nearest neighbours agree on."""
-    from scipy.spatial import cKDTree
-
     some = points[:: max(1, len(points) // ASKED)]
     distance, near = cKDTree(points).query(some, k=2)
     pitch = float(np.median(distance[:, 1]))

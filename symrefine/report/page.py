@@ -10,7 +10,7 @@ from symrefine.detection.result import Detection
 from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.picture.measures import rms_series, series, turn_series_deg
 from symrefine.picture.rows import found_rows, near_miss_rows
-from symrefine.picture.words import coordinates, fit, headline, meaning, percent, symbol, tuples_meaning
+from symrefine.picture.words import TUPLES, coordinates, fit, headline, meaning, percent, symbol
 from symrefine.report.charts import bar_chart, line_chart
 from symrefine.report.style import STYLE
 from symrefine.shape import Shape
@@ -89,8 +89,6 @@ def _found(d: Detection) -> str:
         )
         for r in found_rows(d)
     ]
-    if not rows:
-        return ""
     told = (
         "Each element maps the surface onto an image of itself. The columns say by how much "
         "that image misses the surface, in % of the diagonal: on average, for the best 95 % and 99 % of the surface, "
@@ -98,24 +96,20 @@ def _found(d: Detection) -> str:
         f"The bar shows the 95 % column against the {percent(LIMITS[1] * d.tolerance)} that is allowed."
     )
     heads = ("", "kind", "normal or direction", *_MISS_NAMES, "95 % and its limit", "confidence")
-    return _section("What was found, and how well it holds", told, _table(heads, rows))
+    return _listed("What was found, and how well it holds", told, heads, rows)
 
 
 def _near_misses(d: Detection) -> str:
-    if not d.near_misses:
-        return ""
     rows = [(r.name, r.kind, _code(r.vector), *_misses(r.residual), f"{r.score:.2f}") for r in near_miss_rows(d)]
     told = (
         "Candidates that were refined and turned down, best first. The last column is by how many times the worst of "
         "their statistics exceeds what the tolerance allows."
     )
     heads = ("", "kind", "normal or direction", *_MISS_NAMES, "times the limit")
-    return _section("Near misses", told, _table(heads, rows))
+    return _listed("Near misses", told, heads, rows)
 
 
 def _alternatives(d: Detection) -> str:
-    if not d.alternatives:
-        return ""
     rows = [
         (escape(symbol(a.point_group)), f"{100 * a.probability:.0f} %", escape(percent(a.forgiven)))
         for a in d.alternatives
@@ -124,7 +118,7 @@ def _alternatives(d: Detection) -> str:
         f"The answer has a probability of {100 * d.confidence:.0f} %. These groups are what the object may have been "
         "meant to have instead, with what their worst element misses by: the tolerance that would have to be granted."
     )
-    return _section("What else it may be", told, _table(("group", "probability", "to be forgiven"), rows))
+    return _listed("What else it may be", told, ("group", "probability", "to be forgiven"), rows)
 
 
 def _staircase(d: Detection) -> str:
@@ -170,7 +164,7 @@ def _tuples(d: Detection) -> str:
     ]
     told = (
         f"{len(d.vectors.vectors)} vectors made of moments (n-tuples) turn with the shape, so a symmetry leaves all of "
-        f"them in place. Here they {tuples_meaning(d.tuples.kind)}. The bars are their singular values over the noise "
+        f"them in place. Here they {TUPLES[d.tuples.kind]}. The bars are their singular values over the noise "
         "that sampling leaves."
     )
     chart = bar_chart("Singular values of the n-tuples over their noise", rows, SIGNIFICANT, "significant from here")
@@ -194,10 +188,14 @@ def _section(title: str, told: str, body: str) -> str:
     return f"<section><h2>{escape(title)}</h2><p>{escape(told)}</p>{body}</section>"
 
 
-def _table(heads: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
+def _listed(title: str, told: str, heads: Iterable[str], rows: Sequence[Sequence[str]]) -> str:
+    """A section with a table, or nothing where there are no rows."""
+    if not rows:
+        return ""
     head = "".join(f"<th>{escape(h)}</th>" for h in heads)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
-    return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+    table = f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+    return _section(title, told, table)
 
 
 def _misses(residual: Deviation) -> list[str]:

@@ -5,20 +5,16 @@ from dataclasses import dataclass
 
 from symrefine.study.experiment import Experiment, Row
 from symrefine.study.plan import chosen
-from symrefine.study.schema import Claim, Study
-from symrefine.study.summary import EMPTY, Measure, Summary, read_expectation, read_measure, short, summarise
+from symrefine.study.schema import Claim
+from symrefine.study.summary import EMPTY, Summary, short, summarise
 from symrefine.study.tables import grid
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """A claim with its figures.
+    """A claim with our figure and those of others, by name.
 
-    Attributes:
-        claim: as the config states it.
-        ours: our figure.
-        peers: those of others, by name.
-        met: whether ours is as expected; None where nothing is expected or nothing was run.
+    `met` is whether ours is as expected; None where nothing is expected or nothing was run.
     """
 
     claim: Claim
@@ -27,34 +23,16 @@ class Verdict:
     met: bool | None
 
 
-def check_claims(study: Study) -> list[Measure]:
-    """The measures of all claims.
-
-    Raises:
-        InputError: aggregates or comparisons that do not exist.
-    """
-    for claim in study.claims:
-        if claim.expect:
-            read_expectation(claim.node.at("expect"), claim.expect)
-    return [_measure(claim) for claim in study.claims]
-
-
-def _measure(claim: Claim) -> Measure:
-    return read_measure(claim.node.at("value"), claim.value)
-
-
 def judge(claim: Claim, rows: Sequence[Row], experiment: Experiment) -> Verdict:
     """Our figure and those of others, and whether ours is as expected; a failed run of ours is a miss."""
     own, *others = (
         chosen(chosen(rows, claim.where, experiment), who, experiment) for who in (claim.ours, *claim.peers.values())
     )
-    measure = _measure(claim)
-    ours = summarise(own, measure)
+    ours = summarise(own, claim.value)
     met = None
-    if claim.expect and own:
-        expected = read_expectation(claim.node.at("expect"), claim.expect)
-        met = expected.holds(ours) and all(row["error"] is None for row in own)
-    peers = {name: summarise(theirs, measure) for name, theirs in zip(claim.peers, others, strict=True)}
+    if claim.expect.said and own:
+        met = claim.expect.holds(ours) and all(row["error"] is None for row in own)
+    peers = {name: summarise(theirs, claim.value) for name, theirs in zip(claim.peers, others, strict=True)}
     return Verdict(claim=claim, ours=ours, peers=peers, met=met)
 
 
@@ -67,8 +45,8 @@ def verdict_rows(verdicts: Sequence[Verdict]) -> list[Row]:
             "paper": v.claim.paper,
             "ours": v.ours.text,
             "peers": "; ".join(f"{name}: {peer.text}" for name, peer in v.peers.items()),
-            "value": v.claim.value,
-            "expected": v.claim.expect,
+            "value": v.claim.value.node.value,
+            "expected": v.claim.expect.said,
             "met": v.met,
             "unit": v.claim.unit,
             "note": v.claim.note,
@@ -87,7 +65,7 @@ def claims_table(verdicts: Sequence[Verdict], *, source: bool = True) -> str:
 def _line(verdict: Verdict, peers: Sequence[str], *, source: bool) -> list[str]:
     claim = verdict.claim
     figures = [verdict.peers[name].text if name in verdict.peers else "" for name in peers]
-    word = "" if verdict.met is None else f"{'yes' if verdict.met else '**no**'} ({claim.expect})"
+    word = "" if verdict.met is None else f"{'yes' if verdict.met else '**no**'} ({claim.expect.said})"
     unit = f" {claim.unit}" if claim.unit else ""
     shown = [text + unit if text not in ("", EMPTY) else text for text in (verdict.ours.text, *figures)]
     paper = claim.paper if isinstance(claim.paper, str) else short(claim.paper) + unit

@@ -27,12 +27,8 @@ class Node:
         """The node under a key path; the last one that is there."""
         node = self
         for key in keys:
-            inside = (
-                node.value
-                if isinstance(node.value, dict)
-                else dict(enumerate(node.value if isinstance(node.value, list) else []))
-            )
-            if key not in inside:
+            inside = dict(enumerate(node.value)) if isinstance(node.value, list) else node.value
+            if not isinstance(inside, dict) or key not in inside:
                 return node
             node = inside[key]
         return node
@@ -83,32 +79,26 @@ def _node(value: Any, source: str, line: int | None, path: str, depth: int) -> N
         for key, inner in value.items():
             if not isinstance(key, str):
                 raise InputError(f"{place}: {path or 'config'}: keys are text, got {key!r}")
-            below = None if line is None else _line(value, "key", key, line)
-            inside[key] = _node(inner, source, below, f"{path}.{key}" if path else key, depth + 1)
+            inside[key] = _node(
+                inner, source, _line(value, "key", key, line), f"{path}.{key}" if path else key, depth + 1
+            )
     elif isinstance(value, list):
-        inside = []
-        for i, inner in enumerate(value):
-            below = None if line is None else _line(value, "item", i, line)
-            inside.append(_node(inner, source, below, f"{path}[{i}]", depth + 1))
+        below = [_line(value, "item", i, line) for i in range(len(value))]
+        inside = [_node(inner, source, below[i], f"{path}[{i}]", depth + 1) for i, inner in enumerate(value)]
     else:
-        inside = _scalar(value)
+        # Of the plain type that it stands for: ruamel remembers how a number was written.
+        inside = next((kind(value) for kind in (bool, int, float, str) if isinstance(value, kind)), value)
     return Node(value=inside, place=place, path=path)
 
 
-def _line(holder: Any, kind: str, key: str | int, line: int) -> int:
+def _line(holder: Any, kind: str, key: str | int, line: int | None) -> int | None:
     """Line of an entry, counted from 1; that of its holder for entries merged in from elsewhere."""
+    if line is None:
+        return None
     try:
         return int(getattr(holder.lc, kind)(key)[0]) + 1
     except (KeyError, TypeError):
         return line
-
-
-def _scalar(value: Any) -> Any:
-    """Of the plain type that it stands for: ruamel remembers how a number was written."""
-    for kind in (bool, int, float, str):
-        if isinstance(value, kind):
-            return kind(value)
-    return value
 
 
 def override(root: Node, settings: Sequence[str]) -> Node:

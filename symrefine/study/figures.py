@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from symrefine.study.experiment import Experiment, Row
 from symrefine.study.plan import chosen
 from symrefine.study.schema import Figure, Study
-from symrefine.study.summary import Measure, read_measure, short, summarise
+from symrefine.study.summary import Measure, short, summarise
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +32,7 @@ def check_figures(study: Study, experiment: Experiment) -> list[Measure]:
     """The measures of all figures, without those of traces.
 
     Raises:
-        InputError: kinds, fields or aggregates that do not exist.
+        InputError: kinds or fields that do not exist.
     """
     measures = []
     for figure in study.figures:
@@ -41,22 +41,14 @@ def check_figures(study: Study, experiment: Experiment) -> list[Measure]:
         if figure.by:
             experiment.field(figure.by, figure.node.at("by"))
         if figure.kind != "convergence":
-            measures.append(read_measure(figure.node.at("y"), figure.y))
-            measures.append(Measure(how="", column=figure.x, node=figure.node.at("x")))
+            measures += [figure.y, Measure(how="", column=figure.x, node=figure.node.at("x"))]
         elif experiment.trace is None:
             raise figure.node.at("kind").error(f"{experiment.name} has no `trace` for a convergence plot")
     return measures
 
 
 def draw(figure: Figure, rows: Sequence[Row], experiment: Experiment, path: Path) -> None:
-    """Write a figure as PNG.
-
-    Args:
-        figure: what to draw.
-        rows: of the runs, or of their iterations for a convergence plot.
-        experiment: whose fields `where` names.
-        path: of the picture.
-    """
+    """Write a figure as PNG; `rows` are those of the runs, or of their iterations for a convergence plot."""
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Canvas
@@ -69,7 +61,7 @@ def draw(figure: Figure, rows: Sequence[Row], experiment: Experiment, path: Path
         names = list(dict.fromkeys(row[figure.by] for row in done)) if figure.by else [None]
         groups = {name: [row for row in done if not figure.by or row[figure.by] == name] for name in names}
         {"line": _lines, "bar": _bars, "convergence": _runs}[figure.kind](axes, figure, groups)
-        axes.set(title=figure.title, xlabel=figure.x_label or figure.x, ylabel=figure.y_label or figure.y)
+        axes.set(title=figure.title, xlabel=figure.x_label or figure.x, ylabel=figure.y_label or figure.y.node.value)
         if figure.log:
             axes.set_yscale("log")
         if len(groups) > 1:
@@ -85,12 +77,11 @@ def _lines(axes: "Axes", figure: Figure, groups: Mapping[Any, Sequence[Row]]) ->
 
 def _points(figure: Figure, rows: Sequence[Row]) -> list[tuple[Any, Any]]:
     """(x, y) for each value of x that has a y, in order."""
-    measure = read_measure(figure.node.at("y"), figure.y)
     values = [value for row in rows if (value := row.get(figure.x)) is not None]
     steps = list(dict.fromkeys(values))
     if not any(isinstance(value, str) for value in steps):
         steps.sort()
-    found = [(x, summarise([row for row in rows if row.get(figure.x) == x], measure).values) for x in steps]
+    found = [(x, summarise([row for row in rows if row.get(figure.x) == x], figure.y).values) for x in steps]
     return [(x, values[0]) for x, values in found if values]
 
 
@@ -112,8 +103,8 @@ def _runs(axes: "Axes", figure: Figure, groups: Mapping[Any, Sequence[Row]]) -> 
         look = _look(i)
         runs: dict[Any, dict[Any, Any]] = {}
         for row in rows:
-            if row.get(figure.x) is not None and row.get(figure.y) is not None:
-                runs.setdefault(row["run"], {})[row[figure.x]] = row[figure.y]
+            if row.get(figure.x) is not None and row.get(figure.y.column) is not None:
+                runs.setdefault(row["run"], {})[row[figure.x]] = row[figure.y.column]
         for run in runs.values():
             axes.plot(list(run), list(run.values()), color=look["color"], alpha=0.25, lw=0.9)
         steps = sorted({x for run in runs.values() for x in run})

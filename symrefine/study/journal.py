@@ -38,7 +38,6 @@ def opened(path: Path, stamp: Stamp, *, replace: bool) -> Iterator[tuple[dict[in
     """The finished runs by index, and the journal to append to; nobody else can write to it meanwhile.
 
     Args:
-        path: of the journal; it is made if it is not there.
         stamp: of the rows to come.
         replace: whether rows with another stamp are dropped instead of refused.
 

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields
 from itertools import product
 from pathlib import Path
@@ -25,8 +25,7 @@ class Plan:
 
     Attributes:
         study: the config, with what the command line put in.
-        experiment: the module.
-        cases: instances of its `Case`, in the order of the sweep.
+        cases: instances of the experiment's `Case`, in the order of the sweep.
         config_hash: of the experiment's name and all cases: what decides the rows.
         changed: whether the quick version or the command line changed the config.
     """
@@ -42,7 +41,6 @@ def make_plan(path: Path, settings: Sequence[str] = (), *, quick: bool = False) 
     """Read a config, put in its quick version and what the command line sets, and list the cases.
 
     Args:
-        path: of the YAML file.
         settings: `KEY.KEY=VALUE`, applied after the quick version.
         quick: whether the config's `quick` section is applied.
 
@@ -160,8 +158,8 @@ def _case(nodes: Mapping[str, Node], root: Node, experiment: Experiment) -> Any:
     return case
 
 
-def select(where: Node, experiment: Experiment) -> Mapping[str, frozenset[Any]]:
-    """Which values of which fields a `where` picks.
+def select(where: Node, experiment: Experiment) -> Callable[[Row], bool]:
+    """Whether a `where` picks a row, or the fields of a case.
 
     Raises:
         InputError: an unknown field, a value of the wrong type.
@@ -170,15 +168,9 @@ def select(where: Node, experiment: Experiment) -> Mapping[str, frozenset[Any]]:
     for name, node in mapping(where).items():
         kind = experiment.field(name, node)
         picked[name] = frozenset(scalar(inner, kind) for inner in spread(node))
-    return picked
-
-
-def matches(row: Row, picked: Mapping[str, frozenset[Any]]) -> bool:
-    """Whether a row, or the fields of a case, is among those picked."""
-    return all(row[name] in values for name, values in picked.items())
+    return lambda row: all(row[name] in values for name, values in picked.items())
 
 
 def chosen(rows: Sequence[Row], where: Node, experiment: Experiment) -> list[Row]:
     """The rows that a `where` picks."""
-    picked = select(where, experiment)
-    return [row for row in rows if matches(row, picked)]
+    return list(filter(select(where, experiment), rows))

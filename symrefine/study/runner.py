@@ -9,12 +9,12 @@ from typing import Any
 
 from symrefine.errors import InputError
 from symrefine.files import replacing
-from symrefine.study.claims import Verdict, check_claims, claims_table, judge, verdict_rows
+from symrefine.study.claims import Verdict, claims_table, judge, verdict_rows
 from symrefine.study.document import Node
 from symrefine.study.experiment import Row
 from symrefine.study.figures import check_figures, draw
 from symrefine.study.journal import Entry, Stamp, opened
-from symrefine.study.plan import Plan, matches, select
+from symrefine.study.plan import Plan, select
 from symrefine.study.summary import Measure, check_columns
 from symrefine.study.tables import check_tables, csv_text, markdown
 from symrefine.study.versions import code_version, library_versions
@@ -27,16 +27,8 @@ Progress = Callable[[str, int, int], AbstractContextManager[Callable[[], None]]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What a study came to.
-
-    Attributes:
-        folder: where everything was written.
-        rows: of the finished runs, in the order of the sweep.
-        verdicts: of the claims.
-        tables: Markdown, as in tables.md.
-        figures: titles and files.
-        resumed: how many of the runs had been done before.
-        failed: how many of the runs have an error.
+    """What a study came to, and where it was written: rows of the finished runs, in the order of the sweep, Markdown as
+    in tables.md, figures by title; how many of the runs had been done before, and how many have an error.
     """
 
     folder: Path
@@ -60,12 +52,9 @@ def run_study(
     """Run what is not done yet and write what the config asks for.
 
     Args:
-        plan: from `make_plan`.
         folder: to write to; made if it is not there.
-        workers: processes.
         limit: the first so many runs of the sweep only.
         replace: whether rows of another config or code version in the folder are dropped instead of refused.
-        progress: a sign of life.
 
     Raises:
         InputError: something in the config does not fit, or the folder holds other rows.
@@ -90,7 +79,7 @@ def run_study(
 def _check(plan: Plan) -> list[Measure]:
     """The measures of everything that is made of the rows, after a look at the names in the config."""
     study, experiment = plan.study, plan.experiment
-    measures = [*check_tables(study, experiment), *check_figures(study, experiment), *check_claims(study)]
+    measures = [*check_tables(study, experiment), *check_figures(study, experiment), *(c.value for c in study.claims)]
     if study.record and experiment.record is None:
         raise study.record[0].error(f"{experiment.name} has no `record`")
     selections = [*study.record, *(table.where for table in study.tables), *(figure.where for figure in study.figures)]
@@ -109,7 +98,7 @@ def _check(plan: Plan) -> list[Measure]:
 def _must_pick(where: Node, plan: Plan, *common: Node) -> None:
     """Refuse what picks no run, which is a slip of the pen; the command line may leave runs out on purpose."""
     picks = [select(node, plan.experiment) for node in (where, *common)]
-    if not plan.changed and not any(all(matches(asdict(case), p) for p in picks) for case in plan.cases):
+    if not plan.changed and not any(all(pick(asdict(case)) for pick in picks) for case in plan.cases):
         raise where.error("picks no run of the sweep")
 
 
@@ -170,8 +159,9 @@ def _figures(
         path = folder / f"{_slug(figure.title)}.png"
         source = iterations if figure.kind == "convergence" else rows
         known = {name: None for row in source for name in row}
-        for key in ("x", "y") if figure.kind == "convergence" and source else ():
-            if (name := getattr(figure, key)) not in known:
+        needed = {"x": figure.x, "y": figure.y.node.value} if figure.kind == "convergence" and source else {}
+        for key, name in needed.items():
+            if name not in known:
                 raise figure.node.at(key).error(f"no iteration has {name!r}; there are {' '.join(known)}")
         with replacing(path) as draft:
             draw(figure, source, plan.experiment, draft)
@@ -196,7 +186,7 @@ def _trace(plan: Plan, chosen: Sequence[Any], progress: Progress) -> list[Row]:
 def _picked(plan: Plan, cases: Sequence[Any], wheres: Sequence[Node]) -> list[Any]:
     """The cases that one of the selections picks."""
     picks = [select(where, plan.experiment) for where in wheres]
-    return [case for case in cases if any(matches(asdict(case), picked) for picked in picks)]
+    return [case for case in cases if any(pick(asdict(case)) for pick in picks)]
 
 
 def _record(plan: Plan, folder: Path, chosen: Sequence[Any], progress: Progress) -> None:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from symrefine.study.document import Node
+from symrefine.study.summary import Expectation, Measure
 from symrefine.study.typed import Scalar
 
 NOTHING = Node(value={}, place="", path="")
@@ -15,7 +16,7 @@ class Table:
     node: Node
     title: str
     groups: list[str]
-    values: dict[str, str]
+    values: dict[str, Measure]
     where: Node = NOTHING
 
 
@@ -26,7 +27,7 @@ class Figure:
     node: Node
     title: str
     kind: str
-    y: str
+    y: Measure
     x: str = "iteration"
     by: str = ""
     where: Node = NOTHING
@@ -43,11 +44,11 @@ class Claim:
     claim: str
     source: str
     paper: Scalar
-    value: str
+    value: Measure
     ours: Node
     where: Node = NOTHING
     peers: dict[str, Node] = field(default_factory=dict)
-    expect: str = ""
+    expect: Expectation = field(default_factory=Expectation)
     unit: str = ""
     main: bool = False
     note: str = ""

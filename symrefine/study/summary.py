@@ -9,7 +9,7 @@ import numpy as np
 
 from symrefine.study.document import Node
 from symrefine.study.experiment import Row
-from symrefine.study.typed import Scalar
+from symrefine.study.typed import Scalar, scalar
 
 EMPTY = "-"
 _NUMBERS: Mapping[str, Callable[[Sequence[float]], float]] = {
@@ -34,6 +34,19 @@ class Measure:
     column: str
     node: Node
 
+    @classmethod
+    def read(cls, node: Node) -> "Measure":
+        """Parse "AGGREGATE COLUMN" or "COLUMN".
+
+        Raises:
+            InputError: something else.
+        """
+        how, _, column = " ".join(scalar(node, str).split()).rpartition(" ")
+        if not column or (how and how not in _NUMBERS):
+            known = " ".join(_NUMBERS)
+            raise node.error(f"expected COLUMN or AGGREGATE COLUMN with one of {known}, got {node.value!r}")
+        return cls(how=how, column=column, node=node)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Summary:
@@ -41,20 +54,6 @@ class Summary:
 
     text: str
     values: tuple[Scalar, ...]
-
-
-def read_measure(node: Node, text: str) -> Measure:
-    """Parse "AGGREGATE COLUMN" or "COLUMN".
-
-    Raises:
-        InputError: something else.
-    """
-    words = text.split()
-    if len(words) == 1:
-        return Measure(how="", column=words[0], node=node)
-    if len(words) != 2 or words[0] not in _NUMBERS:
-        raise node.error(f"expected COLUMN or AGGREGATE COLUMN with one of {' '.join(_NUMBERS)}, got {text!r}")
-    return Measure(how=words[0], column=words[1], node=node)
 
 
 def summarise(rows: Sequence[Row], measure: Measure) -> Summary:
@@ -121,10 +120,28 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Expectation:
-    """What a figure must satisfy: comparisons with numbers, or being a text."""
+    """What a figure must satisfy: comparisons with numbers, or being a text; `said` as in the config, "" if nothing."""
 
+    said: str = ""
     comparisons: tuple[tuple[str, float], ...] = ()
     text: str = ""
+
+    @classmethod
+    def read(cls, node: Node) -> "Expectation":
+        """Parse ">= 4", "== Cs", "0.4 to 0.6".
+
+        Raises:
+            InputError: something else.
+        """
+        said = scalar(node, str)
+        if ends := re.fullmatch(rf"\s*({_NUMBER})\s+to\s+({_NUMBER})\s*", said):
+            return cls(said=said, comparisons=((">=", float(ends[1])), ("<=", float(ends[2]))))
+        if one := re.fullmatch(rf"\s*(>=|<=|==|<|>)\s*({_NUMBER})\s*", said):
+            return cls(said=said, comparisons=((one[1], float(one[2])),))
+        same = re.fullmatch(r"\s*==\s*(\S.*?)\s*", said)
+        if said and not same:
+            raise node.error(f"expected a comparison such as '>= 4', '== Cs' or '0.4 to 0.6', got {said!r}")
+        return cls(said=said, text=same[1] if same else "")
 
     def holds(self, summary: Summary) -> bool:
         """Whether every value of the summary satisfies it; without values nothing does."""
@@ -134,18 +151,3 @@ class Expectation:
         if self.text:
             return str(value) == self.text
         return not isinstance(value, str) and all(_COMPARED[sign](value, to) for sign, to in self.comparisons)
-
-
-def read_expectation(node: Node, text: str) -> Expectation:
-    """Parse ">= 4", "== Cs", "0.4 to 0.6".
-
-    Raises:
-        InputError: something else.
-    """
-    if ends := re.fullmatch(rf"\s*({_NUMBER})\s+to\s+({_NUMBER})\s*", text):
-        return Expectation(comparisons=((">=", float(ends[1])), ("<=", float(ends[2]))))
-    if one := re.fullmatch(rf"\s*(>=|<=|==|<|>)\s*({_NUMBER})\s*", text):
-        return Expectation(comparisons=((one[1], float(one[2])),))
-    if same := re.fullmatch(r"\s*==\s*(\S.*?)\s*", text):
-        return Expectation(text=same[1])
-    raise node.error(f"expected a comparison such as '>= 4', '== Cs' or '0.4 to 0.6', got {text!r}")

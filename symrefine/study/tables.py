@@ -3,12 +3,11 @@
 import csv
 import io
 from collections.abc import Sequence
-from itertools import groupby
 
 from symrefine.study.experiment import Experiment, Row
 from symrefine.study.plan import chosen
 from symrefine.study.schema import Study, Table
-from symrefine.study.summary import Measure, read_measure, short, summarise
+from symrefine.study.summary import Measure, short, summarise
 from symrefine.study.typed import Scalar
 
 
@@ -18,51 +17,37 @@ def csv_text(rows: Sequence[Row]) -> str:
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows([_field(row.get(name)) for name in columns] for row in rows)
+    values = [[row.get(name) for name in columns] for row in rows]
+    writer.writerows([str(v).lower() if isinstance(v, bool) else v for v in row] for row in values)
     return stream.getvalue()
-
-
-def _field(value: object) -> str:
-    """Text that reads back as the same value."""
-    if value is None:
-        return ""
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def check_tables(study: Study, experiment: Experiment) -> list[Measure]:
     """The measures of all tables.
 
     Raises:
-        InputError: fields or aggregates that do not exist.
+        InputError: fields that do not exist.
     """
     for table in study.tables:
         for i, name in enumerate(table.groups):
             experiment.field(name, table.node.at("groups", i))
-    return [measure for table in study.tables for measure in _measures(table).values()]
-
-
-def _measures(table: Table) -> dict[str, Measure]:
-    return {head: read_measure(table.node.at("values", head), text) for head, text in table.values.items()}
+    return [measure for table in study.tables for measure in table.values.values()]
 
 
 def markdown(table: Table, rows: Sequence[Row], experiment: Experiment) -> str:
     """A table under its title, with the number of runs that failed."""
     picked = chosen(rows, table.where, experiment)
-    measures = _measures(table)
-    lines = []
-    # Groups in the order in which the sweep came upon them.
-    order = {key: i for i, key in enumerate(dict.fromkeys(_key(row, table.groups) for row in picked))}
-    picked = sorted(picked, key=lambda row: order[_key(row, table.groups)])
-    for key, group in groupby(picked, key=lambda row: _key(row, table.groups)):
-        members = list(group)
-        lines.append([*map(short, key), *(summarise(members, m).text for m in measures.values()), str(len(members))])
+    # In the order in which the sweep came upon them.
+    groups: dict[tuple[Scalar | None, ...], list[Row]] = {}
+    for row in picked:
+        groups.setdefault(tuple(row[name] for name in table.groups), []).append(row)
+    lines = [
+        [*map(short, key), *(summarise(members, m).text for m in table.values.values()), str(len(members))]
+        for key, members in groups.items()
+    ]
     failed = sum(row["error"] is not None for row in picked)
     note = f"\n{failed} of {len(picked)} runs failed and are left out of the figures.\n" if failed else ""
-    return f"## {table.title}\n\n{grid([*table.groups, *measures, 'runs'], lines)}{note}"
-
-
-def _key(row: Row, groups: Sequence[str]) -> tuple[Scalar | None, ...]:
-    return tuple(row[name] for name in groups)
+    return f"## {table.title}\n\n{grid([*table.groups, *table.values, 'runs'], lines)}{note}"
 
 
 def grid(head: Sequence[str], lines: Sequence[Sequence[str]]) -> str:

@@ -23,7 +23,8 @@ def read_config(path: Path, kind: type[T]) -> T:
 
 
 def typed(node: Node, kind: Any) -> Any:
-    """The value of a node as a scalar type, a union of them, `list[T]`, `dict[str, T]`, `Node` or a dataclass of these.
+    """The value of a node as a scalar type, a union of them, `list[T]`, `dict[str, T]`, `Node`, a class that
+    reads one, or a dataclass of these.
 
     A field named `node` is no key: it takes the node itself, for messages that come later.
 
@@ -32,6 +33,8 @@ def typed(node: Node, kind: Any) -> Any:
     """
     if kind is Node:
         return node
+    if hasattr(kind, "read"):
+        return kind.read(node)
     if is_dataclass(kind):
         return _section(node, kind)
     if get_origin(kind) is list:

@@ -4,18 +4,14 @@ import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
-from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from symrefine.errors import SymrefineError
 from symrefine.study.experiment import Experiment, load_experiment
 from symrefine.study.journal import Entry
 from symrefine.study.versions import LIBRARIES
-
-if TYPE_CHECKING:
-    from multiprocessing.process import BaseProcess
 
 P = TypeVar("P")
 R = TypeVar("R")
@@ -86,24 +82,20 @@ def _start_worker() -> None:
     warnings.simplefilter("ignore")
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     parent = parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    if parent is None:
+        return
 
+    def end_with_parent() -> None:
+        parent.join()
+        os._exit(1)
 
-def _end_with(parent: "BaseProcess") -> None:
-    parent.join()
-    os._exit(1)
+    threading.Thread(target=end_with_parent, daemon=True).start()
 
 
 def _unpack(parcel: _Parcel) -> Entry:
     name, root, index, fields = parcel
-    experiment = _loaded(name, root)
+    experiment = load_experiment(name, Path(root))
     return attempt(experiment, index, experiment.case(**fields))
-
-
-@lru_cache(maxsize=1)
-def _loaded(name: str, root: str) -> Experiment:
-    return load_experiment(name, Path(root))
 
 
 def attempt(experiment: Experiment, index: int, case: Any) -> Entry:

@@ -1,5 +1,6 @@
 """How a finite group permutes points: counterparts that agree with one another, so that orbits close exactly."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,10 +27,12 @@ class Action:
 
     def mean(self, points: Array, operations: Array) -> Array:
         """Means [N, 3] over the group of g^-1 (counterpart of g p)."""
-        total = np.zeros_like(points)
-        for g, image in zip(operations, self.images, strict=True):
-            total += points[image] @ g
-        return total / len(operations)
+        return mean_back((points[image] for image in self.images), operations)
+
+
+def mean_back(counterparts: Iterable[Array], operations: Array) -> Array:
+    """Means [N, 3] over the group of g^-1 c, the counterparts c [N, 3] given for one operation after the other."""
+    return np.asarray(sum(c @ g for g, c in zip(operations, counterparts, strict=True)) / len(operations))
 
 
 def act(points: Array, operations: Array, labels: Index | None, reach: float) -> Action:
@@ -42,9 +45,10 @@ def act(points: Array, operations: Array, labels: Index | None, reach: float) ->
     closed = miss <= reach
     for h, table in generators(operations):
         closed &= (images[table] == images[:, images[h]]).all(axis=0)
-    for image in images:
-        closed &= closed[image]
-    return Action(images=images, closed=_whole(images, closed), miss=miss)
+    # Only the points all of whose orbit is closed.
+    while ((whole := closed & closed[images].all(axis=0)) != closed).any():
+        closed = whole
+    return Action(images=images, closed=closed, miss=miss)
 
 
 def _labelled(points: Array, labels: Index | None) -> tuple[cKDTree, Array]:
@@ -52,15 +56,6 @@ def _labelled(points: Array, labels: Index | None) -> tuple[cKDTree, Array]:
     size = 0.0 if labels is None else 4.0 * float(np.abs(points).max())
     shifted = np.zeros(len(points)) if labels is None else np.unique(labels, return_inverse=True)[1] * size
     return cKDTree(np.column_stack([points, shifted])), shifted
-
-
-def _whole(images: Index, closed: Mask) -> Mask:
-    """Only the points all of whose orbit is closed."""
-    while True:
-        smaller = closed & closed[images].all(axis=0)
-        if (smaller == closed).all():
-            return closed
-        closed = smaller
 
 
 def generators(operations: Array) -> list[tuple[int, Index]]:

@@ -6,7 +6,6 @@ points least wins, longer orbits before shorter ones.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -23,12 +22,8 @@ LARGEST, LARGEST_GROUP = 1500, 240
 PREFERENCE = 2.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Orbit:
-    """Rows `owners` [K] at the place of each g of what stands at the identity, and how far points move [K]."""
-
-    owners: Index
-    moved: Array
+# Rows [K] at the place of each g of what stands at the identity, and how far points move [K].
+_Orbit = tuple[Index, Array]
 
 
 def with_leftovers(points: Array, operations: Array, action: Action, labels: Index | None, reach: float) -> Action:
@@ -40,13 +35,14 @@ def with_leftovers(points: Array, operations: Array, action: Action, labels: Ind
     products = (operations[:, None] @ operations[None]).reshape(-1, 9)
     table = cKDTree(operations.reshape(-1, 9)).query(products)[1].reshape(len(operations), -1)  # of g h
     while len(free):
-        orbit = _orbit(points, operations, table, free, labels, reach)
-        members = free[:1] if orbit is None else np.unique(orbit.owners)
-        if orbit is not None:
+        members = free[:1]
+        if orbit := _orbit(points, operations, table, free, labels, reach):
+            owners, moved = orbit
+            members = np.unique(owners)
             closed[members] = True
-            for k, owner in enumerate(orbit.owners):
-                images[:, owner] = orbit.owners[table[:, k]]
-            miss[members] = orbit.moved.max()
+            for k, owner in enumerate(owners):
+                images[:, owner] = owners[table[:, k]]
+            miss[members] = moved.max()
         free = np.setdiff1d(free, members)
     return Action(images=images, closed=closed, miss=miss)
 
@@ -59,9 +55,7 @@ def _orbit(
     found: _Orbit | None = None
     for stabilizer in _stabilizers(points[free[0]], operations, table, reach):
         orbit = _with_stabilizer(points, operations, table, same, stabilizer)
-        if orbit is None or orbit.moved.max() > reach:
-            continue
-        if found is None or _rms(orbit.moved) * PREFERENCE < _rms(found.moved):
+        if orbit and orbit[1].max() <= reach and (not found or _rms(orbit[1]) * PREFERENCE < _rms(found[1])):
             found = orbit
     return found
 
@@ -88,7 +82,7 @@ def _with_stabilizer(points: Array, operations: Array, table: Index, same: Index
     _, columns = linear_sum_assignment(cost)
     owners = same[columns][which.reshape(-1)]
     mean = np.einsum("kji,kj->i", operations, points[owners]) / len(operations)
-    return _Orbit(owners=owners, moved=np.linalg.norm(operations @ mean - points[owners], axis=1))
+    return owners, np.linalg.norm(operations @ mean - points[owners], axis=1)
 
 
 def _rms(values: Array) -> float:

@@ -13,11 +13,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from symrefine.errors import DegenerateShapeError, InputError
+from symrefine.fit.placed import Placed
 from symrefine.geometry import Array, ReadOnly, orthogonal_factor, tight_diagonal, unit
 from symrefine.groups import PointGroup
 from symrefine.shape import Index, Shape
 from symrefine.surface.skin import FEW
-from symrefine.symmetrize.action import Action, act, generators
+from symrefine.symmetrize.action import Action, act, generators, mean_back
 from symrefine.symmetrize.finite import finite_group
 from symrefine.symmetrize.leftover import with_leftovers
 from symrefine.symmetrize.surface import Closest, closest_on
@@ -94,32 +95,18 @@ def symmetrize(
         raise InputError(f"{shape.source}: symmetrize takes 3-D shapes; these points have {shape.dim} coordinates")
     if group.name == "C1":
         raise InputError(f"{shape.source}: C1 has no operation but the identity: there is nothing to make symmetric")
-    diagonal = tight_diagonal(shape.points)
-    work = _start(shape, (shape.points - center) / diagonal, group, copied=shape.faces is None, seed=seed)
-    place, action = _counterparts(work.points, work.place.group, work.labels, REACH * tolerance)
-    work = replace(work, place=place)
+    work = _start(shape, center, group, copied=shape.faces is None, seed=seed)
+    work, action = _counterparts(work, REACH * tolerance)
     few = len(work.rows) <= FEW and shape.faces is None
     if _corresponds(work.points, action, few):
-        made = work.by_vertices(action)
-    elif few:
+        return work.by_vertices(action)
+    if few:
         raise DegenerateShapeError(
             f"{shape.source}: {int((~action.closed).sum())} of {len(work.rows)} points have no counterpart under "
-            f"{place.group.name}; so few points stand for themselves, not for a surface: choose a subgroup (--group)"
+            f"{work.place.group.name}; so few points stand for themselves, not for a surface: choose a subgroup "
+            "(--group)"
         )
-    else:
-        made = work.by_orbits() if shape.faces is None else work.by_surface(action)
-    moved = np.linalg.norm(made.moved, axis=1)
-    return Symmetrized(
-        shape=replace(made.shape, points=center + diagonal * made.shape.points),
-        group=made.place.group,
-        center=center + diagonal * made.place.center,
-        method=made.method,
-        paired=made.paired,
-        largest=float(moved.max()),
-        rms=float(np.sqrt(np.mean(moved**2))),
-        residual=made.residual,
-        diagonal=diagonal,
-    )
+    return work.by_orbits() if shape.faces is None else work.by_surface(action)
 
 
 def exact_place(shape: Shape, group: PointGroup, center: Array) -> tuple[PointGroup, Array]:
@@ -133,16 +120,15 @@ def exact_place(shape: Shape, group: PointGroup, center: Array) -> tuple[PointGr
     """
     if group.name == "C1" or group.symbol.family in ("K", "Kh"):
         return group, center
-    diagonal = tight_diagonal(shape.points)
-    work = _start(shape, (shape.points - center) / diagonal, group, copied=False, seed=0)
+    work = _start(shape, center, group, copied=False, seed=0)
     finite = work.place.group
     if finite.order * len(work.rows) > LARGEST:
         return group, center
     action = act(work.points, finite.operations(), work.labels, EXACT)
     if not action.closed.all():
         return group, center
-    place = work.by_vertices(action).place
-    return PointGroup(name=group.name, frame=place.group.frame), center + diagonal * place.center
+    made = work.by_vertices(action)
+    return PointGroup(name=group.name, frame=made.group.frame), made.center
 
 
 def _corresponds(points: Array, action: Action, few: bool) -> bool:
@@ -153,45 +139,13 @@ def _corresponds(points: Array, action: Action, few: bool) -> bool:
     return bool(np.sqrt(np.mean(action.miss**2)) <= SPACED * spacing and action.miss.max() <= WORST * spacing)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Made:
-    """A result in units of the diagonal about the given centre; `moved` [N, 3] is by what each point moved."""
-
-    shape: Shape
-    place: "_Place"
-    method: Method
-    paired: float
-    moved: Array
-    residual: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Place:
-    """Where the group stands: operations x -> center + g (x - center)."""
-
-    group: PointGroup
-    center: Array
-
-    def towards(self, points: Array, wanted: Array) -> tuple["_Place", float]:
-        """The place to which the best rigid motion from `points` to `wanted` [N, 3] belongs, and how far it turns."""
-        a, b = points.mean(axis=0), wanted.mean(axis=0)
-        turn = orthogonal_factor((wanted - b).T @ (points - a), proper=True)
-        center = a + turn.T @ (self.center - b)
-        step = float(np.abs(turn - np.eye(3)).max() + np.abs(center - self.center).max())
-        return _Place(group=PointGroup(name=self.group.name, frame=self.group.frame @ turn), center=center), step
-
-
-def _counterparts(points: Array, group: PointGroup, labels: Index | None, reach: float) -> tuple[_Place, Action]:
-    """Counterparts about the place that those found so far point to, since a misplaced group pairs fewer points."""
-    place = _Place(group=group, center=np.zeros(3))
-    for _ in range(MATCHINGS):
-        operations = place.group.operations()
-        action = act(points - place.center, operations, labels, reach)
-        if action.closed.all() or action.closed.sum() < FEWEST:
-            break
-        wanted = place.center + action.mean(points - place.center, operations)
-        place, _ = place.towards(points[action.closed], wanted[action.closed])
-    return place, with_leftovers(points - place.center, place.group.operations(), action, labels, reach)
+def _towards(place: Placed, points: Array, wanted: Array) -> tuple[Placed, float]:
+    """The place to which the best rigid motion from `points` to `wanted` [N, 3] belongs, and how far it turns."""
+    a, b = points.mean(axis=0), wanted.mean(axis=0)
+    turn = orthogonal_factor((wanted - b).T @ (points - a), proper=True)
+    center = a + turn.T @ (place.center - b)
+    step = float(np.abs(turn - np.eye(3)).max() + np.abs(center - place.center).max())
+    return Placed(group=PointGroup(name=place.group.name, frame=place.group.frame @ turn), center=center), step
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -202,19 +156,21 @@ class _Work:
     """
 
     shape: Shape
+    center: Array
+    diagonal: float
     points: Array
     rows: Index
     back: Index
     labels: Index | None
-    place: _Place
+    place: Placed
     rng: np.random.Generator
 
-    def by_vertices(self, action: Action) -> _Made:
+    def by_vertices(self, action: Action) -> Symmetrized:
         """Points that correspond: means over orbits, about the place that moves them least."""
         place = self.place
         for _ in range(ROUNDS):
             wanted = self._means(action, place)
-            nearer, step = place.towards(self.points, wanted)
+            nearer, step = _towards(place, self.points, wanted)
             if step < _STILL:
                 break
             place = nearer
@@ -225,16 +181,11 @@ class _Work:
             weights=self._even_weights(action),
             normals=self._mean_normals(action, place),
         )
-        residual = _miss_of_points(wanted, place)
-        return _Made(
-            shape=made, place=place, method="vertices", paired=1.0, moved=wanted - self.points, residual=residual
-        )
+        return self._made(made, place, "vertices", wanted, paired=1.0, residual=_miss(wanted, place))
 
-    def by_orbits(self) -> _Made:
+    def by_orbits(self) -> Symmetrized:
         """A cloud of a surface: its points on the symmetric surface, of which one sector is copied to the others."""
-        closest = closest_on(replace(self.shape, points=self.points[self.back]), self.rng)
-        place = self._fitted(closest)
-        wanted = _on_symmetric_surface(self.points, place, closest)
+        place, wanted = self._onto_surface()
         rows = _sector(wanted - place.center, place.group)
         operations, owners = place.group.operations(), self.rows[rows]
         copies = _turned(operations, wanted[rows] - place.center)
@@ -247,36 +198,47 @@ class _Work:
             labels=None if labels is None else np.tile(labels[owners], len(operations))[keep],
             source=self.shape.source,
         )
-        residual = _miss_of_points(made.points, place)
-        return _Made(
-            shape=made, place=place, method="orbits", paired=0.0, moved=wanted - self.points, residual=residual
-        )
+        return self._made(made, place, "orbits", wanted, paired=0.0, residual=_miss(made.points, place))
 
-    def by_surface(self, action: Action) -> _Made:
+    def by_surface(self, action: Action) -> Symmetrized:
         """A mesh: vertices with counterparts go to their means, the others onto the symmetric surface."""
-        closest = closest_on(replace(self.shape, points=self.points[self.back]), self.rng)
-        place = self._fitted(closest)
-        wanted = _on_symmetric_surface(self.points, place, closest)
+        place, wanted = self._onto_surface()
         own = action.miss < OWN * cKDTree(self.points).query(self.points, k=2)[0][:, 1]
         paired = action.closed & own & own[action.images].all(axis=0)
         wanted[paired] = self._means(action, place)[paired]
         made = replace(self.shape, points=wanted[self.back])
-        residual = _miss_of_surface(wanted, place, closest_on(made, self.rng))
+        residual = _miss(wanted, place, closest_on(made, self.rng))
         share = float(paired[self.back].mean())
-        return _Made(
-            shape=made, place=place, method="surface", paired=share, moved=wanted - self.points, residual=residual
+        return self._made(made, place, "surface", wanted, paired=share, residual=residual)
+
+    def _made(
+        self, shape: Shape, place: Placed, method: Method, wanted: Array, *, paired: float, residual: float
+    ) -> Symmetrized:
+        """The result in the units of the input; `wanted` [M, 3] is where the distinct points belong."""
+        moved = np.linalg.norm(wanted - self.points, axis=1)
+        return Symmetrized(
+            shape=replace(shape, points=self.center + self.diagonal * shape.points),
+            group=place.group,
+            center=self.center + self.diagonal * place.center,
+            method=method,
+            paired=paired,
+            largest=float(moved.max()),
+            rms=float(np.sqrt(np.mean(moved**2))),
+            residual=residual,
+            diagonal=self.diagonal,
         )
 
-    def _means(self, action: Action, place: _Place) -> Array:
+    def _means(self, action: Action, place: Placed) -> Array:
         return place.center + action.mean(self.points - place.center, place.group.operations())
 
-    def _fitted(self, closest: Closest) -> _Place:
-        """The group's place, fitted to where some of the points belong."""
+    def _onto_surface(self) -> tuple[Placed, Array]:
+        """The group's place, fitted to where some of the points belong, and where all of them do."""
+        closest = closest_on(replace(self.shape, points=self.points[self.back]), self.rng)
         place = self.place
         some = self.points[:: max(1, len(self.points) // FITTED)]
         for _ in range(4):
-            place, _ = place.towards(some, _on_symmetric_surface(some, place, closest))
-        return place
+            place, _ = _towards(place, some, _on_symmetric_surface(some, place, closest))
+        return place, _on_symmetric_surface(self.points, place, closest)
 
     def _even_weights(self, action: Action) -> Array | None:
         """Weights that are equal over each orbit, their sum kept; copies of one point share its mean."""
@@ -286,31 +248,48 @@ class _Work:
         even = np.mean([mass[image] for image in action.images], axis=0)
         return np.asarray((even / np.bincount(self.back))[self.back])
 
-    def _mean_normals(self, action: Action, place: _Place) -> Array | None:
+    def _mean_normals(self, action: Action, place: Placed) -> Array | None:
         """Normals averaged like the points, each with the sign of the normal that it joins."""
         if self.shape.normals is None:
             return None
-        own, total = self.shape.normals[self.rows], np.zeros_like(self.points)
-        for g, image in zip(place.group.operations(), action.images, strict=True):
-            turned = own[image] @ g
-            total += turned * np.where(np.sum(turned * own, axis=1) < 0.0, -1.0, 1.0)[:, None]
+        own = self.shape.normals[self.rows]
+        joined = [own[image] @ g for g, image in zip(place.group.operations(), action.images, strict=True)]
+        total = sum(n * np.where(np.sum(n * own, axis=1) < 0.0, -1.0, 1.0)[:, None] for n in joined)
         return unit(total)[self.back]
 
 
-def _start(shape: Shape, local: Array, group: PointGroup, *, copied: bool, seed: int) -> _Work:
-    """The distinct points (and labels) of a shape, given in units of the diagonal about the centre of its group."""
+def _start(shape: Shape, center: Array, group: PointGroup, *, copied: bool, seed: int) -> _Work:
+    """The distinct points (and labels) of a shape, in units of the diagonal about the centre of its group."""
+    diagonal = tight_diagonal(shape.points)
+    local = (shape.points - center) / diagonal
     of_points = shape.labels if shape.faces is None else None
     key = local if of_points is None else np.column_stack([local, of_points])
     _, rows, back = np.unique(key, axis=0, return_index=True, return_inverse=True)
     return _Work(
         shape=shape,
+        center=center,
+        diagonal=diagonal,
         points=local[rows],
         rows=rows,
         back=back.reshape(-1),
         labels=None if of_points is None else of_points[rows],
-        place=_Place(group=finite_group(group, local[rows], copied=copied), center=np.zeros(3)),
+        place=Placed(group=finite_group(group, local[rows], copied=copied), center=np.zeros(3)),
         rng=np.random.default_rng(seed),
     )
+
+
+def _counterparts(work: _Work, reach: float) -> tuple[_Work, Action]:
+    """Counterparts about the place that those found so far point to, since a misplaced group pairs fewer points."""
+    points, place = work.points, work.place
+    for _ in range(MATCHINGS):
+        operations = place.group.operations()
+        action = act(points - place.center, operations, work.labels, reach)
+        if action.closed.all() or action.closed.sum() < FEWEST:
+            break
+        wanted = place.center + action.mean(points - place.center, operations)
+        place, _ = _towards(place, points[action.closed], wanted[action.closed])
+    action = with_leftovers(points - place.center, place.group.operations(), action, work.labels, reach)
+    return replace(work, place=place), action
 
 
 def _turned(operations: Array, vectors: Array) -> Array:
@@ -318,12 +297,11 @@ def _turned(operations: Array, vectors: Array) -> Array:
     return np.asarray(np.einsum("kij,nj->kni", operations, vectors).reshape(-1, 3))
 
 
-def _on_symmetric_surface(points: Array, place: _Place, closest: Closest) -> Array:
+def _on_symmetric_surface(points: Array, place: Placed, closest: Closest) -> Array:
     """Means [N, 3] over the group of g^-1 (closest point to g p): a map of space that commutes with the group."""
-    local, operations, total = points - place.center, place.group.operations(), np.zeros_like(points)
-    for g in operations:
-        total += (closest(place.center + local @ g.T) - place.center) @ g
-    return np.asarray(place.center + total / len(operations))
+    local, operations = points - place.center, place.group.operations()
+    found = (closest(place.center + local @ g.T) - place.center for g in operations)
+    return np.asarray(place.center + mean_back(found, operations))
 
 
 def _sector(points: Array, group: PointGroup) -> Index:
@@ -343,17 +321,12 @@ def _once(points: Array, owners: Index | None) -> Index:
     return np.flatnonzero(keep)
 
 
-def _miss_of_points(points: Array, place: _Place) -> float:
-    """Largest distance of an image under a generator to the nearest point."""
+def _miss(points: Array, place: Placed, closest: Closest | None = None) -> float:
+    """Largest distance of an image under a generator to the surface, or else to the nearest point."""
     local, operations = points - place.center, place.group.operations()
-    tree = cKDTree(local)
-    return max(float(tree.query(local @ operations[h].T)[0].max()) for h, _ in generators(operations))
-
-
-def _miss_of_surface(points: Array, place: _Place, closest: Closest) -> float:
-    """Largest distance of an image under a generator to the surface."""
-    operations, worst = place.group.operations(), 0.0
-    for h, _ in generators(operations):
-        images = place.center + (points - place.center) @ operations[h].T
-        worst = max(worst, float(np.linalg.norm(closest(images) - images, axis=1).max()))
-    return worst
+    images = [local @ operations[h].T for h, _ in generators(operations)]
+    if closest is None:
+        tree = cKDTree(local)
+        return max(float(tree.query(image)[0].max()) for image in images)
+    there = [place.center + image for image in images]
+    return max(float(np.linalg.norm(closest(at) - at, axis=1).max()) for at in there)

@@ -43,12 +43,9 @@ POINT, ARROW = 0.0035, 0.42
 
 
 def record(detection: Detection, shape: Shape, path: Path | str) -> None:
-    """Write a recording of a detection; equal input gives equal content (`rerun rrd compare`).
+    """Write a recording (`.rrd` by custom) of a detection and the shape that `detect` was given.
 
-    Args:
-        detection: what `detect` returned.
-        shape: what it was given.
-        path: the file, `.rrd` by custom.
+    Equal input gives equal content (`rerun rrd compare`).
 
     Raises:
         InputError: the file cannot be written.

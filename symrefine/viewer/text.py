@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from symrefine.detection.result import Detection
 from symrefine.fit.refine import Iterate
 from symrefine.picture.rows import found_rows, near_miss_rows
-from symrefine.picture.words import coordinates, fit, headline, percent, tuples_meaning
+from symrefine.picture.words import TUPLES, coordinates, fit, headline, percent
 from symrefine.shape import Shape
 from symrefine.surface.misses import Deviation
 
@@ -24,7 +24,7 @@ def markdown(detection: Detection, shape: Shape) -> str:
         parts.append(_table(("", "kind", "mean %", "95 %", "times the limit"), near))
     pairs = zip(d.tuples.singular_values, d.tuples.significance, strict=True)
     sizes = ", ".join(f"{value:.2g} ({times:.1f} times its noise)" for value, times in pairs)
-    meaning = f"The {len(d.vectors.vectors)} n-tuples (yellow arrows) {tuples_meaning(d.tuples.kind)}"
+    meaning = f"The {len(d.vectors.vectors)} n-tuples (yellow arrows) {TUPLES[d.tuples.kind]}"
     conventions = (
         f"Positions are relative to the centre {coordinates(d.center, d.diagonal)}, in the units of the input; "
         "misses are in percent of the diagonal of the bounding box."
