@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from symrefine.decide.posterior import UNKNOWN
 from symrefine.geometry import Array, tight_diagonal
 from symrefine.moments.moments import Moments, shape_moments
 from symrefine.moments.quadrature import mesh_nodes, sample_surface
@@ -107,10 +108,10 @@ def _few_decide(measured: Measured) -> str:
 
 
 def _hidden(surface: Surface, tolerance: float) -> str:
-    """Noise that hides what the tolerance tells apart."""
-    hidden = float(np.quantile(surface.noise, 0.95)) if surface.noise.size else 0.0
-    if hidden <= tolerance:
+    """Noise that makes an exact symmetry more likely broken than not."""
+    if UNKNOWN * surface.floor <= tolerance:
         return ""
+    hidden = float(np.quantile(surface.noise, 0.95))
     return (
         f"the cloud does not even agree with itself: 5 % of one half of it misses the other by {hidden:.1%} of the "
         f"diagonal or more, and a tolerance of {tolerance:.1%} is asked; give more points, or less noise"
@@ -175,7 +176,7 @@ def _surface(
         # As many neighbours as in the whole, so that noise is the same; exact normals need none.
         own = normals[some] if exact and normals is not None else None
         skin = Skin(points=local[some], normals=own, neighbours=whole.neighbours, given=None)
-        pick = drawn(len(some), SAMPLES if exact else PLANES // 4, rng)
+        pick = drawn(len(some), SAMPLES if exact else PLANES // 2, rng)
         return skin.local_planes(pick, None if labels is None else labels[some])
 
     pick = drawn(len(local), SAMPLES if exact else PLANES, rng, chance)
