@@ -78,7 +78,7 @@ def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
     for starts in proposals(evidence):
         pool = _settled(surface, _tried(surface, pool, starts, limit), pool.largest, limit)
     for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
-        if glance < HOPELESS and not pool.has(axis, max(glance, _exact(surface))):
+        if glance < HOPELESS and not pool.has(axis, _exact(surface)):
             starts = about(evidence, axis.group.frame[2])
             pool = _settled(surface, _tried(surface, pool, starts, limit), pool.largest, limit)
     nearest = sorted((*pool.looked, *pool.hopeless), key=lambda k: k[1])[:TOLD] if not pool.small else []
@@ -108,7 +108,7 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float)
     """The pool with candidates fitted, but for those that the group so far has anyway."""
     for start, glance in _glanced(surface, pool, starts):
         least = _exact(surface)
-        if pool.has(start, max(glance, least)) or _is_image(start, glance, pool):
+        if pool.has(start, least) or _is_image(start, glance, pool):
             continue
         if glance >= HOPELESS:
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
