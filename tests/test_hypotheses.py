@@ -24,8 +24,7 @@ from symrefine.fit.placed import Placed, elements
 from symrefine.geometry import frame_with_z, line_angle_rad, random_orthogonal, rotation, tight_diagonal, unit
 from symrefine.groups import close, is_subgroup, point_group
 from symrefine.moments.moments import shape_moments
-from symrefine.surface.misses import TOLERANCE, Deviation
-from symrefine.surface.noise import noise_distances
+from symrefine.surface.misses import TOLERANCE, Deviation, noise_distances
 from symrefine.surface.skin import isolated_points, local_planes
 from symrefine.surface.surface import Surface
 

@@ -21,9 +21,9 @@ from symrefine.surface.misses import (
     miss_distances,
     needs,
     needs_of_atoms,
+    noise_distances,
     spread_distance,
 )
-from symrefine.surface.noise import noise_distances
 from symrefine.surface.skin import isolated_points, local_planes
 from symrefine.surface.surface import Surface
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.align.coset import Coset
-from symrefine.geometry import Array, read_only
+from symrefine.geometry import Array, ReadOnly
 
 OK = "ok"
 # How a status begins that leaves open whether the objects agree.
@@ -16,7 +16,7 @@ OPEN = "not determined"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Alignment:
+class Alignment(ReadOnly):
     """`target ~ scale * matrix @ source + translation`, and what else would do as well.
 
     Attributes:
@@ -37,10 +37,6 @@ class Alignment:
     timings: dict[str, float]
     _coset: Callable[[], Coset] = field(repr=False)
     _miss: Callable[[], tuple[float, str]] = field(repr=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "matrix", read_only(self.matrix))
-        object.__setattr__(self, "translation", read_only(self.translation))
 
     @property
     def determinant(self) -> int:

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.geometry import Array, householder, read_only, unit
+from symrefine.geometry import Array, ReadOnly, householder, unit
 from symrefine.groups import PointGroup, PointGroup2D
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Coset:
+class Coset(ReadOnly):
     """All maps that explain a pair as well as one another.
 
     Attributes:
@@ -30,10 +30,6 @@ class Coset:
     free: Array
     symmetry: str
     observable: str
-
-    def __post_init__(self) -> None:
-        for name in ("matrices", "translations", "free"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
 
 def coset_of_group(

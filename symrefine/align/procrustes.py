@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.geometry import Array, read_only
+from symrefine.geometry import Array, ReadOnly
 from symrefine.ntuples.contract import NTuples
 from symrefine.ntuples.rank import FLOOR
 
@@ -19,7 +19,7 @@ SIGNIFICANT = 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Procrustes:
+class Procrustes(ReadOnly):
     """The orthogonal map that n-tuples determine, and how far they do.
 
     Attributes:
@@ -36,10 +36,6 @@ class Procrustes:
     singular_values: Array
     target_directions: Array
     significance: float
-
-    def __post_init__(self) -> None:
-        for name in ("matrix", "flipped", "singular_values", "target_directions"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def rank(self) -> int:

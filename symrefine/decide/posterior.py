@@ -19,6 +19,10 @@ EVEN_MIRROR = 1.02
 EVEN_PICTURE, EVEN_PICTURE_MIRROR, STEEPNESS_PICTURE = 0.6, 0.75, 3.6
 # How much of what noise alone needs is left to doubt, once it was taken away.
 UNKNOWN = 0.7
+# Alternatives that are told of, and the least probability that is worth telling.
+NEAR, LEAST = 8, 0.01
+# Groups that need up to so many tolerances are asked for.
+BEYOND = 1.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,3 +85,33 @@ def meant(link: Link, tolerance: float, noise: float = 0.0, curve: Curve = SPACE
     squares = ((link.need / even) ** 2 + (UNKNOWN * noise) ** 2) / tolerance**2
     steepness = curve.steepness / (1.0 + (noise / tolerance) ** 2)
     return float(1.0 / (1.0 + squares ** (steepness / 2.0)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Alternative:
+    """Another group that the object may have been meant to have.
+
+    `forgiven` is what its worst element misses by, as the smallest tolerance at which it would hold (fraction of the
+    diagonal): what one has to forgive to believe it.
+    """
+
+    point_group: str
+    probability: float
+    forgiven: float
+
+
+def alternatives(names: Sequence[str], needs: Sequence[float], decision: Decision, index: int) -> list[Alternative]:
+    """The groups of a chain, but for one, that are worth telling, likeliest first.
+
+    Args:
+        names: of the groups from C1 upwards.
+        needs: what each needs to be forgiven.
+        decision: how likely each is.
+        index: the group that is told as the answer; -1 if none is.
+    """
+    found = [
+        Alternative(point_group=name, probability=p, forgiven=need)
+        for i, (name, need, p) in enumerate(zip(names, needs, decision.probabilities, strict=True))
+        if i != index and p >= LEAST
+    ]
+    return sorted(found, key=lambda a: -a.probability)[:NEAR]

@@ -13,8 +13,8 @@ from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import FixedSubspace, fixed_subspace
 from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
+from symrefine.surface.misses import noise_distances
 from symrefine.surface.neighbourhoods import fills_volume, kd_tree
-from symrefine.surface.noise import noise_distances
 from symrefine.surface.skin import FEW, LocalPlanes, Skin, drawn, isolated_points, make_skin
 from symrefine.surface.surface import Surface
 

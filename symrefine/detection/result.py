@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from symrefine.decide.alternatives import Alternative
+from symrefine.decide.posterior import Alternative
 from symrefine.fit.refine import Iterate
-from symrefine.geometry import Array, Axis, Plane, read_only
+from symrefine.geometry import Array, Axis, Plane, ReadOnly
 from symrefine.groups import PointGroup
 from symrefine.ntuples.contract import NTuples
 from symrefine.ntuples.rank import FixedSubspace
@@ -65,7 +65,7 @@ class NearMiss:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Detection:
+class Detection(ReadOnly):
     """Everything `detect` found, in the frame and units of the input.
 
     Attributes:
@@ -116,7 +116,3 @@ class Detection:
     origin: Array
     scale: float
     timings: dict[str, float] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        for name in ("center", "points", "origin"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))

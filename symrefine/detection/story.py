@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
-from symrefine.decide.alternatives import BEYOND, NEAR, alternatives
 from symrefine.decide.chain import Pool, chain, explore
 from symrefine.decide.hypotheses import Element, Hypothesis
-from symrefine.decide.posterior import Decision, Link, decide
+from symrefine.decide.posterior import BEYOND, NEAR, Decision, Link, alternatives, decide
 from symrefine.detection.measure import Measured, doubt, gather, measure, part
 from symrefine.detection.result import Detection, FoundAxis, FoundPlane, NearMiss, Step
 from symrefine.errors import InputError

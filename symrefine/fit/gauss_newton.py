@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from symrefine.geometry import Array, read_only
+from symrefine.geometry import Array, ReadOnly
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -28,7 +28,7 @@ class Linearisations:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Solution:
+class Solution(ReadOnly):
     """Where the iteration stopped, with the evidence: `steps` accepted steps, and whether it converged."""
 
     x: Array
@@ -36,10 +36,6 @@ class Solution:
     hessian: Array
     steps: int
     converged: bool
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "x", read_only(self.x))
-        object.__setattr__(self, "hessian", read_only(self.hessian))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

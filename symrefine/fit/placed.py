@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from symrefine.fit.refine import Framed, mirror_bundle
-from symrefine.geometry import Array, Isometry, frame_with_z, householder, read_only, rotation, rotoreflection
+from symrefine.geometry import Array, Isometry, ReadOnly, frame_with_z, householder, rotation, rotoreflection
 from symrefine.groups import PointGroup
 from symrefine.groups.standard import GOLDEN
 
@@ -20,14 +20,11 @@ FITTED = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Placed:
+class Placed(ReadOnly):
     """A point group about a centre [3], normalised units."""
 
     group: PointGroup
     center: Array
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "center", read_only(self.center))
 
     def framed(self) -> Framed:
         """The operations that are fitted, in the frame of the group: together they leave no unknown of it free."""

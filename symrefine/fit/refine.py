@@ -21,7 +21,7 @@ from symrefine.fit.residual import (
     theta_model,
     turn_frame,
 )
-from symrefine.geometry import Array, Isometry, Plane, frame_with_z, householder, read_only
+from symrefine.geometry import Array, Isometry, Plane, ReadOnly, frame_with_z, householder
 from symrefine.surface.skin import LocalPlanes
 
 MAX_OUTER = 10
@@ -34,7 +34,7 @@ LONGEST = 0.7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Framed:
+class Framed(ReadOnly):
     """Operations given in the coordinates of a frame, and where that frame stands.
 
     Attributes:
@@ -48,10 +48,6 @@ class Framed:
     frame: Array
     center: Array
     bundle: bool = False
-
-    def __post_init__(self) -> None:
-        for name in ("standard", "frame", "center"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def motions(self) -> tuple[Isometry, ...]:
@@ -88,7 +84,7 @@ def single_plane(plane: Plane) -> Framed:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Iterate:
+class Iterate(ReadOnly):
     """State after one outer iteration.
 
     Attributes:
@@ -114,10 +110,6 @@ class Iterate:
     pairs: tuple[Pairs, ...]
     inner_steps: int
     converged: bool
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "theta_rad", read_only(self.theta_rad))
-        object.__setattr__(self, "covariance", read_only(self.covariance))
 
 
 def refine(

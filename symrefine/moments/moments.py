@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.errors import DegenerateShapeError
-from symrefine.geometry import Array, read_only
+from symrefine.geometry import Array, ReadOnly
 from symrefine.moments.quadrature import mesh_nodes, triangle_areas_and_normals
 from symrefine.shape import Shape
 
@@ -99,7 +99,7 @@ def raw_moments(points: Array, weights: Array, order: int) -> Array:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Moments:
+class Moments(ReadOnly):
     """Central normalised moments, with the frame that undoes the normalisation.
 
     Attributes:
@@ -116,10 +116,6 @@ class Moments:
     replicates: Array
     center: Array
     scale: float
-
-    def __post_init__(self) -> None:
-        for name in ("values", "replicates", "center"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     def tensor(self, degree: int) -> Array:
         """Symmetric moment tensor T_degree, shape [n]*degree."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from symrefine.decide.alternatives import NEAR
+from symrefine.decide.posterior import NEAR
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance
 from symrefine.moments.moments import shape_moments

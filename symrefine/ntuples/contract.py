@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from symrefine.errors import InputError
-from symrefine.geometry import Array, read_only
+from symrefine.geometry import Array, ReadOnly, read_only
 from symrefine.moments.moments import Moments, deviations, exponents, occurrences
 from symrefine.shape import Index
 
@@ -21,7 +21,7 @@ PAPER_ORDERS: tuple[tuple[int, ...], ...] = ((3,), (5,), (2, 3), (2, 5), (4, 3),
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class NTuples:
+class NTuples(ReadOnly):
     """Vectors that turn with the object, v(R X) = R v(X), scaled to be comparable across orders and objects.
 
     Attributes:
@@ -35,10 +35,6 @@ class NTuples:
     vectors: Array
     replicates: Array
     labels: tuple[str, ...]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "vectors", read_only(self.vectors))
-        object.__setattr__(self, "replicates", read_only(self.replicates))
 
     @property
     def noise(self) -> Array:

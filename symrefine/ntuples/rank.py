@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from symrefine.geometry import Array, read_only
+from symrefine.geometry import Array, ReadOnly
 from symrefine.ntuples.contract import NTuples
 
 TupleKind = Literal["none", "plane", "axis", "vanish"]
@@ -25,7 +25,7 @@ FLOOR = 0.004 / SIGNIFICANT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FixedSubspace:
+class FixedSubspace(ReadOnly):
     """What the singular values of the n-tuples say.
 
     Attributes:
@@ -40,10 +40,6 @@ class FixedSubspace:
     singular_values: Array
     significance: Array
     directions: Array
-
-    def __post_init__(self) -> None:
-        for name in ("singular_values", "significance", "directions"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def kind(self) -> TupleKind:

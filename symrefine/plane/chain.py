@@ -7,9 +7,9 @@ from functools import reduce
 
 import numpy as np
 
-from symrefine.decide.alternatives import NEAR
 from symrefine.decide.chain import ALIKE, EXACT, HOPELESS
 from symrefine.decide.hypotheses import DIRECTION_ERROR, MOVED_EACH, START_ERROR
+from symrefine.decide.posterior import NEAR
 from symrefine.geometry import Array
 from symrefine.plane.outline import NOISES, Outlines
 from symrefine.plane.placed import Placed, fitted

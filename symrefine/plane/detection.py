@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
-from symrefine.decide.alternatives import BEYOND, NEAR, Alternative, alternatives
-from symrefine.decide.posterior import PICTURE, Decision, Link, decide
+from symrefine.decide.posterior import BEYOND, NEAR, PICTURE, Alternative, Decision, Link, alternatives, decide
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance
 from symrefine.groups import PointGroup2D

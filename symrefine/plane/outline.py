@@ -10,9 +10,8 @@ import numpy as np
 from symrefine.geometry import Array, Isometry
 from symrefine.plane.raster import Raster, between, coarser, outlines, raster_of
 from symrefine.shape import Index
-from symrefine.surface.misses import LIMITS, SHARES, Deviation, disc_distances
+from symrefine.surface.misses import ASKED, LIMITS, SHARES, Deviation, disc_distances, noise_distances
 from symrefine.surface.neighbourhoods import NEIGHBOURS
-from symrefine.surface.noise import ASKED, noise_distances
 from symrefine.surface.skin import FEW, LocalPlanes, isolated_points, local_planes
 from symrefine.surface.surface import Surface
 

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from symrefine.geometry import Array, ReadOnly
 from symrefine.shape import Index
-from symrefine.surface.noise import ASKED
+from symrefine.surface.misses import ASKED
 
 # Points that make a grid, and the share of their weight that must have a neighbour one step away.
 FEWEST, JOINED = 64, 0.9

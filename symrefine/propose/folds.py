@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.geometry import Array, frame_with_z, read_only, rotation
+from symrefine.geometry import Array, ReadOnly, frame_with_z, rotation
 
 # Folds up to half of this are told: a fundamental and its octave.
 MAX_FOLD = 128
@@ -34,15 +34,12 @@ def azimuthal_spectrum(points: Array, weights: Array, axis: Array, max_fold: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FoldCandidate:
+class FoldCandidate(ReadOnly):
     """A fold b with the frame (rows p0, p1, u) whose mirror planes contain u and stand at multiples of pi/b from p0."""
 
     fold: int
     frame: Array
     leak: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "frame", read_only(self.frame))
 
 
 def fold_candidates(points: Array, weights: Array, axis: Array, *, leak_max: float = 0.35) -> list[FoldCandidate]:

@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from symrefine.geometry import Array, read_only, unit
+from symrefine.geometry import Array, ReadOnly, read_only, unit
 from symrefine.moments.harmonics import harmonic_moments, to_polar_axis
 from symrefine.moments.moments import Moments, transformed
 from symrefine.shape import Index
@@ -25,15 +25,11 @@ THIN = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Candidates:
+class Candidates(ReadOnly):
     """Directions [C, 3] in the order of their miss [C], the fraction of the energy that the operation would flip."""
 
     directions: Array
     misses: Array
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "directions", read_only(self.directions))
-        object.__setattr__(self, "misses", read_only(self.misses))
 
 
 @lru_cache(maxsize=1)

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from symrefine.geometry import Array, read_only
+from symrefine.geometry import Array, ReadOnly
 from symrefine.shape import Index
 from symrefine.surface.neighbourhoods import (
     PROBES,
@@ -28,7 +28,7 @@ Body = Literal["surface", "atoms", "volume"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Planes:
+class Planes(ReadOnly):
     """Planes that stand for a surface, or points that stand for themselves.
 
     Attributes:
@@ -42,10 +42,6 @@ class Planes:
     normals: Array
     thickness: Array
     flatness: Array
-
-    def __post_init__(self) -> None:
-        for name in ("points", "normals", "thickness", "flatness"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     def chosen(self, index: Index | NDArray[np.bool_] | slice) -> "Planes":
         """Some of the planes."""
@@ -76,10 +72,6 @@ class LocalPlanes(Planes):
     tree: Any
     body: Body = "surface"
     labels: Index | None = None
-
-    def __post_init__(self) -> None:
-        Planes.__post_init__(self)
-        object.__setattr__(self, "reach", read_only(self.reach))
 
     @property
     def isolated(self) -> bool:
