@@ -19,9 +19,9 @@ from symrefine.groups import PointGroup, from_elements, is_subgroup
 from symrefine.surface.misses import LIMITS, Deviation
 from symrefine.surface.surface import Surface
 
-# Local planes that are moved at a glance by each operation; in a fit and in the judgement, by all of them together (a
-# quarter of that by each at most) and by each at least: what they cost.
-GLANCE, MOVED, MOVED_EACH = 120, 12000, 600
+# Local planes that are moved at a glance by each operation, and in a look by all together; in a fit and in the judgement
+# by all together (a quarter of that by each at most) and by each at least: of fewer, 0.6 % are no sample.
+GLANCE, LOOK, MOVED, MOVED_EACH = 120, 600, 12000, 1200
 # How far the moments may put a start wrong (radians, RMS radii; 0.04 was the most of 698 true ones), and directions of
 # fitted elements.
 START_ERROR, DIRECTION_ERROR = 0.05, np.radians(1.5)
@@ -90,7 +90,7 @@ def _some(parts: list[Operations]) -> list[Operations]:
 def looked_at(surface: Surface, start: Placed) -> tuple[Placed, float]:
     """A coarse fit on a few points, and what it needs by them."""
     state = start.framed()
-    stride = surface.stride(max(GLANCE, MOVED_EACH // len(state.standard)))
+    stride = surface.stride(max(GLANCE, LOOK // len(state.standard)))
     for iterate in refine(surface.cloud, state, start_error_rad=START_ERROR, max_outer=3, stride=stride):
         state = iterate.state
     moved = start.moved(state)

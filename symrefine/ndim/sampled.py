@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import cKDTree
 
-from symrefine.decide.hypotheses import MOVED, MOVED_EACH
+from symrefine.decide.hypotheses import LOOK, MOVED
 from symrefine.geometry import Array
 from symrefine.moments.moments import Moments, tensor_index
 from symrefine.ntuples.rank import SIGNIFICANT
@@ -159,7 +159,7 @@ class Neighbours:
     def __init__(self, points: Array, diameter: float, rng: np.random.Generator) -> None:
         """Split points [N, n] about the centre into some to ask about and others to find nearby."""
         order = rng.permutation(len(points))
-        asked = min(MOVED_EACH, len(points) // 2)
+        asked = min(LOOK, len(points) // 2)
         self.asked = points[order[:asked]]
         self.tree = cKDTree(points[order[asked : asked + MOVED]])
         self.own = self.tree.query(self.asked)[0]

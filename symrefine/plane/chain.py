@@ -8,7 +8,7 @@ from functools import reduce
 import numpy as np
 
 from symrefine.decide.chain import ALIKE, EXACT, HOPELESS
-from symrefine.decide.hypotheses import DIRECTION_ERROR, MOVED_EACH, START_ERROR
+from symrefine.decide.hypotheses import DIRECTION_ERROR, LOOK, START_ERROR
 from symrefine.decide.posterior import NEAR
 from symrefine.geometry import Array
 from symrefine.plane.outline import NOISES, Outlines
@@ -69,7 +69,7 @@ def explore(outlines: Outlines, hint_rad: float | None, limit: float) -> tuple[H
 
 
 def _looks(outlines: Outlines, starts: Sequence[Placed]) -> Array:
-    return outlines.glances([p.widest() for p in starts], MOVED_EACH)
+    return outlines.glances([p.widest() for p in starts], LOOK)
 
 
 def _best(starts: Sequence[Placed], looks: Array) -> list[Placed]:
