@@ -181,10 +181,15 @@ def _join(surface: Surface, parts: list[Hypothesis], known: Iterable[Hypothesis]
     return fitted(surface, placed, before=max(h.iterations for h in parts))
 
 
+def _worst(found: Hypothesis) -> tuple[float, float]:
+    """What a group needs; of those that noise hides, the mean miss of its worst element."""
+    return found.need, max((e.deviation.mean for e in found.elements), default=0.0)
+
+
 def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     """Groups from C1 upwards, each inside the next, by what they need; the last one may be beyond the limit."""
     elements = [single(e) for e in pool.largest.elements if e.need < pool.largest.need / ALIKE]
-    rest = sorted([*pool.small, *elements, pool.largest], key=lambda h: h.need)
+    rest = sorted([*pool.small, *elements, pool.largest], key=_worst)
     known = [pool.largest, *pool.failed]
     links = [NOTHING]
     while rest := [h for h in rest if not links[-1].holds(h.placed)]:
@@ -197,7 +202,7 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
         if found is None or found.need > ALIKE * level:
             tried = [] if found is None else [found]
             singly = [_join(surface, [here, h], known) for h in batch[:SINGLY]]
-            found = min((h for h in (*tried, *singly) if h is not None), key=lambda h: h.need, default=None)
+            found = min((h for h in (*tried, *singly) if h is not None), key=_worst, default=None)
             known += [h for h in (*tried, *singly) if h is not None]
         if found is None:
             rest = [h for h in rest if h not in batch]
