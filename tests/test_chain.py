@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from experiments.objects.shapes import box, join, sample
 from symrefine.decide.chain import Pool, chain, explore
 from symrefine.decide.hypotheses import NOTHING, SAME_RAD, fitted
 from symrefine.decide.posterior import Link, decide
@@ -122,6 +123,32 @@ def test_how_far_the_chain_reaches_changes_nothing_below(sub):
     further = chain(surface, pool, 0.12)
     assert links[1].group.name == sub
     assert further[1].group.name == sub
+
+
+def test_a_larger_group_that_holds_poorly_replaces_no_exact_one():
+    """A ring of 100 atoms is nearly one of revolution: at any tolerance its own group stays in the chain."""
+    angle = 2.0 * np.pi * np.arange(100) / 100
+    atoms = (
+        np.column_stack([np.cos(angle), np.sin(angle), np.zeros(100)]) @ random_orthogonal(np.random.default_rng(2)).T
+    )
+    for limit in (0.0005, 0.005, 0.01, 0.02):
+        links, _, _ = linked(atoms, limit, 1.5 * limit)
+        check_chain(links, 1.5 * limit)
+        assert links[1].group.name == "D100h"
+        assert links[1].need < 1e-6
+
+
+def test_the_exact_mirror_of_a_group_that_nearly_holds_is_found():
+    """Three legs, one of them too far out: its mirror stays exact, off the centroid, while the three nearly hold."""
+    rng = np.random.default_rng(3)
+    legs = [(np.cos(a), np.sin(a)) for a in 2.0 * np.pi * np.arange(3) / 3]
+    parts = [box((0.9 * x, 0.9 * y, 0.0), (0.1, 0.1, 0.6)) for x, y in legs[1:]]
+    parts.append(box((0.98, 0.0, 0.0), (0.1, 0.1, 0.6)))
+    turn = random_orthogonal(rng)
+    points = sample(join([*parts, box((0.0, 0.0, 0.35), (0.8, 0.8, 0.1))]), 8000, 0.0, rng) @ turn.T
+    links, _, _ = linked(points, TOLERANCE, LIMIT)
+    assert links[1].group.name == "Cs"
+    assert abs(links[1].group.frame[2] @ turn[:, 1]) > 0.999
 
 
 # Pools made by hand

@@ -19,8 +19,8 @@ from symrefine.groups import PointGroup, from_elements, is_subgroup
 from symrefine.surface.misses import LIMITS, Deviation
 from symrefine.surface.surface import Surface
 
-# Local planes that are moved at a glance by each operation, and in a look by all together; in a fit and the judgement by
-# all together (a quarter of that by each at most) and by each at least: of fewer, 0.6 % are no sample.
+# Local planes that are moved: at a glance by each operation; in a look by all together; in a fit and when judged by all
+# together (a quarter of that by each at most) and by each at least, as 0.6 % of fewer are no sample.
 GLANCE, LOOK, MOVED, MOVED_EACH = 120, 600, 12000, 1200
 # How far the moments may put a start wrong (radians, RMS radii; 0.04 was the most of 698 true ones), and directions of
 # fitted elements.
