@@ -35,7 +35,7 @@ from experiments.studies.boundary import VIEWS as BOUNDARY_VIEWS
 from experiments.studies.calibration import Judged, bins, plausible, plot, summary
 from experiments.studies.jobs import add_jobs, in_order
 from symrefine.clock import Clock
-from symrefine.decide.posterior import EVEN, EVEN_MIRROR, STEEPNESS, UNKNOWN
+from symrefine.decide.posterior import BLURRED, EVEN, EVEN_MIRROR, STEEPNESS, UNKNOWN
 from symrefine.detection.story import examined, told
 from symrefine.errors import InputError
 from symrefine.files import check_target, whole
@@ -53,7 +53,7 @@ VIEWS = {
 }
 # A group of a chain is true if its operations are those of the truth up to so much.
 NEAR_RAD = math.radians(5.0)
-SHIPPED = (EVEN, EVEN_MIRROR, STEEPNESS, UNKNOWN)
+SHIPPED = (EVEN, EVEN_MIRROR, STEEPNESS, UNKNOWN, BLURRED)
 QUICK_EVERY = 21
 FIGURE = Path(__file__).parents[2] / "docs" / "reliability.png"
 
@@ -243,12 +243,11 @@ def sure_and_wrong(rows: Sequence[Answer]) -> Iterator[str]:
 
 def misfit(constants: Sequence[float], links: Sequence[Known]) -> float:
     """Negative log likelihood of what is true of each link, a link, under constants in the order of `SHIPPED`."""
-    even, even_mirror, steepness, unknown = constants
+    even, even_mirror, steepness, unknown, blurred = constants
     evens = np.array([even_mirror if k.group == "Cs" else even for k in links])
-    noise = np.array([k.noise for k in links])
-    squares = (np.array([k.need for k in links]) / evens) ** 2 + (unknown * noise) ** 2
-    less_steep = steepness / (1.0 + (noise / TOLERANCE) ** 2)
-    wrong_odds = less_steep / 2.0 * np.log(np.maximum(squares, np.finfo(float).tiny) / TOLERANCE**2)
+    noise, needs = (np.array([getattr(k, name) for k in links]) / TOLERANCE for name in ("noise", "need"))
+    squares = (needs / evens) ** 2 * (1.0 + (blurred * noise) ** 2) + (unknown * noise) ** 2
+    wrong_odds = steepness / (1.0 + noise**2) / 2.0 * np.log(np.maximum(squares, np.finfo(float).tiny))
     return float(np.logaddexp(0.0, np.where([k.true for k in links], wrong_odds, -wrong_odds)).mean())
 
 
@@ -268,10 +267,11 @@ def fit_report(links: Sequence[Known]) -> Iterator[str]:
     if not all(halves.values()):
         yield "nothing to fit to in one of the halves"
         return
-    yield f"{'':22s} EVEN  EVEN_MIRROR  STEEPNESS  UNKNOWN  negative log likelihood a link: {', '.join(HALVES)}"
+    named = "EVEN  EVEN_MIRROR  STEEPNESS  UNKNOWN  BLURRED"
+    yield f"{'':22s} {named}  negative log likelihood a link: {', '.join(HALVES)}"
     for label, c in (("shipped", SHIPPED), *((f"best for {half}", best(ks)) for half, ks in halves.items())):
         scores = ", ".join(f"{misfit(c, ks):.5f}" for ks in halves.values())
-        yield f"{label:20s} {c[0]:6.3f}  {c[1]:11.3f}  {c[2]:9.2f}  {c[3]:7.3f}  {scores}"
+        yield f"{label:20s} {c[0]:6.3f}  {c[1]:11.3f}  {c[2]:9.2f}  {c[3]:7.3f}  {c[4]:7.3f}  {scores}"
 
 
 def kept(path: Path) -> list[Known]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symrefine.decide.hypotheses import (
+    DIRECTION_ERROR,
     NOTHING,
     SAME_RAD,
     START_ERROR,
@@ -23,6 +24,7 @@ from symrefine.decide.hypotheses import (
     single,
 )
 from symrefine.fit.placed import Placed
+from symrefine.groups import is_subgroup
 from symrefine.propose.candidates import Evidence, about, beside, prime_axes, proposals
 from symrefine.surface.misses import LIMITS
 from symrefine.surface.surface import Surface
@@ -66,6 +68,11 @@ class Pool:
     def has(self, placed: Placed, needs: float) -> bool:
         """Whether a group is in one that was fitted and needs no more than it does."""
         return any(h.need <= ALIKE * needs and h.holds(placed) for h in (self.largest, *self.small))
+
+    def met(self, placed: Placed) -> bool:
+        """Whether a group was fitted at this very place."""
+        near = [h.group for h in self.small if h.group.name == placed.group.name]
+        return any(is_subgroup(placed.group, g, DIRECTION_ERROR) for g in near)
 
 
 def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
@@ -116,9 +123,9 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float)
         moved, needs = looked_at(surface, start)
         if needs > COARSE * limit:
             pool = replace(pool, looked=(*pool.looked, (moved, needs)))
-        elif not pool.has(moved, max(needs, least)):
+        elif not pool.has(moved, max(needs / COARSE, least)) and not pool.met(moved):
             pool = _joined_at_once(surface, pool, moved) if needs <= limit and pool.largest.elements else pool
-            if not pool.has(moved, max(needs, least)):
+            if not pool.has(moved, max(needs / COARSE, least)):
                 pool = _grown(surface, pool, fitted(surface, moved), limit)
     return pool
 

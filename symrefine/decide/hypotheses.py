@@ -64,7 +64,9 @@ class Hypothesis:
 
     def holds(self, other: Placed) -> bool:
         """Whether it has all operations of another group, as far as directions tell."""
-        return is_subgroup(other.group, self.group, 2.0 * SAME_RAD)
+        # By a quarter of a turn of the other's own, lest turns of many folds pass for those of fewer.
+        turn = 2.0 * math.pi / other.group.symbol.fold if other.group.symbol.fold else math.pi
+        return is_subgroup(other.group, self.group, min(2.0 * SAME_RAD, 0.25 * turn) if turn else 2.0 * SAME_RAD)
 
 
 NOTHING = Hypothesis(placed=Placed(group=PointGroup(name="C1"), center=np.zeros(3)), elements=(), need=0.0)
@@ -105,7 +107,7 @@ def fitted(surface: Surface, start: Placed, *, error: float = START_ERROR, befor
     placed = start.moved(history[-1].state)
     parts = [(part, part.motions(placed.center)) for part in elements(placed.group)]
     misses = [surface.misses(motions, sources=_moved_each(len(parts))) for _, motions in parts]
-    found = tuple(_judged(surface, *p, m, placed.center) for p, m in zip(parts, misses, strict=True))
+    found = tuple(_judged(surface, *p, m, placed.center, len(parts)) for p, m in zip(parts, misses, strict=True))
     # A part out of place is met by all operations: together they tell it from noise where none does alone.
     need = max(surface.needed_by_all(misses), *(e.need for e in found))
     return Hypothesis(placed=placed, elements=found, need=need, history=history, before=before)
@@ -115,9 +117,12 @@ def _moved_each(operations: int) -> int:
     return min(max(MOVED_EACH, MOVED // operations), MOVED // 4)
 
 
-def _judged(surface: Surface, part: Operations, motions: Sequence[Isometry], misses: Array, center: Array) -> Element:
+def _judged(
+    surface: Surface, part: Operations, motions: Sequence[Isometry], misses: Array, center: Array, tests: int
+) -> Element:
     worst = reduce(Deviation.at_least, map(Deviation.of, misses))
-    return Element(operations=part, center=center, deviation=worst, need=float(surface.needed(misses, motions).max()))
+    need = float(surface.needed(misses, motions, tests).max())
+    return Element(operations=part, center=center, deviation=worst, need=need)
 
 
 def joined(parts: Sequence[Placed]) -> Placed | None:

@@ -11,14 +11,14 @@ from itertools import pairwise
 
 # Of the logistic curve: the need over the tolerance at which half of the groups are meant, and how fast they become
 # fewer. Calibrated on intact, broken and noisy objects by `python -m experiments.studies.reliability --fit`.
-EVEN, STEEPNESS = 0.5, 8.0
+EVEN, STEEPNESS = 0.75, 8.0
 # The same of a lone mirror: bodies and devices that are meant to have just one are made less exactly than others.
 EVEN_MIRROR = 1.02
 # All three of pictures, where parts moved by half a tolerance are told as well, so that the curve is less steep: close
 # to that of the first version, which was fitted to half of its drawings; see `experiments.studies.planar_reliability`.
 EVEN_PICTURE, EVEN_PICTURE_MIRROR, STEEPNESS_PICTURE = 0.6, 0.75, 3.6
-# How much of what noise alone needs is left to doubt, once it was taken away.
-UNKNOWN = 0.7
+# How much of what noise alone needs is left to doubt, once it was taken away, and by how much it blurs a miss.
+UNKNOWN, BLURRED = 0.7, 2.0
 # Alternatives that are told of, and the least probability that is worth telling.
 NEAR, LEAST = 8, 0.01
 # Groups that need up to so many tolerances are asked for.
@@ -79,11 +79,13 @@ def decide(links: Sequence[Link], tolerance: float, noise: float = 0.0, curve: C
 def meant(link: Link, tolerance: float, noise: float = 0.0, curve: Curve = SPACE) -> float:
     """Probability that a group is meant, from what it needs.
 
-    Noise and need add up in squares. Noise also blurs what was measured, in both directions: the curve gets less steep.
+    Noise and need add up in squares. Noise also blurs what was measured: local planes grow with it, so that details of
+    one size show less and less of what they miss by, and the curve gets less steep.
     """
     even = curve.even_mirror if link.lone_mirror else curve.even
-    squares = ((link.need / even) ** 2 + (UNKNOWN * noise) ** 2) / tolerance**2
-    steepness = curve.steepness / (1.0 + (noise / tolerance) ** 2)
+    need, noise = link.need / tolerance, noise / tolerance
+    squares = (need / even) ** 2 * (1.0 + (BLURRED * noise) ** 2) + (UNKNOWN * noise) ** 2
+    steepness = curve.steepness / (1.0 + noise**2)
     return float(1.0 / (1.0 + squares ** (steepness / 2.0)))
 
 

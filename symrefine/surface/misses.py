@@ -58,7 +58,7 @@ class Deviation:
 NO_MISS = Deviation(mean=0.0, p95=0.0, p99=0.0, max=0.0)
 
 
-def needs(misses: Array, noise: Array) -> Array:
+def needs(misses: Array, noise: Array, tests: int = 1) -> Array:
     """The smallest tolerances [...], fractions of the diagonal, at which misses [..., N] still count as symmetric.
 
     What noise alone explains is taken away, with what samples leave uncertain: from the mean in squares, as noise and
@@ -67,11 +67,12 @@ def needs(misses: Array, noise: Array) -> Array:
     Args:
         misses: distances, fractions of the diagonal.
         noise: [M] misses that noise alone shows, in ascending order; none if empty.
+        tests: of how many operations the worst counts: the more, the farther off one of them is by chance.
     """
     farthest, count = -np.sort(-misses, axis=-1), misses.shape[-1]
     mean, beyond = misses.mean(axis=-1), np.arange(1, count + 1) / count
     if noise.size:
-        sampled = SURE * np.sqrt(1.0 / count + 1.0 / noise.size)
+        sampled = np.sqrt((SURE**2 + 2.0 * np.log(tests)) * (1.0 / count + 1.0 / noise.size))
         chance = 1.0 - np.searchsorted(noise, farthest, side="right") / noise.size
         beyond = beyond - chance - sampled * np.sqrt(chance * (1.0 - chance))
         mean = np.sqrt(np.maximum(mean**2 - (noise.mean() + sampled * noise.std()) ** 2, 0.0))

@@ -46,14 +46,15 @@ class Surface:
         stride = self.stride(sources)
         return miss_distances(self.cloud, motions, stride=stride, bound=bound * self.diagonal) / self.diagonal
 
-    def needed(self, misses: Array, motions: Sequence[Isometry]) -> Array:
+    def needed(self, misses: Array, motions: Sequence[Isometry], tests: int = 1) -> Array:
         """The smallest tolerances [K], fractions of the diagonal, at which operations hold that miss so [K, N].
 
         Of a volume the nearest points tell the outline only; by how much its mass spreads otherwise counts like a mean.
+        `tests` as of `needs`.
         """
         if self.cloud.body == "atoms":
             return needs_of_atoms(misses)
-        found = needs(misses, self.noise)
+        found = needs(misses, self.noise, tests)
         if self.cloud.body == "surface":
             return found
         own = np.cov(self.cloud.points.T)
