@@ -78,7 +78,8 @@ def needs(misses: Array, noise: Array, tests: int = 1) -> Array:
         mean = np.sqrt(np.maximum(mean**2 - (noise.mean() + sampled * noise.std()) ** 2, 0.0))
     found = [mean / LIMITS[0]]
     for share, limit in zip(SHARES, LIMITS[1:], strict=True):
-        found.append((farthest * (beyond > share)).max(axis=-1) / limit)
+        by_chance = np.sqrt(2.0 * np.log(tests) * share * (1.0 - share) / count)
+        found.append((farthest * (beyond > share + by_chance)).max(axis=-1) / limit)
     return np.asarray(reduce(np.maximum, found))
 
 
