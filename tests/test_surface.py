@@ -237,6 +237,17 @@ def test_another_sample_of_the_same_noise_needs_next_to_nothing():
     assert needs(noise, NO_NOISE) > 2.0
 
 
+def test_the_worst_of_many_operations_is_no_farther_off_by_chance():
+    """Of 60 samples of the same noise, and of an exact surface with specks as large as they may just be."""
+    rng = np.random.default_rng(7)
+    noise = np.sort(np.abs(rng.standard_normal(4000)))
+    draws = np.abs(rng.standard_normal((20, 60, 1200)))
+    assert (needs(draws, noise, tests=60).max(axis=1) == 0.0).mean() > 0.9
+    assert (needs(draws, noise).max(axis=1) > 0.0).mean() > 0.9
+    specks = np.where(rng.random((20, 60, 1200)) < SHARES[-1], 0.02, 0.0)
+    assert np.median(needs(specks, NO_NOISE, tests=60).max(axis=1)) < np.median(needs(specks, NO_NOISE).max(axis=1))
+
+
 @pytest.mark.parametrize("share", [0.02, 0.05, 0.15])
 def test_a_detail_is_seen_under_noise(share):
     """A part that is out of place by three standard deviations of the noise needs nearly what it does without any."""

@@ -35,7 +35,7 @@ from experiments.studies.boundary import VIEWS as BOUNDARY_VIEWS
 from experiments.studies.calibration import Judged, bins, plausible, plot, summary
 from experiments.studies.jobs import add_jobs, in_order
 from symrefine.clock import Clock
-from symrefine.decide.posterior import BLURRED, EVEN, EVEN_MIRROR, STEEPNESS, UNKNOWN
+from symrefine.decide.posterior import BLURRED, EVEN, EVEN_MIRROR, STEEPNESS, UNKNOWN, sharpness, strain
 from symrefine.detection.story import examined, told
 from symrefine.errors import InputError
 from symrefine.files import check_target, whole
@@ -246,8 +246,8 @@ def misfit(constants: Sequence[float], links: Sequence[Known]) -> float:
     even, even_mirror, steepness, unknown, blurred = constants
     evens = np.array([even_mirror if k.group == "Cs" else even for k in links])
     noise, needs = (np.array([getattr(k, name) for k in links]) / TOLERANCE for name in ("noise", "need"))
-    squares = (needs / evens) ** 2 * (1.0 + (blurred * noise) ** 2) + (unknown * noise) ** 2
-    wrong_odds = steepness / (1.0 + noise**2) / 2.0 * np.log(np.maximum(squares, np.finfo(float).tiny))
+    squares = np.maximum(strain(needs, noise, evens, unknown, blurred), np.finfo(float).tiny)
+    wrong_odds = sharpness(noise, steepness) / 2.0 * np.log(squares)
     return float(np.logaddexp(0.0, np.where([k.true for k in links], wrong_odds, -wrong_odds)).mean())
 
 

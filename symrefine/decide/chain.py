@@ -6,7 +6,7 @@ an exact element stays in it, and the group at any tolerance is read from the sa
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,6 +74,10 @@ class Pool:
         near = [h.group for h in self.small if h.group.name == placed.group.name]
         return any(is_subgroup(placed.group, g, DIRECTION_ERROR) for g in near)
 
+    def with_failed(self, failed: Hypothesis | None) -> "Pool":
+        """The pool that knows of a group, if there is one, that it does not hold."""
+        return self if failed is None or failed in self.failed else replace(self, failed=(*self.failed, failed))
+
 
 def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
     """Fit and judge what the moments propose, and what may stand beside the largest group that holds.
@@ -85,7 +89,7 @@ def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
     for starts in proposals(evidence):
         pool = _settled(surface, _tried(surface, pool, starts, limit), pool.largest, limit)
     for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
-        if glance < HOPELESS and not pool.has(axis, _exact(surface)):
+        if glance < HOPELESS and not pool.has(axis, exact_need(surface.floor)):
             starts = about(evidence, axis.group.frame[2])
             pool = _settled(surface, _tried(surface, pool, starts, limit), pool.largest, limit)
     nearest = sorted((*pool.looked, *pool.hopeless), key=lambda k: k[1])[:TOLD] if not pool.small else []
@@ -102,7 +106,7 @@ def _settled(surface: Surface, pool: Pool, before: Hypothesis, limit: float) -> 
 
 def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tuple[Placed, float]]:
     """The starts that are new with what they seem to need at a glance, large groups that look good first."""
-    new = [s for s in starts if not pool.has(s, _exact(surface))]
+    new = [s for s in starts if not pool.has(s, exact_need(surface.floor))]
     seen = zip(new, glances(surface, new, HOPELESS), strict=True)
     return sorted(seen, key=lambda k: k[1] / math.log2(1.0 + _size(k[0])))
 
@@ -114,7 +118,7 @@ def _size(placed: Placed) -> float:
 def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float) -> Pool:
     """The pool with candidates fitted, but for those that the group so far has anyway."""
     for start, glance in _glanced(surface, pool, starts):
-        least = _exact(surface)
+        least = exact_need(surface.floor)
         if pool.has(start, least) or _is_image(start, glance, pool):
             continue
         if glance >= HOPELESS:
@@ -132,35 +136,31 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float)
 
 def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
     """The pool where a candidate and the largest group hold together as far as noise tells: no need to part them."""
-    placed = joined([pool.largest.placed, start])
-    if placed is not None and not any(_same(h.placed, placed) for h in pool.failed):
-        both = fitted(surface, placed, before=pool.largest.iterations)
-        if both.need <= _exact(surface):
-            return replace(pool, largest=both)
-        return replace(pool, failed=(*pool.failed, both))
-    return pool
+    both = _generated(surface, [pool.largest.placed, start], pool.failed, pool.largest.iterations)
+    if both is not None and both.need <= exact_need(surface.floor):
+        return replace(pool, largest=both)
+    return pool.with_failed(both)
 
 
-def _exact(surface: Surface) -> float:
-    """The need up to which noise, or the rounding of coordinates, tells nothing apart."""
-    return max(EXACT, 0.5 * surface.floor)
+def exact_need(floor: float) -> float:
+    """The need up to which noise, which alone needs `floor`, or the rounding of coordinates tells nothing apart."""
+    return max(EXACT, 0.5 * floor)
 
 
 def _grown(surface: Surface, pool: Pool, found: Hypothesis, limit: float) -> Pool:
     """The pool with what was fitted, and its largest group joined to it, if both hold together, or else the larger."""
-    if pool.has(found.placed, max(found.need, _exact(surface))):
+    if pool.has(found.placed, max(found.need, exact_need(surface.floor))):
         return pool
     if found.need > limit:
         return replace(pool, small=(*pool.small, found))
     both = _join(surface, [pool.largest, found], pool.failed)
     if both is not None and both.need <= limit:
-        largest, failed = both, pool.failed
+        largest = both
     else:
-        largest = max(pool.largest, found, key=lambda h: _size(h.placed))
-        failed = pool.failed if both is None else (*pool.failed, both)
+        largest, pool = max(pool.largest, found, key=lambda h: _size(h.placed)), pool.with_failed(both)
     # What is replaced may hold better than what takes its place.
     kept = [pool.largest] if largest is not pool.largest and pool.largest.elements else []
-    return replace(pool, small=(*pool.small, *kept, found), largest=largest, failed=failed)
+    return replace(pool, small=(*pool.small, *kept, found), largest=largest)
 
 
 def _is_image(start: Placed, glance: float, pool: Pool) -> bool:
@@ -179,13 +179,18 @@ def _same(a: Placed, b: Placed) -> bool:
 
 def _join(surface: Surface, parts: list[Hypothesis], known: Iterable[Hypothesis]) -> Hypothesis | None:
     """The group that hypotheses generate, fitted unless it is one of them or known; None if they generate none."""
-    placed = joined([h.placed for h in parts if h.elements])
+    placed = [h.placed for h in parts if h.elements]
+    return _generated(surface, placed, (*parts, *known), max(h.iterations for h in parts))
+
+
+def _generated(
+    surface: Surface, parts: Sequence[Placed], known: Iterable[Hypothesis], before: int
+) -> Hypothesis | None:
+    placed = joined(parts)
     if placed is None:
         return None
-    for h in (*parts, *known):
-        if h.history and _same(h.placed, placed):
-            return h
-    return fitted(surface, placed, before=max(h.iterations for h in parts))
+    same = (h for h in known if h.history and _same(h.placed, placed))
+    return next(same, None) or fitted(surface, placed, before=before)
 
 
 def _worst(found: Hypothesis) -> tuple[float, float]:
@@ -203,7 +208,7 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
         here = links[-1]
         if rest[0].need > limit:
             break
-        level = max(ALIKE * rest[0].need, here.need, _exact(surface))
+        level = max(ALIKE * rest[0].need, here.need, exact_need(surface.floor))
         batch = [h for h in rest if h.need <= level]
         found = _join(surface, [here, *batch], known)
         if found is None or found.need > ALIKE * level:

@@ -65,8 +65,9 @@ class Hypothesis:
     def holds(self, other: Placed) -> bool:
         """Whether it has all operations of another group, as far as directions tell."""
         # By a quarter of a turn of the other's own, lest turns of many folds pass for those of fewer.
-        turn = 2.0 * math.pi / other.group.symbol.fold if other.group.symbol.fold else math.pi
-        return is_subgroup(other.group, self.group, min(2.0 * SAME_RAD, 0.25 * turn) if turn else 2.0 * SAME_RAD)
+        fold = other.group.symbol.fold
+        turn = 2.0 * math.pi / fold if 0 < fold < math.inf else math.inf
+        return is_subgroup(other.group, self.group, min(2.0 * SAME_RAD, 0.25 * turn))
 
 
 NOTHING = Hypothesis(placed=Placed(group=PointGroup(name="C1"), center=np.zeros(3)), elements=(), need=0.0)

@@ -8,7 +8,10 @@ it is the i-th itself is `inside[i] - inside[i + 1]`: the worst element kept and
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any, TypeVar
 
+# One number, or many side by side.
+T = TypeVar("T", bound=Any)
 # Of the logistic curve: the need over the tolerance at which half of the groups are meant, and how fast they become
 # fewer. Calibrated on intact, broken and noisy objects by `python -m experiments.studies.reliability --fit`.
 EVEN, STEEPNESS = 0.8, 8.0
@@ -83,10 +86,18 @@ def meant(link: Link, tolerance: float, noise: float = 0.0, curve: Curve = SPACE
     one size show less and less of what they miss by, and the curve gets less steep.
     """
     even = curve.even_mirror if link.lone_mirror else curve.even
-    need, noise = link.need / tolerance, noise / tolerance
-    squares = (need / even) ** 2 * (1.0 + (BLURRED * noise) ** 2) + (UNKNOWN * noise) ** 2
-    steepness = curve.steepness / (1.0 + noise**2)
-    return float(1.0 / (1.0 + squares ** (steepness / 2.0)))
+    strained = strain(link.need / tolerance, noise / tolerance, even)
+    return float(1.0 / (1.0 + strained ** (sharpness(noise / tolerance, curve.steepness) / 2.0)))
+
+
+def strain(need: T, noise: T, even: T, unknown: float = UNKNOWN, blurred: float = BLURRED) -> T:
+    """How far a group is from the middle of the curve, in squares; 1 there. Need and noise in tolerances."""
+    return (need / even) ** 2 * (1.0 + (blurred * noise) ** 2) + (unknown * noise) ** 2
+
+
+def sharpness(noise: T, steepness: float) -> T:
+    """How steep the curve is where noise alone needs so many tolerances."""
+    return steepness / (1.0 + noise**2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

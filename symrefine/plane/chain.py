@@ -7,7 +7,7 @@ from functools import reduce
 
 import numpy as np
 
-from symrefine.decide.chain import ALIKE, EXACT, HOPELESS
+from symrefine.decide.chain import ALIKE, EXACT, HOPELESS, exact_need
 from symrefine.decide.hypotheses import DIRECTION_ERROR, LOOK, START_ERROR
 from symrefine.decide.posterior import NEAR
 from symrefine.geometry import Array
@@ -136,7 +136,7 @@ def chain(outlines: Outlines, pool: Sequence[Hypothesis], limit: float) -> tuple
     links = [NOTHING]
     while beyond := [h for h in pool if h.placed.order > links[-1].placed.order and h.placed.holds(links[-1].placed)]:
         here, least = links[-1], min(h.need for h in beyond)
-        level = max(ALIKE * least, here.need, EXACT, 0.5 * outlines.floor)
+        level = max(ALIKE * least, here.need, exact_need(outlines.floor))
         found = max((h for h in beyond if h.need <= level), key=lambda h: (h.placed.order, -h.need))
         links.append(replace(found, needs=_largest((found.needs, here.needs))))
         if found.need > limit:

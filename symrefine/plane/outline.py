@@ -10,7 +10,7 @@ import numpy as np
 from symrefine.geometry import Array, Isometry
 from symrefine.plane.raster import Raster, between, coarser, outlines, raster_of
 from symrefine.shape import Index
-from symrefine.surface.misses import ASKED, LIMITS, SHARES, Deviation, disc_distances, noise_distances
+from symrefine.surface.misses import ASKED, LIMITS, SHARES, Deviation, disc_distances, miss_distances, noise_distances
 from symrefine.surface.neighbourhoods import NEIGHBOURS
 from symrefine.surface.skin import FEW, LocalPlanes, isolated_points, local_planes
 from symrefine.surface.surface import Surface
@@ -51,12 +51,8 @@ class Outlines:
 
     def glances(self, motions: Sequence[Isometry], sources: int) -> Array:
         """Mean miss [M] of each operation, as about `sources` points of each outline tell."""
-        found = np.zeros(len(motions))
-        for surface in self.surfaces:
-            some = surface.cloud.points[:: surface.stride(sources)]
-            images = np.concatenate([m.apply(some) for m in motions])
-            found += disc_distances(surface.cloud, images).reshape(len(motions), -1).mean(axis=1)
-        return found
+        each = [miss_distances(s.cloud, motions, stride=s.stride(sources)).mean(axis=1) for s in self.surfaces]
+        return np.asarray(np.sum(each, axis=0))
 
     @property
     def diagonal(self) -> float:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from symrefine.surface.skin import LocalPlanes
 NEAREST_SPREAD = 0.363
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Surface:
     """Local planes in normalised units, the diagonal their misses are measured by, and what noise alone would show.
 
@@ -57,8 +58,12 @@ class Surface:
         found = needs(misses, self.noise, tests)
         if self.cloud.body == "surface":
             return found
-        own = np.cov(self.cloud.points.T)
-        return np.maximum(found, [spread_distance(own, m) / (self.diagonal * LIMITS[0]) for m in motions])
+        return np.maximum(found, [spread_distance(self._spread, m) / (self.diagonal * LIMITS[0]) for m in motions])
+
+    @cached_property
+    def _spread(self) -> Array:
+        """Covariance of the points [3, 3]."""
+        return np.cov(self.cloud.points.T)
 
     def needed_by_all(self, misses: Sequence[Array]) -> float:
         """The smallest tolerance at which a surface holds that operations together miss so, each [K, N]."""
@@ -74,7 +79,7 @@ class Surface:
         """The smallest tolerance at which all of some operations hold."""
         return float(self.needs(motions, sources=sources).max())
 
-    @property
+    @cached_property
     def floor(self) -> float:
         """The smallest tolerance at which what noise alone shows would count as symmetric.
 
