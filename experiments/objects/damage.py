@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from experiments.objects.shapes import sample
 from symrefine.geometry import Array, tight_diagonal, unit
+from symrefine.load.open3d import open3d
 from symrefine.shape import Index, Shape
 
 Rng = np.random.Generator
@@ -140,8 +141,7 @@ def views(mesh: Shape, count: float, rng: Rng, *, rough: bool = False) -> Damage
 
 def view(mesh: Shape, direction: Array, rng: Rng, *, rough: bool = False) -> Damaged:
     """What a camera sees that stands in a direction from the object, on a grid of rays."""
-    import open3d as o3d
-
+    o3d = open3d()
     scene = o3d.t.geometry.RaycastingScene()
     faces = np.asarray(mesh.faces, dtype=np.uint32)
     scene.add_triangles(np.ascontiguousarray(mesh.points, dtype=np.float32), faces)

@@ -1,8 +1,7 @@
 """Open3D's map between two clouds: feature matching and ICP, beside `align`."""
 
-from functools import cache
-
 from symrefine.geometry import Array
+from symrefine.load.open3d import open3d
 
 # Voxel of Open3D's feature matching, as a fraction of the diagonal: of 5, 3 and 2 % the first at which it finds
 # (nearly) every rotation: 24 of 24 and 15 of 16 in two runs, against 4 of 8 at 5 % and 7 of 8 at 3 %.
@@ -11,7 +10,7 @@ VOXEL = 0.02
 
 def open3d_align(source: Array, target: Array, voxel: float) -> Array:
     """FPFH features, RANSAC, point-to-plane ICP, with the parameters of Open3D's own tutorial."""
-    import open3d as o3d
+    o3d = open3d()
 
     registration, search = o3d.pipelines.registration, o3d.geometry.KDTreeSearchParamHybrid
     o3d.utility.set_verbosity_level(o3d.utility.VerbosityLevel.Error)
@@ -37,14 +36,3 @@ def open3d_align(source: Array, target: Array, voxel: float) -> Array:
     b.estimate_normals(search(radius=2 * voxel, max_nn=30))
     plane = registration.TransformationEstimationPointToPlane()
     return registration.registration_icp(a, b, 0.4 * voxel, found.transformation, plane).transformation[:3, :3]
-
-
-@cache
-def ready() -> None:
-    """Load open3d with the library that it needs, outside the time that is taken."""
-    import ctypes
-
-    import libusb_package
-
-    ctypes.CDLL(str(libusb_package.get_library_path()))
-    import open3d  # noqa: F401

@@ -1,6 +1,5 @@
 """Point clouds of the Point Cloud Library (PCD 0.7), in its three encodings."""
 
-import ctypes
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ import numpy as np
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.content import Content, as_float64
+from symrefine.load.open3d import open3d
 from symrefine.load.text import NATURAL, count, numbered_lines, parse_table, shorten
 
 _KEYS = frozenset("VERSION FIELDS SIZE TYPE COUNT WIDTH HEIGHT VIEWPOINT POINTS DATA".split())
@@ -161,12 +161,7 @@ def _read_compressed(data: bytes, path: Path, header: _Header, wanted: list[str]
 
 
 def _open3d_points(path: Path, header: _Header, columns: int) -> Array:
-    # Here, for it takes a second; libusb first, for open3d needs it and bare machines lack it.
-    import libusb_package
-
-    ctypes.CDLL(str(libusb_package.get_library_path()))
-    import open3d as o3d
-
+    o3d = open3d()
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
         cloud = o3d.io.read_point_cloud(path, format="pcd")
     arrays = [np.asarray(cloud.points), np.asarray(cloud.normals)][: columns // 3]
