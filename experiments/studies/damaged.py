@@ -131,7 +131,7 @@ def run(case: Case) -> Row:
     true = all(there) and not (found.inversion and not truth.group.has_inversion)
     at_least = getattr(found, "at_least", False) and true
     flagged = np.zeros(len(made.points), dtype=bool)
-    flagged[getattr(found, "outliers", np.empty(0, dtype=np.int64))] = True
+    flagged[found.outliers] = True
     stray = made.strays == 1
     both = float((flagged & stray).sum())
     return Row(

@@ -2,10 +2,12 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal, get_args
 
 import numpy as np
 
 from symrefine.decide.posterior import UNKNOWN
+from symrefine.errors import InputError
 from symrefine.geometry import Array, tight_diagonal
 from symrefine.moments.moments import Moments, shape_moments
 from symrefine.moments.quadrature import mesh_nodes, sample_surface
@@ -15,9 +17,11 @@ from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
 from symrefine.surface.misses import noise_distances
 from symrefine.surface.neighbourhoods import fills_volume, kd_tree
+from symrefine.surface.sampling import sampling
 from symrefine.surface.skin import FEW, LocalPlanes, Skin, drawn, isolated_points, make_skin
 from symrefine.surface.surface import Surface
 
+Outliers = Literal["auto", "none"]
 # Order of the moments, and parts of their jackknife.
 ORDER, PARTS = 8, 16
 # Local planes of a cloud; points that a volume is known by, and planes of a mesh, whose normals are exact.
@@ -32,9 +36,20 @@ STRAY = 5.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measured:
-    """A shape with the classes of its points or faces, its moments and its n-tuples."""
+    """A shape with the classes of its points or faces, its moments and its n-tuples.
+
+    Attributes:
+        shape: without what was taken as outliers.
+        outliers: indices, ascending, of the points that were.
+        clumps: how many groups of them stand apart from the body.
+        classes: of its points or faces, that must match.
+        moments: to order 8.
+        vectors: the n-tuples of them.
+    """
 
     shape: Shape
+    outliers: Index
+    clumps: int
     classes: Index | None
     moments: Moments
     vectors: NTuples
@@ -50,11 +65,30 @@ class Measured:
         return fixed_subspace(self.vectors)
 
 
-def measure(shape: Shape) -> Measured:
-    """Moments to order 8 and the n-tuples of them."""
+def measure(shape: Shape, *, outliers: Outliers = "auto") -> Measured:
+    """Moments to order 8 and the n-tuples of them, of the points that belong to the object.
+
+    Raises:
+        InputError: another word for outliers.
+    """
+    if outliers not in get_args(Outliers):
+        raise InputError(f"outliers is {outliers!r}; expected one of {list(get_args(Outliers))}")
+    away, clumps = np.empty(0, dtype=np.int64), 0
+    if shape.faces is None and shape.weights is not None and not shape.weights.all():
+        massive = np.flatnonzero(shape.weights > 0)
+        shape = part(shape, massive)  # points of no mass are no part of the object
+    else:
+        massive = np.arange(len(shape.points))
+    if shape.faces is None and not is_few(shape):
+        seen = sampling(shape.points, np.random.default_rng(0), outliers=outliers == "auto")
+        away, clumps = massive[np.sort(np.concatenate([seen.strays, *seen.clumps]))], len(seen.clumps)
+        shape = part(shape, seen.kept) if away.size else shape
+        shape = replace(shape, weights=seen.shares) if shape.weights is None and seen.shares is not None else shape
     classes = _classes(shape)
     moments = _moments(shape, classes, parts=0 if is_few(shape) or shape.faces is not None else PARTS)
-    return Measured(shape=shape, classes=classes, moments=moments, vectors=ntuples(moments))
+    return Measured(
+        shape=shape, outliers=away, clumps=clumps, classes=classes, moments=moments, vectors=ntuples(moments)
+    )
 
 
 def is_few(shape: Shape) -> bool:

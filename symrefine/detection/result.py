@@ -8,6 +8,7 @@ from symrefine.geometry import Array, Axis, Plane, ReadOnly
 from symrefine.groups import PointGroup
 from symrefine.ntuples.contract import NTuples
 from symrefine.ntuples.rank import FixedSubspace
+from symrefine.shape import Index
 from symrefine.surface.misses import Deviation
 
 
@@ -90,6 +91,8 @@ class Detection(ReadOnly):
         vectors: the n-tuples themselves, dimensionless.
         history: the iterates of that refinement, in normalised units; `scale` and `origin` undo the normalisation.
         points: [M, 3] the points the refinement used, normalised units.
+        outliers: indices, ascending, of the points that were taken as no part of the object.
+        clumps: how many of these are groups of points apart from the body, rather than single strays.
         timings: seconds by stage; everything else is a function of the input and the options alone.
     """
 
@@ -113,6 +116,8 @@ class Detection(ReadOnly):
     vectors: NTuples
     history: tuple[Iterate, ...]
     points: Array
+    outliers: Index
+    clumps: int
     origin: Array
     scale: float
     timings: dict[str, float] = field(default_factory=dict)

@@ -11,7 +11,7 @@ from symrefine.clock import Clock
 from symrefine.decide.chain import Pool, chain, explore
 from symrefine.decide.hypotheses import Element, Hypothesis
 from symrefine.decide.posterior import BEYOND, NEAR, Decision, Link, alternatives, decide
-from symrefine.detection.measure import Measured, doubt, gather, measure, part
+from symrefine.detection.measure import Measured, Outliers, doubt, gather, measure
 from symrefine.detection.result import Detection, FoundAxis, FoundPlane, NearMiss, Step
 from symrefine.errors import InputError
 from symrefine.fit.refine import Iterate
@@ -30,6 +30,7 @@ def detect(
     weights: ArrayLike | None = None,
     normals: ArrayLike | None = None,
     labels: ArrayLike | None = None,
+    outliers: Outliers = "auto",
     tolerance: float = TOLERANCE,
     ladder: Sequence[float] = (),
     seed: int = 0,
@@ -42,6 +43,8 @@ def detect(
             different mass are different things, which no symmetry exchanges; of more, masses are a sampling density.
         normals: [N, 3] normals, any sign; estimated where absent. Not with a `Shape`.
         labels: [N] integers: classes (elements, colours, materials) that every symmetry must keep. Not with a `Shape`.
+        outliers: "auto": points of a cloud that belong to no surface are set apart and told as `Detection.outliers`;
+            "none": all points count.
         tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal: 95 % of the
             surface must come within 0.75 of it, 99 % within 1.6, the mean within 0.22 (see `surface.misses`). How sure
             the answer is says how close the object comes to these limits.
@@ -49,12 +52,11 @@ def detect(
         seed: of the random choices (samples of a mesh, subsets of a cloud).
 
     Raises:
-        InputError: not a 3-D shape, or tolerances outside (0, 0.2].
+        InputError: not a 3-D shape, tolerances outside (0, 0.2], or another word for outliers.
         DegenerateShapeError: the points do not spread.
     """
-    found = examined(
-        _given(shape, weights, normals, labels), tolerance=tolerance, ladder=ladder, seed=seed, clock=(clock := Clock())
-    )
+    data, clock = _given(shape, weights, normals, labels), Clock()
+    found = examined(data, outliers=outliers, tolerance=tolerance, ladder=ladder, seed=seed, clock=clock)
     return told(found, tolerance=tolerance, ladder=ladder, clock=clock)
 
 
@@ -87,7 +89,13 @@ class Examined:
 
 
 def examined(
-    shape: Shape, *, tolerance: float = TOLERANCE, ladder: Sequence[float] = (), seed: int = 0, clock: Clock
+    shape: Shape,
+    *,
+    outliers: Outliers = "auto",
+    tolerance: float = TOLERANCE,
+    ladder: Sequence[float] = (),
+    seed: int = 0,
+    clock: Clock,
 ) -> Examined:
     """Everything before the decision: what the moments propose, fitted, judged and put into a chain.
 
@@ -96,7 +104,7 @@ def examined(
     for t in (tolerance, *ladder):
         check_tolerance(t)
     with clock("moments"):
-        measured = measure(shape)
+        measured = measure(shape, outliers=outliers)
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed))
     with clock("search"):
@@ -116,16 +124,14 @@ def told(found: Examined, *, tolerance: float = TOLERANCE, ladder: Sequence[floa
 def _given(
     shape: Shape | ArrayLike, weights: ArrayLike | None, normals: ArrayLike | None, labels: ArrayLike | None
 ) -> Shape:
-    """The shape in 3-space, without points of no mass, which are no part of the object."""
+    """The shape in 3-space."""
     if not isinstance(shape, Shape):
         shape = Shape.of(shape, weights=weights, normals=normals, labels=labels)
     elif not (weights is None and normals is None and labels is None):
         raise InputError("weights, normals and labels belong to the Shape; give them there, or give an array of points")
     if shape.dim != 3:
         raise InputError(f"{shape.source}: detect takes 3-D shapes; {_elsewhere(shape.dim)}")
-    if shape.weights is None or shape.faces is not None or shape.weights.all():
-        return shape
-    return part(shape, np.flatnonzero(shape.weights > 0))
+    return shape
 
 
 def _elsewhere(dim: int) -> str:
@@ -199,6 +205,8 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
         vectors=measured.vectors,
         history=history,
         points=surface.cloud.points,
+        outliers=measured.outliers,
+        clumps=measured.clumps,
         origin=origin,
         scale=scale,
         timings=clock.seconds,

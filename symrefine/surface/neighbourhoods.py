@@ -43,7 +43,7 @@ def smallest_eigenvectors(covariance: Array) -> tuple[Array, Array]:
     return np.clip(values, 0.0, None), vectors[:, :, 0]
 
 
-def _sums(points: Array) -> Array:
+def sums_of(points: Array) -> Array:
     """What plane fits need of points [N, d]: 1, x and x x', [N, 1 + d + d d]."""
     products = points[:, :, None] * points[:, None, :]
     return np.column_stack([np.ones(len(points)), points, products.reshape(len(points), -1)])
@@ -93,14 +93,14 @@ class Neighbourhoods:
     def of(cls, points: Array, tree: Any, size: int) -> "Neighbourhoods":
         """Neighbourhoods of about `size` of the points [N, d], of which `tree` is the kd-tree."""
         if size <= CELLS:
-            return cls(tree=tree, sums=_sums(points), count=size)
+            return cls(tree=tree, sums=sums_of(points), count=size)
         count = max(CELLS, len(points) * CELLS // size)
         middles = points[np.random.default_rng(0).permutation(len(points))[:count]]
         cells = kd_tree(middles)
         own = cells.query(points)[1]
         order = np.argsort(own, kind="stable")
         ends = np.searchsorted(own[order], np.arange(count + 1))
-        return cls(tree=cells, sums=_added(_sums(points), order, ends), count=CELLS)
+        return cls(tree=cells, sums=_added(sums_of(points), order, ends), count=CELLS)
 
     def around(self, points: Array) -> Array:
         """Sums [M, .] of the neighbourhoods of points [M, d]."""
@@ -137,7 +137,7 @@ def choose_neighbours(
 
 def _variances(points: Array, near: Index) -> Array:
     """Variances [M, 3] of a few neighbourhoods [M, k]."""
-    return fit_planes(_sums(points[near.ravel()]).reshape(*near.shape, -1).sum(axis=1))[2]
+    return fit_planes(sums_of(points[near.ravel()]).reshape(*near.shape, -1).sum(axis=1))[2]
 
 
 def flatness_of(values: Array) -> Array:

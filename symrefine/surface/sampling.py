@@ -1,0 +1,133 @@
+"""How a cloud was sampled: which of its points belong to no surface, and how much surface each of the others stands for.
+
+A few thousand of the points tell whether there is anything to be done at all; only then all of them are asked. What is
+decided here depends on the surroundings of a point alone, so that it breaks no symmetry.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from symrefine.geometry import Array
+from symrefine.shape import Index
+from symrefine.surface.neighbourhoods import FLAT, fills_volume, fit_planes, kd_tree, sums_of
+
+# Points that are asked first, and neighbours that tell of the surroundings of a point.
+ASKED, AROUND = 5000, 16
+# A stray has its neighbours so many times as far away as half of the points have theirs: what 8 neighbours vary by on an
+# even surface ends at 1.8, and a density that falls by 6:1 to one side reaches it.
+FAR = 2.5
+# A round that finds fewer strays than this share is the last: what remains lies within the spacing of the surface.
+LAST = 0.001
+# Standard deviation of the logarithm of the density from which on points are no even sample: that of a fall-off of 4:1.
+# Thin parts of some objects have it too; their weights do no harm.
+UNEVEN = 0.4
+# A clump apart from the body holds at most this share of the points, and has no counterpart: none of half its size.
+CLUMP, COUNTERPART = 0.1, 0.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sampling:
+    """Which points of a cloud make the object, and how much of its surface each of them stands for.
+
+    Attributes:
+        kept: [K] indices, ascending.
+        strays: indices of those far from all others.
+        clumps: indices of each group of points apart from the body, with no counterpart.
+        shares: [K] surface that each of the kept stands for; None where they are an even sample.
+    """
+
+    kept: Index
+    strays: Index
+    clumps: tuple[Index, ...] = ()
+    shares: Array | None = None
+
+
+def sampling(points: Array, rng: np.random.Generator, *, outliers: bool) -> Sampling:
+    """How points [N, 3] were sampled; with `outliers` those that belong to no surface are set apart.
+
+    Of points that fill a volume none is set apart, and all count alike.
+    """
+    every, none = np.arange(len(points)), np.empty(0, dtype=np.int64)
+    some = points[rng.permutation(len(points))[:ASKED]]
+    some = (some - some.mean(axis=0)) / some.std()
+    if fills_volume(some, kd_tree(some), np.random.default_rng(0)):
+        return Sampling(kept=every, strays=none)
+    away = strays(points, rng) if outliers else none
+    body = np.setdiff1d(every, away)
+    apart = tuple(body[c] for c in clumps(points[body], rng)) if outliers else ()
+    kept = np.setdiff1d(body, np.concatenate([none, *apart]))
+    return Sampling(kept=kept, strays=away, clumps=apart, shares=shares(points[kept], rng))
+
+
+def strays(points: Array, rng: np.random.Generator) -> Index:
+    """Indices, ascending, of points [N, 3] that lie on no surface: far from others, and in no plane with them.
+
+    Sparse parts of a surface are flat, more so than dense ones; strays near a surface are not in its plane. Each round
+    sees clearer, as strays among strays look less alone.
+    """
+    some = rng.permutation(len(points))[:ASKED]
+    if not _alone(points[some]).any():
+        return np.empty(0, dtype=np.int64)
+    kept = np.arange(len(points))
+    while len(kept) > AROUND:
+        alone = _alone(points[kept])
+        kept = kept[~alone]
+        if alone.sum() <= LAST * len(points):
+            break
+    return np.setdiff1d(np.arange(len(points)), kept)
+
+
+def _alone(points: Array) -> NDArray[np.bool_]:
+    """Which of points [N, 3] are far from the others and in no plane with them."""
+    away, near = kd_tree(points).query(points, k=[*range(2, AROUND + 2)])
+    reach = away[:, AROUND // 2 - 1]
+    sparse = np.flatnonzero(reach > FAR * np.median(reach))
+    found = np.zeros(len(points), dtype=bool)
+    if sparse.size:
+        sums = sums_of(points[near[sparse].ravel()]).reshape(len(sparse), AROUND, -1).sum(axis=1)
+        mean, normals, variances = fit_planes(sums)
+        across = np.abs(np.einsum("ni,ni->n", normals, points[sparse] - mean))
+        thick = np.sqrt(variances[:, 0] / np.maximum(variances[:, 2], 1e-300))
+        found[sparse] = (thick > FLAT) | (across > FLAT * away[sparse, -1])
+    return found
+
+
+def clumps(points: Array, rng: np.random.Generator) -> list[Index]:
+    """Indices, ascending, of each group of points [N, 3] apart from the body that is small and has no counterpart.
+
+    Points belong together if one is among the nearest of the other, whatever the density.
+    """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    some = rng.permutation(len(points))[:ASKED]
+    tree = kd_tree(points[some])
+    _, near = tree.query(points[some], k=[*range(2, AROUND // 2 + 2)])
+    ends = np.arange(0, near.size + 1, near.shape[1])
+    links = csr_array((np.ones(near.size), near.ravel(), ends), shape=(len(some), len(some)))
+    count, part = connected_components(links, directed=False)
+    if count == 1:
+        return []
+    sizes = np.bincount(part)
+    alike = (sizes >= COUNTERPART * sizes[:, None]) & (sizes <= sizes[:, None] / COUNTERPART)
+    small = np.flatnonzero((sizes <= CLUMP * len(some)) & (alike.sum(axis=1) == 1))
+    owner = part[tree.query(points)[1]] if small.size else part
+    return [np.flatnonzero(owner == k) for k in small]
+
+
+def shares(points: Array, rng: np.random.Generator) -> Array | None:
+    """How much surface each of points [N, 3] stands for, from the distance of its neighbours; None where all are even.
+
+    Of an even sample the area that `AROUND` neighbours take is a Gamma variable, so that the variance of its logarithm
+    is known; what is more is the density's own.
+    """
+    from scipy.special import polygamma
+
+    known = np.log(np.maximum(_area(points[rng.permutation(len(points))[:ASKED]]), 1e-300)).var()
+    return None if known < UNEVEN**2 + float(polygamma(1, AROUND)) else _area(points)
+
+
+def _area(points: Array) -> Array:
+    away, _ = kd_tree(points).query(points, k=[AROUND + 1])
+    return np.asarray(away[:, 0] ** 2)
