@@ -15,22 +15,22 @@ from symrefine.decide.hypotheses import (
     DIRECTION_ERROR,
     NOTHING,
     SAME_RAD,
-    START_ERROR,
     Hypothesis,
     fitted,
     glances,
     joined,
     looked_at,
     single,
+    start_error,
 )
 from symrefine.fit.placed import Placed
 from symrefine.groups import is_subgroup
-from symrefine.propose.candidates import Evidence, about, beside, prime_axes, proposals
+from symrefine.propose.candidates import Evidence, about, beside, prime_axes, proposals, voted
 from symrefine.surface.misses import LIMITS
 from symrefine.surface.surface import Surface
 
-# What a start that is off by START_ERROR may miss by: half a diagonal is the longest lever.
-HOPELESS = 0.5 * START_ERROR / LIMITS[0]
+# Share of a surface that has to be carried onto itself for anything to be said of an operation.
+SUPPORTED = 0.15
 # A coarse fit on few points may need so many times what a fine one does.
 COARSE = 3.5
 # Needs within this factor are the same, as the elements of a true group miss alike; so are those below what rounding
@@ -86,14 +86,21 @@ def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
         limit: what the largest group may need, as a fraction of the diagonal.
     """
     pool = Pool()
+    if surface.openings is not None:
+        pool = _settled(surface, _tried(surface, pool, voted(surface.cloud.points, surface.cloud.normals), limit), pool.largest, limit)
     for starts in proposals(evidence):
         pool = _settled(surface, _tried(surface, pool, starts, limit), pool.largest, limit)
     for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
-        if glance < HOPELESS and not pool.has(axis, exact_need(surface.floor)):
+        if glance < _hopeless(surface) and not pool.has(axis, exact_need(surface.floor)):
             starts = about(evidence, axis.group.frame[2])
             pool = _settled(surface, _tried(surface, pool, starts, limit), pool.largest, limit)
     nearest = sorted((*pool.looked, *pool.hopeless), key=lambda k: k[1])[:TOLD] if not pool.small else []
     return replace(pool, small=(*pool.small, *(fitted(surface, start) for start, _ in nearest)))
+
+
+def _hopeless(surface: Surface) -> float:
+    """What a start may seem to need: half a diagonal is the longest lever of what it may be off by."""
+    return 0.5 * start_error(surface) / LIMITS[0]
 
 
 def _settled(surface: Surface, pool: Pool, before: Hypothesis, limit: float) -> Pool:
@@ -107,7 +114,7 @@ def _settled(surface: Surface, pool: Pool, before: Hypothesis, limit: float) -> 
 def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tuple[Placed, float]]:
     """The starts that are new with what they seem to need at a glance, large groups that look good first."""
     new = [s for s in starts if not pool.has(s, exact_need(surface.floor))]
-    seen = zip(new, glances(surface, new, HOPELESS), strict=True)
+    seen = zip(new, glances(surface, new, _hopeless(surface)), strict=True)
     return sorted(seen, key=lambda k: k[1] / math.log2(1.0 + _size(k[0])))
 
 
@@ -121,7 +128,7 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float)
         least = exact_need(surface.floor)
         if pool.has(start, least) or _is_image(start, glance, pool):
             continue
-        if glance >= HOPELESS:
+        if glance >= _hopeless(surface):
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
             continue
         moved, needs = looked_at(surface, start)
@@ -150,6 +157,8 @@ def exact_need(floor: float) -> float:
 def _grown(surface: Surface, pool: Pool, found: Hypothesis, limit: float) -> Pool:
     """The pool with what was fitted, and its largest group joined to it, if both hold together, or else the larger."""
     if pool.has(found.placed, max(found.need, exact_need(surface.floor))):
+        return pool
+    if surface.openings is not None and found.supported < SUPPORTED:
         return pool
     if found.need > limit:
         return replace(pool, small=(*pool.small, found))

@@ -16,8 +16,9 @@ from symrefine.fit.placed import Operations, Placed, common_center, elements
 from symrefine.fit.refine import Iterate, refine
 from symrefine.geometry import Array, Isometry
 from symrefine.groups import PointGroup, from_elements, is_subgroup
+from symrefine.propose.votes import AGREE_RAD
 from symrefine.surface.misses import LIMITS, Deviation
-from symrefine.surface.surface import Surface
+from symrefine.surface.surface import Coverage, Surface
 
 # Local planes that are moved: at a glance by each operation; in a look by all together; in a fit and when judged by all
 # together (a quarter of that by each at most) and by each at least, as 0.6 % of fewer are no sample.
@@ -31,12 +32,13 @@ SAME_RAD = np.radians(4.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Element:
-    """One element of a group about a centre, with its miss and the smallest tolerance at which it holds."""
+    """One element of a group about a centre, with its miss, the smallest tolerance at which it holds, and coverage."""
 
     operations: Operations
     center: Array
     deviation: Deviation
     need: float
+    coverage: Coverage
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -51,6 +53,11 @@ class Hypothesis:
     need: float
     history: tuple[Iterate, ...] = ()
     before: int = 0
+
+    @property
+    def supported(self) -> float:
+        """Share of the surface that moves and meets itself under the element that says least."""
+        return min((e.coverage.supported for e in self.elements), default=1.0)
 
     @property
     def group(self) -> PointGroup:
@@ -94,17 +101,22 @@ def looked_at(surface: Surface, start: Placed) -> tuple[Placed, float]:
     """A coarse fit on a few points, and what it needs by them."""
     state = start.framed()
     stride = surface.stride(max(GLANCE, LOOK // len(state.standard)))
-    for iterate in refine(surface.cloud, state, start_error_rad=START_ERROR, max_outer=3, stride=stride):
+    for iterate in refine(surface.cloud, state, start_error_rad=start_error(surface), max_outer=3, stride=stride):
         state = iterate.state
     moved = start.moved(state)
     return moved, glances(surface, [moved])[0]
 
 
-def fitted(surface: Surface, start: Placed, *, error: float = START_ERROR, before: int = 0) -> Hypothesis:
+def start_error(surface: Surface) -> float:
+    """How far a start may be off: moments know no more where surface is missing than votes do."""
+    return START_ERROR if surface.openings is None else AGREE_RAD
+
+
+def fitted(surface: Surface, start: Placed, *, before: int = 0) -> Hypothesis:
     """The group fitted as a whole from where it stands, and judged."""
     state = start.framed()
     stride = surface.stride(_moved_each(len(state.standard)))
-    history = tuple(refine(surface.cloud, state, start_error_rad=error, stride=stride))
+    history = tuple(refine(surface.cloud, state, start_error_rad=START_ERROR, stride=stride))
     placed = start.moved(history[-1].state)
     parts = [(part, part.motions(placed.center)) for part in elements(placed.group)]
     misses = [surface.misses(motions, sources=_moved_each(len(parts))) for _, motions in parts]
@@ -123,7 +135,9 @@ def _judged(
 ) -> Element:
     worst = reduce(Deviation.at_least, map(Deviation.of, misses))
     need = float(surface.needed(misses, motions, tests).max())
-    return Element(operations=part, center=center, deviation=worst, need=need)
+    return Element(
+        operations=part, center=center, deviation=worst, need=need, coverage=surface.coverage(misses, motions, sources=_moved_each(tests))
+    )
 
 
 def joined(parts: Sequence[Placed]) -> Placed | None:

@@ -15,8 +15,9 @@ from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import FixedSubspace, fixed_subspace
 from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
-from symrefine.surface.misses import noise_distances
+from symrefine.surface.misses import LIMITS, TOLERANCE, noise_distances
 from symrefine.surface.neighbourhoods import fills_volume, kd_tree
+from symrefine.surface.openings import openings
 from symrefine.surface.sampling import sampling
 from symrefine.surface.skin import FEW, LocalPlanes, Skin, drawn, isolated_points, make_skin
 from symrefine.surface.surface import Surface
@@ -179,7 +180,7 @@ def _moments(shape: Shape, classes: Index | None, parts: int) -> Moments:
     return shape_moments(Shape(points=shape.points[0] + nodes, weights=heavier), ORDER)
 
 
-def gather(measured: Measured, rng: np.random.Generator) -> tuple[Evidence, Surface]:
+def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLERANCE) -> tuple[Evidence, Surface]:
     """What proposals are made of, and the surface that judges them."""
     shape, moments = measured.shape, measured.moments
     points, normals, weights, labels = _cloud(shape, measured.classes, rng)
@@ -193,11 +194,17 @@ def gather(measured: Measured, rng: np.random.Generator) -> tuple[Evidence, Surf
     )
     if is_few(shape):
         return evidence, Surface(cloud=isolated_points(local, labels), diagonal=tight_diagonal(local))
-    return evidence, _surface(local, normals, weights, labels, shape.faces is not None, rng)
+    return evidence, _surface(local, normals, weights, labels, shape.faces is not None, tolerance, rng)
 
 
 def _surface(
-    local: Array, normals: Array | None, weights: Array, labels: Index | None, exact: bool, rng: np.random.Generator
+    local: Array,
+    normals: Array | None,
+    weights: Array,
+    labels: Index | None,
+    exact: bool,
+    tolerance: float,
+    rng: np.random.Generator,
 ) -> Surface:
     """Local planes (points, where they fill a volume) with what noise alone shows."""
     tree = None if exact else kd_tree(local)
@@ -218,7 +225,13 @@ def _surface(
     cloud = whole.local_planes(pick[kd_tree(local[pick]).indices], labels)
     diagonal = tight_diagonal(cloud.points)
     noise = noise_distances(len(local), half, rng)
-    return Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal)
+    return Surface(
+        cloud=cloud,
+        diagonal=diagonal,
+        noise=noise / diagonal,
+        openings=None if exact else openings(cloud, local, tree, whole.neighbours),
+        far=LIMITS[1] * tolerance,
+    )
 
 
 def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Surface:

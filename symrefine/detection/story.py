@@ -106,7 +106,7 @@ def examined(
     with clock("moments"):
         measured = measure(shape, outliers=outliers)
     with clock("local_planes"):
-        evidence, surface = gather(measured, np.random.default_rng(seed))
+        evidence, surface = gather(measured, np.random.default_rng(seed), tolerance)
     with clock("search"):
         pool = Pool() if doubt(measured, surface, tolerance) else explore(surface, evidence, tolerance)
         links = chain(surface, pool, BEYOND * max((tolerance, *ladder)))

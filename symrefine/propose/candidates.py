@@ -19,6 +19,7 @@ from symrefine.moments.harmonics import harmonic_moments
 from symrefine.moments.moments import Moments
 from symrefine.ntuples.rank import FixedSubspace
 from symrefine.propose.folds import MAX_FOLD, fold_candidates
+from symrefine.propose.votes import mirror_votes, revolution
 from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candidates, whitened
 
 # Directions nearer than this to an earlier one are the same start: half of what order 8 resolves is 5.6 degrees.
@@ -59,6 +60,16 @@ def proposals(evidence: Evidence) -> Iterator[list[Placed]]:
     spectral = mirror_candidates(evidence.moments).directions
     normals = np.concatenate([evidence.tuples.directions[::-1], _principal(evidence), spectral])
     yield [placed("Ci", np.eye(3)), *(placed("Cs", frame_with_z(n)) for n in apart(normals))]
+
+
+def voted(points: Array, normals: Array) -> list[Placed]:
+    """What pairs of local planes vote for, wherever the centroid is."""
+    line, through = revolution(points, normals)
+    mirrors = mirror_votes(points, normals, np.random.default_rng(0))
+    return [
+        placed("Cinfv", frame_with_z(line), through),
+        *(placed("Cs", frame_with_z(n), offset * n) for n, offset in mirrors),
+    ]
 
 
 def prime_axes(evidence: Evidence) -> list[Placed]:

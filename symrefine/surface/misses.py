@@ -46,7 +46,8 @@ class Deviation:
 
     @classmethod
     def of(cls, distances: Array) -> "Deviation":
-        """The distribution of distances [N], in fractions of the diagonal."""
+        """The distribution of distances [N], in fractions of the diagonal; NaN where nobody looked."""
+        distances = distances[np.isfinite(distances)] if np.isfinite(distances).any() else np.zeros(1)
         p95, p99 = np.quantile(distances, [0.95, 0.99]).tolist()
         return cls(mean=float(distances.mean()), p95=p95, p99=p99, max=float(distances.max()))
 
@@ -65,17 +66,19 @@ def needs(misses: Array, noise: Array, tests: int = 1) -> Array:
     miss add up; from the share of the surface that misses by more than some distance, the share of noise that does.
 
     Args:
-        misses: distances, fractions of the diagonal.
+        misses: distances, fractions of the diagonal; NaN where nobody looked.
         noise: [M] misses that noise alone shows, in ascending order; none if empty.
         tests: of how many operations the worst counts: the more, the farther off one of them is by chance.
     """
-    farthest, count = -np.sort(-misses, axis=-1), misses.shape[-1]
-    mean, beyond = misses.mean(axis=-1), np.arange(1, count + 1) / count
+    farthest = -np.sort(-misses, axis=-1)  # what is unseen stands last
+    count = np.maximum(np.isfinite(misses).sum(axis=-1, keepdims=True), 1)
+    farthest = np.nan_to_num(farthest)
+    mean, beyond = farthest.sum(axis=-1) / count[..., 0], np.arange(1, misses.shape[-1] + 1) / count
     if noise.size:
         sampled = np.sqrt((SURE**2 + 2.0 * np.log(tests)) * (1.0 / count + 1.0 / noise.size))
         chance = 1.0 - np.searchsorted(noise, farthest, side="right") / noise.size
         beyond = beyond - chance - sampled * np.sqrt(chance * (1.0 - chance))
-        mean = np.sqrt(np.maximum(mean**2 - (noise.mean() + sampled * noise.std()) ** 2, 0.0))
+        mean = np.sqrt(np.maximum(mean**2 - (noise.mean() + sampled[..., 0] * noise.std()) ** 2, 0.0))
     found = [mean / LIMITS[0]]
     for share, limit in zip(SHARES, LIMITS[1:], strict=True):
         by_chance = np.sqrt(2.0 * np.log(tests) * share * (1.0 - share) / count)

@@ -19,9 +19,9 @@ ASKED, AROUND = 5000, 16
 FAR = 2.5
 # A round that finds fewer strays than this share is the last: what remains lies within the spacing of the surface.
 LAST = 0.001
-# Standard deviation of the logarithm of the density from which on points are no even sample: that of a fall-off of 4:1.
-# Thin parts of some objects have it too; their weights do no harm.
-UNEVEN = 0.4
+# Standard deviation of the logarithm of the density along some direction from which on points are no even sample: half
+# that of a fall-off of 3:1. Objects with thin parts at one end have it too; their weights do no harm.
+UNEVEN = 0.1
 # A clump apart from the body holds at most this share of the points, and has no counterpart: none of half its size.
 CLUMP, COUNTERPART = 0.1, 0.5
 
@@ -119,13 +119,13 @@ def clumps(points: Array, rng: np.random.Generator) -> list[Index]:
 def shares(points: Array, rng: np.random.Generator) -> Array | None:
     """How much surface each of points [N, 3] stands for, from the distance of its neighbours; None where all are even.
 
-    Of an even sample the area that `AROUND` neighbours take is a Gamma variable, so that the variance of its logarithm
-    is known; what is more is the density's own.
+    What counts is how the density falls off along some direction: that is what a scanner does, and what shifts moments.
     """
-    from scipy.special import polygamma
-
-    known = np.log(np.maximum(_area(points[rng.permutation(len(points))[:ASKED]]), 1e-300)).var()
-    return None if known < UNEVEN**2 + float(polygamma(1, AROUND)) else _area(points)
+    some = points[rng.permutation(len(points))[:ASKED]]
+    place = np.column_stack([np.ones(len(some)), some - some.mean(axis=0)])
+    area = np.log(np.maximum(_area(some), 1e-300))
+    trend = place @ np.linalg.lstsq(place, area, rcond=None)[0]
+    return None if trend.std() < UNEVEN else _area(points)
 
 
 def _area(points: Array) -> Array:

@@ -9,10 +9,22 @@ import numpy as np
 
 from symrefine.geometry import Array, Isometry, read_only
 from symrefine.surface.misses import LIMITS, miss_distances, needs, needs_of_atoms, spread_distance
+from symrefine.surface.openings import Openings
 from symrefine.surface.skin import LocalPlanes
 
 # Standard deviation over mean of the distance to the nearest of random points in a volume (Weibull, shape 3).
 NEAREST_SPREAD = 0.363
+# Local planes that show how the patches of an image hang together.
+PATCHES = 2000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coverage:
+    """Shares of a surface that operations carry onto itself (of what moves), where it says no, where nobody looked."""
+
+    supported: float
+    contradicted: float
+    unseen: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -23,21 +35,25 @@ class Surface:
         cloud: the local planes.
         diagonal: normalised units.
         noise: [M] misses that noise alone shows, fractions of the diagonal; none if empty.
+        openings: where the surface is open, or None.
+        far: misses from which on a point meets no surface, a fraction of the diagonal.
     """
 
     cloud: LocalPlanes
     diagonal: float
     noise: Array = field(default_factory=lambda: np.empty(0))
+    openings: Openings | None = None
+    far: float = math.inf
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "noise", read_only(np.sort(self.noise)))
 
     def stride(self, sources: int) -> int:
-        """Stride that leaves about `sources` local planes."""
-        return max(1, len(self.cloud.points) // sources)
+        """Stride that leaves about `sources` local planes; enough for the patches of an image to hang together."""
+        return max(1, len(self.cloud.points) // max(sources, PATCHES if self.openings is not None else 1))
 
     def misses(self, motions: Sequence[Isometry], *, sources: int = 10**9, bound: float = math.inf) -> Array:
-        """By how much each of K operations misses the surface [K, N], fractions of the diagonal.
+        """By how much each of K operations misses the surface [K, N], fractions of the diagonal; NaN where unseen.
 
         Args:
             motions: the operations.
@@ -45,7 +61,25 @@ class Surface:
             bound: misses end here, which is quicker.
         """
         stride = self.stride(sources)
-        return miss_distances(self.cloud, motions, stride=stride, bound=bound * self.diagonal) / self.diagonal
+        found = miss_distances(self.cloud, motions, stride=stride, bound=bound * self.diagonal) / self.diagonal
+        if self.openings is not None:
+            for motion, miss in zip(motions, found, strict=True):
+                moved = motion.apply(self.cloud.points[::stride])
+                miss[self.openings.unseen(self.cloud, moved, miss > self.far, stride)] = np.nan
+        return found
+
+    def coverage(self, misses: Array, motions: Sequence[Isometry], *, sources: int) -> Coverage:
+        """What the misses [K, N] of K operations say of the surface, each by itself, the one that says least."""
+        still = self.cloud.points[:: self.stride(sources)]
+        travel = [np.linalg.norm(m.apply(still) - still, axis=1) for m in motions]
+        moved = np.stack(travel) > self.far * self.diagonal
+        unseen = np.isnan(misses)
+        off = np.nan_to_num(misses) > self.far
+        return Coverage(
+            supported=float((moved & ~unseen & ~off).mean(axis=1).min()),
+            contradicted=float(off.mean(axis=1).max()),
+            unseen=float(unseen.mean(axis=1).max()),
+        )
 
     def needed(self, misses: Array, motions: Sequence[Isometry], tests: int = 1) -> Array:
         """The smallest tolerances [K], fractions of the diagonal, at which operations hold that miss so [K, N].
