@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from experiments.objects.shapes import bottle, box, join, mug, sample, stool, table
 from symrefine.decide.hypotheses import (
     NOTHING,
-    START_ERROR,
     Element,
     Hypothesis,
     fitted,
@@ -26,9 +25,10 @@ from symrefine.groups import close, is_subgroup, point_group
 from symrefine.moments.moments import shape_moments
 from symrefine.surface.misses import TOLERANCE, Deviation, noise_distances
 from symrefine.surface.skin import isolated_points, local_planes
-from symrefine.surface.surface import Surface
+from symrefine.surface.surface import Coverage, Surface
 
 ORIGIN = np.zeros(3)
+ALL = Coverage(supported=1.0, contradicted=0.0, unseen=0.0)
 FINITE = "Cs Ci C2 C3 C5 C2v C3v C4v C3h S4 S6 D2 D3 D5 D2h D3h D6h D2d D3d T Td Th O Oh I Ih".split()
 BUILDS = {
     "table": (table, "C4v"),
@@ -96,7 +96,7 @@ def test_some_elements_of_a_group_generate_a_subgroup_of_it(name, chosen, seed):
 
 def _single(part):
     zero = Deviation.of(np.zeros(4))
-    return single(Element(operations=part, center=ORIGIN, deviation=zero, need=0.0))
+    return single(Element(operations=part, center=ORIGIN, deviation=zero, need=0.0, coverage=ALL))
 
 
 @pytest.mark.parametrize("name", [*FINITE, "Cinfv", "Dinfh", "Kh"])
@@ -273,7 +273,7 @@ def test_of_exact_atoms_a_true_group_needs_nothing(name, seed):
     points = np.einsum("kij,pj->kpi", group.operations(), rng.standard_normal((4, 3))).reshape(-1, 3)
     points -= points.mean(axis=0)
     surface = atoms_of(points / np.sqrt((points**2).sum(axis=1).mean()))
-    found = fitted(surface, Placed(group=group, center=ORIGIN), error=0.1 * START_ERROR)
+    found = fitted(surface, Placed(group=group, center=ORIGIN))
     assert found.need < 1e-9
     moved, needs = looked_at(surface, Placed(group=group, center=ORIGIN))
     assert needs < 1e-9

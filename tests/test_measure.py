@@ -17,9 +17,9 @@ RANKS = {"vanish": 0, "axis": 1, "plane": 2, "none": 3}
 TABLE = sample(table(), 3000, 0.0, np.random.default_rng(0))
 
 
-def reason(shape, tolerance=TOLERANCE):
+def reason(shape, tolerance=TOLERANCE, outliers="auto"):
     """The doubt about a shape, which is one line."""
-    measured = measure(shape if isinstance(shape, Shape) else Shape.of(shape))
+    measured = measure(shape if isinstance(shape, Shape) else Shape.of(shape), outliers=outliers)
     found = doubt(measured, gather(measured, np.random.default_rng(0))[1], tolerance)
     assert "\n" not in found
     return found
@@ -56,12 +56,15 @@ def test_atoms_in_a_row_have_a_group(ends, group):
 def test_a_stray_point_sets_the_scale(far):
     radius = np.linalg.norm(TABLE - TABLE.mean(axis=0), axis=1).max()
     cloud = np.concatenate([TABLE, TABLE.mean(axis=0) + far * radius * np.array([[0.6, 0.48, 0.64]])])
-    said = reason(cloud)
+    said = reason(cloud, outliers="none")
     assert said.startswith("1 of 3001 points stand")
     assert "stray" in said
-    found = detect(cloud)
+    found = detect(cloud, outliers="none")
     assert found.point_group == "undetermined"
     assert found.undetermined == said
+    without = detect(cloud)
+    assert without.outliers.tolist() == [3000]
+    assert without.point_group == "C4v"
 
 
 @pytest.mark.parametrize("far", [1.0, 1.5, 2.0])

@@ -129,7 +129,7 @@ def run(case: Case) -> Row:
     there = [holds(truth, claim, diagonal) for claim, _ in claims(found)]
     sure = [confidence for _, confidence in claims(found)]
     true = all(there) and not (found.inversion and not truth.group.has_inversion)
-    at_least = getattr(found, "at_least", False) and true
+    at_least = found.at_least and true
     flagged = np.zeros(len(made.points), dtype=bool)
     flagged[found.outliers] = True
     stray = made.strays == 1
@@ -137,7 +137,7 @@ def run(case: Case) -> Row:
     return Row(
         case=case,
         truth=truth.group.name,
-        group=("at least " if getattr(found, "at_least", False) and not found.undetermined else "") + found.point_group,
+        group=("at least " if found.at_least and not found.undetermined else "") + found.point_group,
         confidence=math.nan if found.undetermined else found.confidence,
         right=not found.undetermined and true and (at_least or found.point_group == truth.group.name),
         contradicted=not true,
@@ -201,9 +201,9 @@ def line(rows: Sequence[Row]) -> str:
 
 def heat(rows: Sequence[Row], path: Path) -> None:
     """Recall by shape and damage as a picture."""
-    import matplotlib
+    import matplotlib as mpl
 
-    matplotlib.use("agg")
+    mpl.use("agg")
     import matplotlib.pyplot as plt
 
     from symrefine.files import whole

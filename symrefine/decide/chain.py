@@ -15,27 +15,34 @@ from symrefine.decide.hypotheses import (
     DIRECTION_ERROR,
     NOTHING,
     SAME_RAD,
+    START_ERROR,
     Hypothesis,
+    exact_need,
     fitted,
     glances,
     joined,
     looked_at,
     single,
-    start_error,
 )
 from symrefine.fit.placed import Placed
 from symrefine.groups import is_subgroup
-from symrefine.propose.candidates import Evidence, about, beside, prime_axes, proposals, voted
+from symrefine.propose.candidates import Evidence, about, beside, prime_axes, proposals, voted_mirrors, voted_turns
+from symrefine.propose.votes import AGREE_RAD
 from symrefine.surface.misses import LIMITS
 from symrefine.surface.surface import Surface
 
+# What a start that is off by START_ERROR may miss by: half a diagonal is the longest lever. Votes know no more than to
+# AGREE_RAD.
+HOPELESS, HOPELESS_VOTES = 0.5 * START_ERROR / LIMITS[0], 0.5 * AGREE_RAD / LIMITS[0]
 # Share of a surface that has to be carried onto itself for anything to be said of an operation.
 SUPPORTED = 0.15
+# Share of its open borders that a group carries onto open borders where the object ends there: flat plates 1, mugs 0.75
+# and more, chance up to 0.6.
+KEPT = 2.0 / 3.0
 # A coarse fit on few points may need so many times what a fine one does.
 COARSE = 3.5
-# Needs within this factor are the same, as the elements of a true group miss alike; so are those below what rounding
-# of coordinates to five digits leaves.
-ALIKE, EXACT = 1.5, 1e-5
+# Needs within this factor are the same, as the elements of a true group miss alike.
+ALIKE = 1.5
 # Candidates turned down after a look that are fitted all the same where nothing else was: the nearest misses.
 TOLD = 2
 # Elements that are joined one by one, where all of a level together make no group.
@@ -52,6 +59,7 @@ class Pool:
         failed: groups that the largest and another one generate, which do not hold.
         looked: candidates turned down after a look, where a coarse fit put them, with what they seem to need.
         hopeless: the same of those turned down at a glance.
+        at_least: whether there may be more that was not seen.
     """
 
     small: tuple[Hypothesis, ...] = ()
@@ -59,6 +67,7 @@ class Pool:
     failed: tuple[Hypothesis, ...] = ()
     looked: tuple[tuple[Placed, float], ...] = ()
     hopeless: tuple[tuple[Placed, float], ...] = ()
+    at_least: bool = False
 
     @property
     def seen(self) -> list[tuple[Placed, float]]:
@@ -82,29 +91,65 @@ class Pool:
 def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
     """Fit and judge what the moments propose, and what may stand beside the largest group that holds.
 
+    Of a surface with open borders all that is judged once as if it were whole, and then with what votes propose where
+    nobody looked beyond them.
+
     Args:
         limit: what the largest group may need, as a fraction of the diagonal.
     """
+    whole = _of_whole(replace(surface, openings=None), evidence, limit)
+    if surface.openings is None:
+        return whole
+    part = _of_part(surface, whole, limit)
+    if not _ends_there(surface, whole.largest) or _left_over(whole.largest, part.largest):
+        return replace(part, at_least=True)
+    if _size(part.largest.placed) <= _size(whole.largest.placed):
+        return whole
+    # To believe that what ends so evenly is missing a part takes as much as to believe in as much as was seen.
+    rival = replace(part.largest, need=math.hypot(part.largest.need, surface.tolerance))
+    return replace(whole, small=(*whole.small, rival), at_least=True)
+
+
+def _ends_there(surface: Surface, found: Hypothesis) -> bool:
+    """Whether a group carries the open borders onto themselves, as what a sensor leaves out has no symmetry."""
+    if surface.openings is None:
+        return True
+    line, cloud = surface.openings.line, surface.cloud
+    motions = [m for e in found.elements for m in e.operations.motions(e.center)]
+    near = [cloud.nearest(m.apply(cloud.points[line]), cloud.classes(np.flatnonzero(line)))[1] for m in motions]
+    return bool(near) and float(np.median([surface.openings.border[n].mean() for n in near])) > KEPT
+
+
+def _left_over(seen: Hypothesis, found: Hypothesis) -> bool:
+    """Whether one hole or cut in a body with the symmetry found leaves what is seen: a mirror of what is round."""
+    return not found.placed.group.is_finite and seen.placed.group.name in (
+        ("Cinfv", "Cs") if found.placed.group.name == "Kh" else ("Cs",)
+    )
+
+
+def _of_whole(surface: Surface, evidence: Evidence, limit: float) -> Pool:
     pool = Pool()
-    if surface.openings is not None:
-        pool = _settled(surface, _tried(surface, pool, voted(surface.cloud.points, surface.cloud.normals), limit), pool.largest, limit)
     for starts in proposals(evidence):
-        pool = _settled(surface, _tried(surface, pool, starts, limit), pool.largest, limit)
+        pool = _with(surface, pool, starts, limit)
     for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
-        if glance < _hopeless(surface) and not pool.has(axis, exact_need(surface.floor)):
-            starts = about(evidence, axis.group.frame[2])
-            pool = _settled(surface, _tried(surface, pool, starts, limit), pool.largest, limit)
+        if glance < HOPELESS and not pool.has(axis, exact_need(surface.floor)):
+            pool = _with(surface, pool, about(evidence, axis.group.frame[2]), limit)
     nearest = sorted((*pool.looked, *pool.hopeless), key=lambda k: k[1])[:TOLD] if not pool.small else []
     return replace(pool, small=(*pool.small, *(fitted(surface, start) for start, _ in nearest)))
 
 
-def _hopeless(surface: Surface) -> float:
-    """What a start may seem to need: half a diagonal is the longest lever of what it may be off by."""
-    return 0.5 * start_error(surface) / LIMITS[0]
+def _of_part(surface: Surface, whole: Pool, limit: float) -> Pool:
+    pool = Pool()
+    for known in (whole.largest, *whole.small):
+        pool = _grown(surface, pool, fitted(surface, known.placed), limit) if known.elements else pool
+    pool = _with(surface, pool, voted_mirrors(surface.cloud), limit)
+    # Two mirrors tell the axis that they share, and what may stand beside it; of turns alone only votes know.
+    return pool if _size(pool.largest.placed) > 2 else _with(surface, pool, voted_turns(surface.cloud), limit)
 
 
-def _settled(surface: Surface, pool: Pool, before: Hypothesis, limit: float) -> Pool:
-    """The pool when the neighbours of its largest group were tried, and of the one that this makes, and so on."""
+def _with(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float) -> Pool:
+    """The pool with candidates tried, and then the neighbours of its largest group, as long as that grows."""
+    before, pool = pool.largest, _tried(surface, pool, starts, limit)
     while pool.largest is not before:
         before = pool.largest
         pool = _tried(surface, pool, beside(before.placed), limit)
@@ -113,8 +158,9 @@ def _settled(surface: Surface, pool: Pool, before: Hypothesis, limit: float) -> 
 
 def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tuple[Placed, float]]:
     """The starts that are new with what they seem to need at a glance, large groups that look good first."""
+    hopeless = HOPELESS if surface.openings is None else HOPELESS_VOTES
     new = [s for s in starts if not pool.has(s, exact_need(surface.floor))]
-    seen = zip(new, glances(surface, new, _hopeless(surface)), strict=True)
+    seen = zip(new, glances(surface, new, hopeless), strict=True)
     return sorted(seen, key=lambda k: k[1] / math.log2(1.0 + _size(k[0])))
 
 
@@ -124,11 +170,12 @@ def _size(placed: Placed) -> float:
 
 def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float) -> Pool:
     """The pool with candidates fitted, but for those that the group so far has anyway."""
+    hopeless = HOPELESS if surface.openings is None else HOPELESS_VOTES
     for start, glance in _glanced(surface, pool, starts):
         least = exact_need(surface.floor)
         if pool.has(start, least) or _is_image(start, glance, pool):
             continue
-        if glance >= _hopeless(surface):
+        if glance >= hopeless:
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
             continue
         moved, needs = looked_at(surface, start)
@@ -137,7 +184,9 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float)
         elif not pool.has(moved, max(needs / COARSE, least)) and not pool.met(moved):
             pool = _joined_at_once(surface, pool, moved) if needs <= limit and pool.largest.elements else pool
             if not pool.has(moved, max(needs / COARSE, least)):
-                pool = _grown(surface, pool, fitted(surface, moved), limit)
+                found = fitted(surface, moved)
+                if surface.openings is None or found.supported >= SUPPORTED:
+                    pool = _grown(surface, pool, found, limit)
     return pool
 
 
@@ -149,16 +198,9 @@ def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
     return pool.with_failed(both)
 
 
-def exact_need(floor: float) -> float:
-    """The need up to which noise, which alone needs `floor`, or the rounding of coordinates tells nothing apart."""
-    return max(EXACT, 0.5 * floor)
-
-
 def _grown(surface: Surface, pool: Pool, found: Hypothesis, limit: float) -> Pool:
     """The pool with what was fitted, and its largest group joined to it, if both hold together, or else the larger."""
     if pool.has(found.placed, max(found.need, exact_need(surface.floor))):
-        return pool
-    if surface.openings is not None and found.supported < SUPPORTED:
         return pool
     if found.need > limit:
         return replace(pool, small=(*pool.small, found))

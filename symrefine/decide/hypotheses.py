@@ -28,6 +28,8 @@ GLANCE, LOOK, MOVED, MOVED_EACH = 120, 600, 12000, 1200
 START_ERROR, DIRECTION_ERROR = 0.05, np.radians(1.5)
 # Elements nearer than this (radians) are the same.
 SAME_RAD = np.radians(4.0)
+# What rounding of coordinates to five digits leaves needs no more.
+EXACT = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -85,7 +87,8 @@ def glances(surface: Surface, starts: Sequence[Placed], most: float = math.inf) 
     each = [[m for p in _some(elements(s.group)) for m in p.motions(s.center)] for s in starts]
     owner = np.repeat(np.arange(len(starts)), [len(motions) for motions in each])
     every, found = [m for motions in each for m in motions], np.zeros(len(starts))
-    for limit in (LIMITS[1], LIMITS[-1]):  # most candidates are hopeless, and seen to be so without a wide search
+    # Most candidates are hopeless, and seen to be so without a wide search; of an open surface none is made.
+    for limit in (LIMITS[1], LIMITS[-1]) if surface.openings is None else LIMITS[-1:]:
         asked = np.flatnonzero(found[owner] < most)
         if asked.size:
             needs = surface.needs([every[i] for i in asked], sources=GLANCE, bound=limit * most)
@@ -119,15 +122,44 @@ def fitted(surface: Surface, start: Placed, *, before: int = 0) -> Hypothesis:
     history = tuple(refine(surface.cloud, state, start_error_rad=START_ERROR, stride=stride))
     placed = start.moved(history[-1].state)
     parts = [(part, part.motions(placed.center)) for part in elements(placed.group)]
-    misses = [surface.misses(motions, sources=_moved_each(len(parts))) for _, motions in parts]
-    found = tuple(_judged(surface, *p, m, placed.center, len(parts)) for p, m in zip(parts, misses, strict=True))
-    # A part out of place is met by all operations: together they tell it from noise where none does alone.
-    need = max(surface.needed_by_all(misses), *(e.need for e in found))
+    sources = _moved_each(len(parts))
+    misses = [surface.misses(motions, sources=sources) for _, motions in parts]
+    found, need = _all_judged(surface, parts, misses, placed.center)
+    if surface.openings is not None and need > exact_need(surface.floor):
+        # What holds without it asks for no belief in anything unseen.
+        seen = [surface.seen(m, motions, sources=sources) for m, (_, motions) in zip(misses, parts, strict=True)]
+        partly, partial = _all_judged(surface, parts, seen, placed.center)
+        partial = math.hypot(partial, surface.tolerance * _unseen(partly))
+        found, need = (partly, partial) if partial < need else (found, need)
     return Hypothesis(placed=placed, elements=found, need=need, history=history, before=before)
+
+
+def exact_need(floor: float) -> float:
+    """The need up to which noise, which alone needs `floor`, or the rounding of coordinates tells nothing apart."""
+    return max(EXACT, 0.5 * floor)
+
+
+def _unseen(found: Sequence[Element]) -> float:
+    """Surface that half of the elements and one carry to where nobody looked, over that carried onto itself.
+
+    More than half of the operations of a group generate it (Lagrange), so that the others follow. To believe in as much
+    as was seen needs a whole tolerance.
+    """
+    each = sorted(e.coverage.unseen / max(e.coverage.supported, 1e-9) for e in found)
+    return each[len(each) // 2]
 
 
 def _moved_each(operations: int) -> int:
     return min(max(MOVED_EACH, MOVED // operations), MOVED // 4)
+
+
+def _all_judged(
+    surface: Surface, parts: Sequence[tuple[Operations, tuple[Isometry, ...]]], misses: Sequence[Array], center: Array
+) -> tuple[tuple[Element, ...], float]:
+    """The elements of a group from their misses, and what all of them need."""
+    found = tuple(_judged(surface, *p, m, center, len(parts)) for p, m in zip(parts, misses, strict=True))
+    # A part out of place is met by all operations: together they tell it from noise where none does alone.
+    return found, max(surface.needed_by_all(misses), *(e.need for e in found))
 
 
 def _judged(
@@ -136,7 +168,11 @@ def _judged(
     worst = reduce(Deviation.at_least, map(Deviation.of, misses))
     need = float(surface.needed(misses, motions, tests).max())
     return Element(
-        operations=part, center=center, deviation=worst, need=need, coverage=surface.coverage(misses, motions, sources=_moved_each(tests))
+        operations=part,
+        center=center,
+        deviation=worst,
+        need=need,
+        coverage=surface.coverage(misses, motions, sources=_moved_each(tests)),
     )
 
 

@@ -15,7 +15,7 @@ from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import FixedSubspace, fixed_subspace
 from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
-from symrefine.surface.misses import LIMITS, TOLERANCE, noise_distances
+from symrefine.surface.misses import TOLERANCE, noise_distances
 from symrefine.surface.neighbourhoods import fills_volume, kd_tree
 from symrefine.surface.openings import openings
 from symrefine.surface.sampling import sampling
@@ -225,13 +225,11 @@ def _surface(
     cloud = whole.local_planes(pick[kd_tree(local[pick]).indices], labels)
     diagonal = tight_diagonal(cloud.points)
     noise = noise_distances(len(local), half, rng)
-    return Surface(
-        cloud=cloud,
-        diagonal=diagonal,
-        noise=noise / diagonal,
-        openings=None if exact else openings(cloud, local, tree, whole.neighbours),
-        far=LIMITS[1] * tolerance,
-    )
+    surface = Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, tolerance=tolerance)
+    # Where noise alone needs all that is allowed, nobody sees what is open.
+    if exact or surface.floor >= tolerance:
+        return surface
+    return replace(surface, openings=openings(cloud, local, tree))
 
 
 def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Surface:

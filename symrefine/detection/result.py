@@ -92,6 +92,7 @@ class Detection(ReadOnly):
         history: the iterates of that refinement, in normalised units; `scale` and `origin` undo the normalisation.
         points: [M, 3] the points the refinement used, normalised units.
         outliers: indices, ascending, of the points that were taken as no part of the object.
+        at_least: whether the surface has open borders beyond which nobody looked: the object may have more symmetry.
         clumps: how many of these are groups of points apart from the body, rather than single strays.
         timings: seconds by stage; everything else is a function of the input and the options alone.
     """
@@ -118,6 +119,7 @@ class Detection(ReadOnly):
     points: Array
     outliers: Index
     clumps: int
+    at_least: bool
     origin: Array
     scale: float
     timings: dict[str, float] = field(default_factory=dict)

@@ -206,6 +206,7 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
         history=history,
         points=surface.cloud.points,
         outliers=measured.outliers,
+        at_least=found.pool.at_least and not reason,
         clumps=measured.clumps,
         origin=origin,
         scale=scale,

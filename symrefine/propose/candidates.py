@@ -19,8 +19,9 @@ from symrefine.moments.harmonics import harmonic_moments
 from symrefine.moments.moments import Moments
 from symrefine.ntuples.rank import FixedSubspace
 from symrefine.propose.folds import MAX_FOLD, fold_candidates
-from symrefine.propose.votes import mirror_votes, revolution
 from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candidates, whitened
+from symrefine.propose.votes import mirror_votes, revolution, turn_votes
+from symrefine.surface.skin import Planes
 
 # Directions nearer than this to an earlier one are the same start: half of what order 8 resolves is 5.6 degrees.
 APART_RAD = np.radians(3.0)
@@ -62,14 +63,18 @@ def proposals(evidence: Evidence) -> Iterator[list[Placed]]:
     yield [placed("Ci", np.eye(3)), *(placed("Cs", frame_with_z(n)) for n in apart(normals))]
 
 
-def voted(points: Array, normals: Array) -> list[Placed]:
-    """What pairs of local planes vote for, wherever the centroid is."""
-    line, through = revolution(points, normals)
-    mirrors = mirror_votes(points, normals, np.random.default_rng(0))
-    return [
-        placed("Cinfv", frame_with_z(line), through),
-        *(placed("Cs", frame_with_z(n), offset * n) for n, offset in mirrors),
-    ]
+def voted_mirrors(planes: Planes) -> list[Placed]:
+    """Mirrors and a revolution that the local planes of a surface with parts missing vote for."""
+    axis = revolution(planes.points, planes.normals)
+    round_it = [] if axis is None else [placed("Cinfv", frame_with_z(axis[0]), axis[1])]
+    mirrors = mirror_votes(planes.points, planes.normals, np.random.default_rng(0))
+    return [*round_it, *(placed("Cs", frame_with_z(v.direction), v.foot) for v in mirrors)]
+
+
+def voted_turns(planes: Planes) -> list[Placed]:
+    """Turns of prime order that they vote for."""
+    turns = turn_votes(planes.points, planes.normals, np.random.default_rng(0))
+    return [placed(f"C{order}", frame_with_z(v.direction), v.foot) for v, order in turns]
 
 
 def prime_axes(evidence: Evidence) -> list[Placed]:

@@ -1,10 +1,12 @@
 """Mirrors, turns and revolutions that pairs of local planes vote for: no centroid, so that missing parts bias nothing.
 
 A mirror that carries one local plane onto another has its normal along their difference and passes half way between
-them; what decides is whether it turns the one normal into the other. Turns take two pairs (Mitra, Guibas, Pauly, 2006,
-in small). The axis of a revolution meets all normals, which is linear in its Pluecker coordinates (Pottmann, Randrup,
-1998).
+them; what decides is whether it turns the one normal into the other. A turn has its axis across both differences, that
+of the places and that of the normals (Mitra, Guibas, Pauly, 2006, in small). The axis of a revolution meets all
+normals, which is linear in its Pluecker coordinates (Pottmann, Randrup, 1998).
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,70 +15,130 @@ from symrefine.shape import Index
 
 # Local planes whose pairs vote, the largest angle between the normals of a pair, and the candidates that are told.
 VOTERS, AGREE_RAD, TOLD = 1000, np.radians(8.0), 24
-# Cells of votes: along an edge of the cube that directions are binned on, and of offsets for each RMS radius.
-DIRECTIONS, OFFSETS = 24, 10
+# Cells of votes: along an edge of the cube that directions are binned on, and of feet for each RMS radius.
+DIRECTIONS, FEET = 24, 10
 
 
-def mirror_votes(points: Array, normals: Array, rng: np.random.Generator) -> list[tuple[Array, float]]:
-    """Normals [3] and offsets of planes that many pairs of local planes [N, 3] are mirror images in, most votes first.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Vote:
+    """A place where votes are dense.
 
-    Everything in normalised units. Pairs within one flat part agree under any mirror across it and say nothing: a pair
-    counts by how much its normals turn.
+    Attributes:
+        direction: [3] normal of a mirror or direction of an axis, without a sign.
+        foot: [3] point of the plane or axis nearest to the origin.
+        votes: indices of the pairs that vote for it.
     """
-    some = rng.permutation(len(points))[:VOTERS]
-    x, n = points[some], normals[some]
-    i, j = np.triu_indices(len(some), 1)
-    across = x[j] - x[i]
-    length = np.linalg.norm(across, axis=1)
-    across /= np.maximum(length, 1e-300)[:, None]
+
+    direction: Array
+    foot: Array
+    votes: Index
+
+
+def mirror_votes(points: Array, normals: Array, rng: np.random.Generator) -> list[Vote]:
+    """Planes that many pairs of local planes [N, 3] are mirror images in, most votes first; normalised units.
+
+    Pairs within one flat part agree under any mirror across it and say nothing: a pair counts by how much its normals
+    turn.
+    """
+    x, n, i, j = _pairs(points, normals, VOTERS, rng)
+    across = unit_rows(x[j] - x[i])
     along = np.einsum("ki,ki->k", across, n[i])
     image = n[i] - 2.0 * along[:, None] * across
-    agree = (np.abs(np.einsum("ki,ki->k", image, n[j])) > np.cos(AGREE_RAD)) & (length > 1.0 / OFFSETS)
+    agree = np.abs(np.einsum("ki,ki->k", image, n[j])) > np.cos(AGREE_RAD)
     i, j, m, worth = i[agree], j[agree], across[agree], np.abs(along[agree])
-    return _densest(m, 0.5 * np.einsum("ki,ki->k", m, x[i] + x[j]), worth)
+    return _densest(m, 0.5 * np.einsum("ki,ki->k", m, x[i] + x[j])[:, None] * m, worth)
 
 
-def _densest(directions: Array, offsets: Array, worth: Array) -> list[tuple[Array, float]]:
-    """The densest spots of votes: unit vectors [K, 3] without a sign, with offsets [K]."""
-    turned = np.where(directions[np.arange(len(directions)), np.abs(directions).argmax(axis=1)] < 0.0, -1.0, 1.0)
-    directions, offsets = turned[:, None] * directions, turned * offsets
-    cells, volume = _cells(directions, offsets)
-    _, owner = np.unique(cells, axis=0, return_inverse=True)
-    votes = np.bincount(owner.ravel(), worth / volume)
-    found: list[tuple[Array, float]] = []
-    for cell in np.argsort(-votes):
-        inside = owner.ravel() == cell
-        m, d = _middle(directions[inside], offsets[inside], worth[inside])
+def turn_votes(points: Array, normals: Array, rng: np.random.Generator) -> list[tuple[Vote, int]]:
+    """Axes that turn many local planes [N, 3] into others, with the smallest prime order that their angles suggest."""
+    x, n, i, j = _pairs(points, normals, VOTERS // 2, rng)
+    i, j, sign = np.tile(i, 2), np.tile(j, 2), np.repeat([1.0, -1.0], len(i))
+    moved, turned = x[j] - x[i], sign[:, None] * n[j] - n[i]
+    axis = np.cross(moved, turned)
+    worth = np.linalg.norm(axis, axis=1) / np.linalg.norm(moved, axis=1)
+    kept = worth > np.sin(AGREE_RAD)
+    i, j, moved, u, worth = i[kept], j[kept], moved[kept], unit_rows(axis[kept]), worth[kept]
+    a, b = n[i], sign[kept][:, None] * n[j]
+    a, b = (v - np.einsum("ki,ki->k", v, u)[:, None] * u for v in (a, b))
+    angle = np.arctan2(np.einsum("ki,ki->k", np.cross(a, b), u), np.einsum("ki,ki->k", a, b))
+    # The axis lies across the difference, as far off its middle as the angle says.
+    off = 0.5 / np.tan(0.5 * np.where(np.abs(angle) < AGREE_RAD, AGREE_RAD, angle))
+    through = 0.5 * (x[i] + x[j]) + off[:, None] * np.cross(u, moved)
+    foot = through - np.einsum("ki,ki->k", through, u)[:, None] * u
+    near = (np.abs(angle) > AGREE_RAD) & (np.linalg.norm(foot, axis=1) < 3.0)
+    found = _densest(u[near], foot[near], worth[near])
+    return [(v, _order(angle[near][v.votes])) for v in found]
+
+
+def _order(angles: Array) -> int:
+    """The prime order whose multiples most of the angles are near, over what chance would bring."""
+    shares = {}
+    for order in (2, 3, 5, 7):
+        turns = np.abs(angles) * order / (2.0 * np.pi)
+        close = np.abs(turns - np.round(turns)) * 2.0 * np.pi / order < AGREE_RAD
+        shares[order] = float((close & (np.round(turns) > 0)).mean()) / (order * AGREE_RAD / np.pi)
+    return max(shares, key=lambda k: shares[k])
+
+
+def _pairs(points: Array, normals: Array, count: int, rng: np.random.Generator) -> tuple[Array, Array, Index, Index]:
+    """Some local planes, and the pairs of them that are not next to one another."""
+    some = rng.permutation(len(points))[:count]
+    x, n = points[some], normals[some]
+    i, j = np.triu_indices(len(some), 1)
+    far = np.linalg.norm(x[j] - x[i], axis=1) > 1.0 / FEET
+    return x, n, i[far], j[far]
+
+
+def unit_rows(vectors: Array) -> Array:
+    """Vectors [N, 3] at length 1."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None])
+
+
+def _densest(directions: Array, feet: Array, worth: Array) -> list[Vote]:
+    """The densest spots of votes for planes or lines: unit vectors [K, 3] without a sign, with their feet [K, 3]."""
+    some = worth > 0.0
+    directions, feet, worth = directions[some], feet[some], worth[some]
+    if not some.any():
+        return []
+    cells, volume = _cells(directions, feet)
+    _, owner = np.unique(cells @ [1, 7, 7 * 64, 7 * 64**2, 7 * 64**3, 7 * 64**4], return_inverse=True)
+    density = np.bincount(owner, worth / volume)
+    order = np.argsort(owner, kind="stable")
+    ends = np.searchsorted(owner[order], np.arange(len(density) + 1))
+    found: list[Vote] = []
+    for cell in np.argsort(-density)[: 8 * TOLD]:
+        votes = order[ends[cell] : ends[cell + 1]]
         for _ in range(2):
-            cosine = directions @ m
-            near = (np.abs(cosine) > np.cos(AGREE_RAD)) & (np.abs(np.sign(cosine) * offsets - d) < 1.0 / OFFSETS)
-            m, d = _middle(np.sign(cosine[near])[:, None] * directions[near], np.sign(cosine[near]) * offsets[near], worth[near])
-        if all(abs(m @ u) < np.cos(AGREE_RAD) or abs(np.sign(m @ u) * d - o) > 1.0 / OFFSETS for u, o in found):
-            found.append((m, d))
+            sign = np.where(directions[votes] @ directions[votes[0]] < 0.0, -1.0, 1.0)
+            u = unit((worth[votes] * sign) @ directions[votes])
+            foot = np.average(feet[votes], axis=0, weights=worth[votes])
+            near = (np.abs(directions @ u) > np.cos(AGREE_RAD)) & (((feet - foot) ** 2).sum(axis=1) < FEET**-2.0)
+            votes = np.flatnonzero(near)
+            if not votes.size:
+                break
+        known = (abs(v.direction @ u) > np.cos(AGREE_RAD) and np.linalg.norm(v.foot - foot) < 1.0 / FEET for v in found)
+        if votes.size and not any(known):
+            found.append(Vote(direction=u, foot=foot, votes=votes))
         if len(found) == TOLD:
             break
     return found
 
 
-def _cells(directions: Array, offsets: Array) -> tuple[Index, Array]:
-    """Cells of votes as integers [K, 4], and the solid angle of each, in those at the middle of a face of the cube."""
+def _cells(directions: Array, feet: Array) -> tuple[Index, Array]:
+    """Cells of votes as integers [K, 6], and the solid angle of each, in those at the middle of a face of the cube."""
+    row = np.arange(len(directions))
     axis = np.abs(directions).argmax(axis=1)
-    major = directions[np.arange(len(directions)), axis]
-    u = np.stack([directions[np.arange(len(directions)), (axis + k) % 3] / major for k in (1, 2)])
-    grid = np.round(0.5 * DIRECTIONS * u)
-    cells = np.stack([axis, *grid, np.round(OFFSETS * offsets)], axis=1).astype(np.int64)
-    return cells, (1.0 + (2.0 * grid / DIRECTIONS) ** 2).sum(axis=0) ** -1.5
+    major = directions[row, axis]
+    grid = np.round(0.5 * DIRECTIONS * np.stack([directions[row, (axis + k) % 3] / major for k in (1, 2)]))
+    cells = np.stack([axis, *(grid + 32), *(np.clip(np.round(FEET * feet.T), -32, 31) + 32)], axis=1).astype(np.int64)
+    return cells, (1.0 + ((2.0 * grid / DIRECTIONS) ** 2).sum(axis=0)) ** -1.5
 
 
-def _middle(directions: Array, offsets: Array, worth: Array) -> tuple[Array, float]:
-    return unit(worth @ directions), float(np.average(offsets, weights=worth))
-
-
-def revolution(points: Array, normals: Array) -> tuple[Array, Array]:
+def revolution(points: Array, normals: Array) -> tuple[Array, Array] | None:
     """Direction [3] and a point [3] of the line that the normals [N, 3] of a surface at points [N, 3] come closest to.
 
-    A normal n at x meets the line (u, v = p x u) if `(x cross n).u + n.v = 0`; the smallest singular vector, then again
-    without the half that misses most.
+    A normal n at x meets the line (u, v = p x u) if `(x cross n).u + n.v = 0`: the smallest singular vector, then again
+    without the half that misses most. None where that is no line but a direction that all normals lie across.
     """
     rows = np.column_stack([np.cross(points, normals), normals])
     kept = rows
@@ -85,4 +147,5 @@ def revolution(points: Array, normals: Array) -> tuple[Array, Array]:
         off = np.abs(rows @ line)
         kept = rows[off <= np.median(off)]
     u, v = line[:3], line[3:]
-    return unit(u), np.cross(u, v) / max(float(u @ u), 1e-300)
+    square = float(u @ u)
+    return None if square < FEET**-2.0 else (unit(u), np.cross(u, v) / square)

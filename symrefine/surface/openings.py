@@ -11,20 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.geometry import Array
-from symrefine.surface.neighbourhoods import Neighbourhoods, fit_planes, kd_tree
+from symrefine.shape import Index
+from symrefine.surface.neighbourhoods import WIDEST, Neighbourhoods, fit_planes, kd_tree
 from symrefine.surface.skin import LocalPlanes
 
 Mask = NDArray[np.bool_]
 # Neighbours that tell a border: the middle of half a disc lies 0.75 of its width off the point, that of a whole disc 0,
 # with a standard deviation of 0.12 for so many; edges of solids reach 0.4.
-NEIGHBOURS, ASIDE = 32, 0.55
-# Neighbourhoods so many times as thick as most are folded, and those so much narrower than long are wires.
-FOLDED, WIRE = 2.0, 0.2
-# Share of the local planes at a border from which on a surface counts as open: on 76 closed objects it stays below
-# 0.11 %, a hole of 5 % has 0.2 % and more.
-OPEN = 0.0012
+NEIGHBOURS, ASIDE = 32, 0.45
+# A surface counts as open from this share of local planes on that lie farther aside than this: on 76 closed objects it
+# stays below 0.11 %, where 5 % of the surface are missing it is 0.2 % and more. Neighbourhoods so much narrower than
+# long are wires, which end anyway.
+OPEN, FAR_ASIDE, WIRE = 0.0012, 0.55, 0.2
 # Neighbours by which the patches of an image hang together.
 LINKS = 6
+# A patch is unseen if one in so many of the places where it begins is at a border: of true ones more than half are.
+MOST = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,23 +34,22 @@ class Openings:
     """The open borders of a surface.
 
     Attributes:
-        border: [M] which local planes lie at one.
-        links: by stride, which of every so many-th local planes are neighbours, a sparse matrix.
+        line: [M] which local planes make one up.
+        border: [M] which lie at one.
+        links: by stride, pairs [2, E] of every so many-th local planes that are neighbours, both ways.
     """
 
+    line: Mask
     border: Mask
-    links: dict[int, Any] = field(default_factory=dict)
+    links: dict[int, Index] = field(default_factory=dict)
 
-    def linked(self, cloud: LocalPlanes, stride: int) -> Any:
-        """Which of every `stride`-th local planes are neighbours, symmetric."""
+    def linked(self, cloud: LocalPlanes, stride: int) -> Index:
+        """Pairs [2, E] of every `stride`-th local planes that are neighbours, both ways."""
         if stride not in self.links:
-            from scipy.sparse import csr_array
-
             points = cloud.points[::stride]
             _, near = kd_tree(points).query(points, k=[*range(2, LINKS + 2)])
-            ends = np.arange(0, near.size + 1, LINKS)
-            links = csr_array((np.ones(near.size), near.ravel(), ends), shape=(len(points), len(points)))
-            self.links[stride] = links + links.T
+            pairs = np.stack([np.repeat(np.arange(len(points)), LINKS), near.ravel()])
+            self.links[stride] = np.concatenate([pairs, pairs[::-1]], axis=1)
         return self.links[stride]
 
     def unseen(self, cloud: LocalPlanes, moved: Array, away: Mask, stride: int) -> Mask:
@@ -60,48 +61,58 @@ class Openings:
             away: [N] those that meet no surface.
             stride: of the local planes.
         """
-        from scipy.sparse.csgraph import connected_components
-
-        found = np.zeros(len(moved), dtype=bool)
-        off = np.flatnonzero(away)
-        if not off.size:
-            return found
-        links = self.linked(cloud, stride)
-        count, patch = connected_components(links[off][:, off], directed=False)
-        begins = links[off][:, np.flatnonzero(~away)].tocoo()
-        met = np.flatnonzero(~away)[begins.col]
-        which, back = np.unique(met, return_inverse=True)
-        open_there = self.border[cloud.tree.query(moved[which])[1]] if which.size else np.zeros(0, dtype=bool)
-        own = patch[begins.row]
-        at_border = np.bincount(own, open_there[back], count)
-        in_all = np.bincount(own, minlength=count)
-        free = at_border > 0.5 * in_all
-        found[off[free[patch]]] = True
+        one, other = self.linked(cloud, stride)
+        leave = away[one]
+        begins = leave & ~away[other]
+        if not begins.any():
+            return np.zeros(len(moved), dtype=bool)
+        patch = _connected(one[leave & ~begins], other[leave & ~begins], len(moved))
+        met, back = np.unique(other[begins], return_inverse=True)
+        classes = cloud.classes(slice(None, None, stride))
+        _, target = cloud.nearest(moved[met], None if classes is None else classes[met])
+        there, here = self.border[target][back], self.border[::stride][met][back]
+        own = patch[one[begins]]
+        # A border that is carried onto a border says nothing: there the object may end on both sides.
+        at_border, telling = there & ~here, ~(there & here)
+        free = MOST * np.bincount(own, at_border, len(moved)) > np.bincount(own, telling, len(moved))
+        found = away & free[patch]
         # What lies next to such a patch already reaches beyond the border.
-        found[met[free[own] & open_there[back]]] = True
+        found[other[begins][free[own] & at_border]] = True
         return found
 
 
-def openings(cloud: LocalPlanes, points: Array, tree: Any, neighbours: int) -> Openings | None:
-    """The open borders of a surface of which points [N, 3] with their kd-tree are known; None if it is closed.
+def _connected(one: Index, other: Index, count: int) -> Index:
+    """Which part each of `count` nodes belongs to, given pairs of linked ones."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
 
-    Args:
-        neighbours: of the local planes, more where there is noise.
+    return connected_components(coo_array((np.ones(len(one)), (one, other)), shape=(count, count)), directed=False)[1]
+
+
+def openings(cloud: LocalPlanes, points: Array, tree: Any) -> Openings | None:
+    """The open borders of a surface of which points [N, 3] with their kd-tree are known; None if it is closed, or
+    known too coarsely to tell.
     """
-    around = Neighbourhoods.of(points, tree, max(NEIGHBOURS, neighbours)).around(cloud.points)
+    around = Neighbourhoods.of(points, tree, NEIGHBOURS).around(cloud.points)
     mean, normals, variances = fit_planes(around)
     aside = mean - cloud.points
     aside -= np.einsum("ni,ni->n", aside, normals)[:, None] * normals
     width = np.sqrt(variances[:, 1] + variances[:, 2])
-    thick = np.sqrt(variances[:, 0])
-    sheet = (thick < FOLDED * np.median(thick)) & (variances[:, 1] > WIRE**2 * variances[:, 2])
-    border = sheet & (np.linalg.norm(aside, axis=1) > ASIDE * width)
-    if border.mean() < OPEN:
+    if np.median(width) > WIDEST:
         return None
-    # A border is a line: its points stand side by side, and what is within two spacings of it is at it.
-    line = cloud.points[border]
-    beside = kd_tree(line).query(line, k=[3])[0][:, 0] < 2.0 * width[border]
-    if beside.sum() < OPEN * len(border):
+    aside = np.linalg.norm(aside, axis=1) / np.maximum(width, 1e-300)
+    sheet = variances[:, 1] > WIRE**2 * variances[:, 2]
+    if _lines(cloud, sheet & (aside > FAR_ASIDE)).mean() < OPEN:
         return None
-    near = kd_tree(line[beside]).query(cloud.points)[0] < 2.0 * np.median(cloud.reach)
-    return Openings(border=near)
+    line = _lines(cloud, aside > ASIDE)
+    near = kd_tree(cloud.points[line]).query(cloud.points)[0] < 2.0 * np.median(cloud.reach)
+    return Openings(line=line, border=near)
+
+
+def _lines(cloud: LocalPlanes, chosen: Mask) -> Mask:
+    """Which of some local planes stand side by side, as those of a border do: two others within twice their reach."""
+    found = chosen.copy()
+    if chosen.sum() > 2:
+        points = cloud.points[chosen]
+        found[chosen] = kd_tree(points).query(points, k=[3])[0][:, 0] < 2.0 * cloud.reach[chosen]
+    return found if chosen.sum() > 2 else np.zeros(len(chosen), dtype=bool)

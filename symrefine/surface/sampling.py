@@ -1,4 +1,4 @@
-"""How a cloud was sampled: which of its points belong to no surface, and how much surface each of the others stands for.
+"""How a cloud was sampled: which of its points belong to no surface, and how much surface each other one stands for.
 
 A few thousand of the points tell whether there is anything to be done at all; only then all of them are asked. What is
 decided here depends on the surroundings of a point alone, so that it breaks no symmetry.
@@ -8,15 +8,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
 from symrefine.geometry import Array
 from symrefine.shape import Index
 from symrefine.surface.neighbourhoods import FLAT, fills_volume, fit_planes, kd_tree, sums_of
 
 # Points that are asked first, and neighbours that tell of the surroundings of a point.
 ASKED, AROUND = 5000, 16
-# A stray has its neighbours so many times as far away as half of the points have theirs: what 8 neighbours vary by on an
-# even surface ends at 1.8, and a density that falls by 6:1 to one side reaches it.
+# A stray has its neighbours so many times as far away as half of the points have theirs: what 8 neighbours vary by on
+# an even surface ends at 1.8, and a density that falls by 6:1 to one side reaches it.
 FAR = 2.5
+# The ball to the eighth neighbour of a point that is spread at random over a volume should hold eight, near a surface
+# half of that; of thin parts that are sampled sparsely it should hold a tenth of one.
+CROWDED = 1.0
 # A round that finds fewer strays than this share is the last: what remains lies within the spacing of the surface.
 LAST = 0.001
 # Standard deviation of the logarithm of the density along some direction from which on points are no even sample: half
@@ -50,8 +54,9 @@ def sampling(points: Array, rng: np.random.Generator, *, outliers: bool) -> Samp
     """
     every, none = np.arange(len(points)), np.empty(0, dtype=np.int64)
     some = points[rng.permutation(len(points))[:ASKED]]
-    some = (some - some.mean(axis=0)) / some.std()
-    if fills_volume(some, kd_tree(some), np.random.default_rng(0)):
+    spread = some.std()
+    some = (some - some.mean(axis=0)) / spread if spread > 0.0 else some
+    if spread == 0.0 or fills_volume(some, kd_tree(some), np.random.default_rng(0)):
         return Sampling(kept=every, strays=none)
     away = strays(points, rng) if outliers else none
     body = np.setdiff1d(every, away)
@@ -66,7 +71,10 @@ def strays(points: Array, rng: np.random.Generator) -> Index:
     Sparse parts of a surface are flat, more so than dense ones; strays near a surface are not in its plane. Each round
     sees clearer, as strays among strays look less alone.
     """
-    some = rng.permutation(len(points))[:ASKED]
+    away = ((points - np.median(points, axis=0)) ** 2).sum(axis=1)
+    some = np.union1d(
+        rng.permutation(len(points))[:ASKED], np.argsort(away)[-AROUND:]
+    )  # lest a few far ones are missed
     if not _alone(points[some]).any():
         return np.empty(0, dtype=np.int64)
     kept = np.arange(len(points))
@@ -82,15 +90,29 @@ def _alone(points: Array) -> NDArray[np.bool_]:
     """Which of points [N, 3] are far from the others and in no plane with them."""
     away, near = kd_tree(points).query(points, k=[*range(2, AROUND + 2)])
     reach = away[:, AROUND // 2 - 1]
-    sparse = np.flatnonzero(reach > FAR * np.median(reach))
+    # Points that are repeated have no spacing to be far by.
+    sparse = np.flatnonzero(reach > FAR * np.median(reach)) if np.median(reach) > 0.0 else np.empty(0, dtype=np.int64)
     found = np.zeros(len(points), dtype=bool)
     if sparse.size:
         sums = sums_of(points[near[sparse].ravel()]).reshape(len(sparse), AROUND, -1).sum(axis=1)
         mean, normals, variances = fit_planes(sums)
         across = np.abs(np.einsum("ni,ni->n", normals, points[sparse] - mean))
         thick = np.sqrt(variances[:, 0] / np.maximum(variances[:, 2], 1e-300))
-        found[sparse] = (thick > FLAT) | (across > FLAT * away[sparse, -1])
+        loose = (thick > FLAT) | (across > FLAT * away[sparse, -1])
+        # As random points are among themselves, or far from what is dense around: thin parts, sampled sparsely, are not
+        if not _scattered(points[sparse[loose]], np.ptp(points, axis=0)):
+            loose &= reach[sparse] > FAR * reach[near[sparse]].min(axis=1)
+        found[sparse] = loose
     return found
+
+
+def _scattered(points: Array, box: Array) -> bool:
+    """Whether most of points [N, 3] lie no closer together than random ones in a box of these sides [3] would."""
+    neighbours = AROUND // 2
+    if len(points) <= neighbours:
+        return False
+    away = kd_tree(points).query(points, k=[neighbours + 1])[0]
+    return bool(4.0 / 3.0 * np.pi * np.median(away) ** 3 * len(points) > CROWDED * np.prod(box))
 
 
 def clumps(points: Array, rng: np.random.Generator) -> list[Index]:
@@ -103,17 +125,24 @@ def clumps(points: Array, rng: np.random.Generator) -> list[Index]:
 
     some = rng.permutation(len(points))[:ASKED]
     tree = kd_tree(points[some])
-    _, near = tree.query(points[some], k=[*range(2, AROUND // 2 + 2)])
+    away, near = tree.query(points[some], k=[*range(2, AROUND // 2 + 2)])
     ends = np.arange(0, near.size + 1, near.shape[1])
     links = csr_array((np.ones(near.size), near.ravel(), ends), shape=(len(some), len(some)))
     count, part = connected_components(links, directed=False)
-    if count == 1:
+    if count == 1 or np.median(away[:, -1]) == 0.0:
         return []
     sizes = np.bincount(part)
     alike = (sizes >= COUNTERPART * sizes[:, None]) & (sizes <= sizes[:, None] / COUNTERPART)
     small = np.flatnonzero((sizes <= CLUMP * len(some)) & (alike.sum(axis=1) == 1))
-    owner = part[tree.query(points)[1]] if small.size else part
-    return [np.flatnonzero(owner == k) for k in small]
+    apart = [k for k in small if _gap(points[some], part == k, away[:, -1])]
+    owner = part[tree.query(points)[1]] if apart else part
+    return [np.flatnonzero(owner == k) for k in apart]
+
+
+def _gap(points: Array, some: NDArray[np.bool_], reach: Array) -> bool:
+    """Whether some of the points [N, 3] stand as far from all others as strays stand from one another."""
+    between = kd_tree(points[~some]).query(points[some])[0]
+    return bool(between.min() > FAR * np.median(reach[some]))
 
 
 def shares(points: Array, rng: np.random.Generator) -> Array | None:
@@ -123,9 +152,11 @@ def shares(points: Array, rng: np.random.Generator) -> Array | None:
     """
     some = points[rng.permutation(len(points))[:ASKED]]
     place = np.column_stack([np.ones(len(some)), some - some.mean(axis=0)])
-    area = np.log(np.maximum(_area(some), 1e-300))
-    trend = place @ np.linalg.lstsq(place, area, rcond=None)[0]
-    return None if trend.std() < UNEVEN else _area(points)
+    area = _area(some)
+    if not area.all():
+        return None  # points are repeated
+    trend = place @ np.linalg.lstsq(place, np.log(area), rcond=None)[0]
+    return _area(points) if trend.std() > UNEVEN else None
 
 
 def _area(points: Array) -> Array:

@@ -8,14 +8,16 @@ from functools import cached_property
 import numpy as np
 
 from symrefine.geometry import Array, Isometry, read_only
-from symrefine.surface.misses import LIMITS, miss_distances, needs, needs_of_atoms, spread_distance
+from symrefine.surface.misses import LIMITS, TOLERANCE, miss_distances, needs, needs_of_atoms, spread_distance
 from symrefine.surface.openings import Openings
 from symrefine.surface.skin import LocalPlanes
 
 # Standard deviation over mean of the distance to the nearest of random points in a volume (Weibull, shape 3).
 NEAREST_SPREAD = 0.363
 # Local planes that show how the patches of an image hang together.
-PATCHES = 2000
+PATCHES = 1500
+# Misses of an open surface end where the least of it needs so many tolerances: nothing beyond is told apart.
+HOPELESS = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,24 +38,30 @@ class Surface:
         diagonal: normalised units.
         noise: [M] misses that noise alone shows, fractions of the diagonal; none if empty.
         openings: where the surface is open, or None.
-        far: misses from which on a point meets no surface, a fraction of the diagonal.
+        tolerance: what is asked for, as a fraction of the diagonal: of a surface with openings, what misses by more
+            than 95 % may meets no surface.
     """
 
     cloud: LocalPlanes
     diagonal: float
     noise: Array = field(default_factory=lambda: np.empty(0))
     openings: Openings | None = None
-    far: float = math.inf
+    tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "noise", read_only(np.sort(self.noise)))
+
+    @property
+    def far(self) -> float:
+        """Misses from which on a point meets no surface, a fraction of the diagonal."""
+        return LIMITS[1] * self.tolerance
 
     def stride(self, sources: int) -> int:
         """Stride that leaves about `sources` local planes; enough for the patches of an image to hang together."""
         return max(1, len(self.cloud.points) // max(sources, PATCHES if self.openings is not None else 1))
 
     def misses(self, motions: Sequence[Isometry], *, sources: int = 10**9, bound: float = math.inf) -> Array:
-        """By how much each of K operations misses the surface [K, N], fractions of the diagonal; NaN where unseen.
+        """By how much each of K operations misses the surface [K, N], fractions of the diagonal.
 
         Args:
             motions: the operations.
@@ -61,15 +69,21 @@ class Surface:
             bound: misses end here, which is quicker.
         """
         stride = self.stride(sources)
-        found = miss_distances(self.cloud, motions, stride=stride, bound=bound * self.diagonal) / self.diagonal
-        if self.openings is not None:
-            for motion, miss in zip(motions, found, strict=True):
-                moved = motion.apply(self.cloud.points[::stride])
-                miss[self.openings.unseen(self.cloud, moved, miss > self.far, stride)] = np.nan
+        bound = bound if self.openings is None else min(bound, HOPELESS * LIMITS[-1] * self.tolerance)
+        return miss_distances(self.cloud, motions, stride=stride, bound=bound * self.diagonal) / self.diagonal
+
+    def seen(self, misses: Array, motions: Sequence[Isometry], *, sources: int = 10**9) -> Array:
+        """The misses [K, N] of K operations, NaN for what they carry to where nobody looked; `sources` as before."""
+        if self.openings is None:
+            return misses
+        stride, found = self.stride(sources), misses.copy()
+        for motion, miss in zip(motions, found, strict=True):
+            moved = motion.apply(self.cloud.points[::stride])
+            miss[self.openings.unseen(self.cloud, moved, miss > self.far, stride)] = np.nan
         return found
 
     def coverage(self, misses: Array, motions: Sequence[Isometry], *, sources: int) -> Coverage:
-        """What the misses [K, N] of K operations say of the surface, each by itself, the one that says least."""
+        """What K operations say that miss by so much where it was seen [K, N]: the one that says least."""
         still = self.cloud.points[:: self.stride(sources)]
         travel = [np.linalg.norm(m.apply(still) - still, axis=1) for m in motions]
         moved = np.stack(travel) > self.far * self.diagonal
@@ -106,8 +120,9 @@ class Surface:
         return float(needs(np.concatenate([m.ravel() for m in misses]), self.noise))
 
     def needs(self, motions: Sequence[Isometry], *, sources: int = 10**9, bound: float = math.inf) -> Array:
-        """The smallest tolerances [K] at which each of K operations holds; arguments as of `misses`."""
-        return self.needed(self.misses(motions, sources=sources, bound=bound), motions)
+        """The smallest tolerances [K] at which each of K operations holds, as far as it was seen; see `misses`."""
+        misses = self.misses(motions, sources=sources, bound=bound)
+        return self.needed(self.seen(misses, motions, sources=sources), motions)
 
     def need(self, motions: Sequence[Isometry], *, sources: int = 10**9) -> float:
         """The smallest tolerance at which all of some operations hold."""
