@@ -11,6 +11,8 @@ from symrefine.geometry import Array, read_only
 
 Measure = Literal["points", "surface", "solid"]
 Index = NDArray[np.integer[Any]]
+# Views of an object that are told apart.
+CAMERAS = 64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -24,6 +26,8 @@ class Shape:
         faces: [F, 3] vertex indices of a triangle mesh in 3-space, or None.
         labels: [N] integers for a cloud, [F] for a mesh: classes (elements, colours, materials) that a symmetry must
             keep; one class if absent.
+        viewpoint: [3] or [N, 3] place of the camera that saw the points of a cloud, or each of them; 64 places at most.
+            Beside the outline of what it saw it saw that there is nothing: not for what the edge of a picture cuts off.
         measure: "points" for a cloud; "surface" or "solid" for a mesh: what carries the mass.
         source: where the data came from, for messages.
 
@@ -37,6 +41,7 @@ class Shape:
     normals: Array | None = None
     faces: Index | None = None
     labels: Index | None = None
+    viewpoint: Array | None = None
     measure: Measure = "points"
     source: str = "array"
 
@@ -52,6 +57,10 @@ class Shape:
         if self.labels is not None:
             count, what = (len(points), "point") if self.faces is None else (len(self.faces), "face")
             object.__setattr__(self, "labels", _labels(self.labels, count, what, self.source))
+        if self.viewpoint is not None:
+            if self.faces is not None:
+                raise InputError(f"{self.source}: a viewpoint is for clouds, not for meshes")
+            object.__setattr__(self, "viewpoint", _viewpoint(self.viewpoint, points.shape, self.source))
         if self.measure not in get_args(Measure):
             raise InputError(f"{self.source}: measure is {self.measure!r}; expected one of {list(get_args(Measure))}")
         if (self.faces is None) != (self.measure == "points"):
@@ -72,9 +81,10 @@ class Shape:
         weights: ArrayLike | None = None,
         normals: ArrayLike | None = None,
         labels: ArrayLike | None = None,
+        viewpoint: ArrayLike | None = None,
     ) -> "Shape":
         """A cloud from anything numpy can read as an array [N, n]."""
-        given = {"weights": weights, "normals": normals, "labels": labels}
+        given = {"weights": weights, "normals": normals, "labels": labels, "viewpoint": viewpoint}
         return cls(points=points, **{k: v for k, v in given.items() if v is not None})  # type: ignore[arg-type]
 
     @property
@@ -122,6 +132,18 @@ def _weights(values: ArrayLike, count: int, source: str) -> Array:
     if not np.isfinite(array).all() or (array < 0).any() or array.sum() == 0:
         raise InputError(f"{source}: weights must be finite, non-negative and not all zero")
     return read_only(array)
+
+
+def _viewpoint(values: ArrayLike, shape: tuple[int, ...], source: str) -> Array:
+    array = _numbers(values, "viewpoints", source)
+    if array.shape not in (shape, shape[1:]) or shape[1] != 3:
+        raise InputError(f"{source}: viewpoint has shape {array.shape}; expected (3,), or {shape}, one for each point")
+    if not np.isfinite(array).all():
+        raise InputError(f"{source}: viewpoints hold NaN or infinity")
+    places = len(np.unique(array.reshape(-1, 3), axis=0))
+    if places > CAMERAS:
+        raise InputError(f"{source}: {places} different viewpoints; expected at most {CAMERAS}, one for each view")
+    return read_only(np.broadcast_to(array, shape))
 
 
 def _labels(values: ArrayLike, count: int, what: str, source: str) -> Index:

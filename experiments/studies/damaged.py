@@ -119,7 +119,7 @@ def damaged(case: Case) -> tuple[Damaged, Truth]:
 def run(case: Case) -> Row:
     """Detect and compare."""
     made, truth = damaged(case)
-    shape = Shape(points=made.points)
+    shape = Shape(points=made.points, viewpoint=made.viewpoint)
     start = perf_counter()
     found = detect(shape)
     seconds = perf_counter() - start

@@ -112,8 +112,8 @@ def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
 
 def _ends_there(surface: Surface, found: Hypothesis) -> bool:
     """Whether a group carries the open borders onto themselves, as what a sensor leaves out has no symmetry."""
-    if surface.openings is None:
-        return True
+    if surface.openings is None or surface.openings.cameras:
+        return False
     line, cloud = surface.openings.line, surface.cloud
     motions = [m for e in found.elements for m in e.operations.motions(e.center)]
     near = [cloud.nearest(m.apply(cloud.points[line]), cloud.classes(np.flatnonzero(line)))[1] for m in motions]

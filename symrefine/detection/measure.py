@@ -105,6 +105,7 @@ def part(shape: Shape, some: Index) -> Shape:
         weights=None if shape.weights is None else shape.weights[some],
         normals=None if shape.normals is None else shape.normals[some],
         labels=None if shape.labels is None else shape.labels[some],
+        viewpoint=None if shape.viewpoint is None else shape.viewpoint[some],
     )
 
 
@@ -185,6 +186,7 @@ def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLE
     shape, moments = measured.shape, measured.moments
     points, normals, weights, labels = _cloud(shape, measured.classes, rng)
     local = (points - moments.center) / moments.scale
+    viewpoints = None if shape.viewpoint is None else (shape.viewpoint - moments.center) / moments.scale
     evidence = Evidence(
         moments=moments,
         tuples=measured.tuples,
@@ -194,7 +196,7 @@ def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLE
     )
     if is_few(shape):
         return evidence, Surface(cloud=isolated_points(local, labels), diagonal=tight_diagonal(local))
-    return evidence, _surface(local, normals, weights, labels, shape.faces is not None, tolerance, rng)
+    return evidence, _surface(local, normals, weights, labels, shape.faces is not None, tolerance, viewpoints, rng)
 
 
 def _surface(
@@ -204,6 +206,7 @@ def _surface(
     labels: Index | None,
     exact: bool,
     tolerance: float,
+    viewpoints: Array | None,
     rng: np.random.Generator,
 ) -> Surface:
     """Local planes (points, where they fill a volume) with what noise alone shows."""
@@ -227,9 +230,9 @@ def _surface(
     noise = noise_distances(len(local), half, rng)
     surface = Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, tolerance=tolerance)
     # Where noise alone needs all that is allowed, nobody sees what is open.
-    if exact or surface.floor >= tolerance:
+    if exact or (surface.floor >= tolerance and viewpoints is None):
         return surface
-    return replace(surface, openings=openings(cloud, local, tree))
+    return replace(surface, openings=openings(cloud, local, tree, viewpoints))
 
 
 def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Surface:

@@ -30,6 +30,7 @@ def detect(
     weights: ArrayLike | None = None,
     normals: ArrayLike | None = None,
     labels: ArrayLike | None = None,
+    viewpoint: ArrayLike | None = None,
     outliers: Outliers = "auto",
     tolerance: float = TOLERANCE,
     ladder: Sequence[float] = (),
@@ -43,6 +44,8 @@ def detect(
             different mass are different things, which no symmetry exchanges; of more, masses are a sampling density.
         normals: [N, 3] normals, any sign; estimated where absent. Not with a `Shape`.
         labels: [N] integers: classes (elements, colours, materials) that every symmetry must keep. Not with a `Shape`.
+        viewpoint: [3] or [N, 3] place of the camera that saw the points, or each of them: what lies in front of them or
+            beside their outline, was seen to be free. Not with a `Shape`.
         outliers: "auto": points of a cloud that belong to no surface are set apart and told as `Detection.outliers`;
             "none": all points count.
         tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal: 95 % of the
@@ -55,7 +58,7 @@ def detect(
         InputError: not a 3-D shape, tolerances outside (0, 0.2], or another word for outliers.
         DegenerateShapeError: the points do not spread.
     """
-    data, clock = _given(shape, weights, normals, labels), Clock()
+    data, clock = _given(shape, weights, normals, labels, viewpoint), Clock()
     found = examined(data, outliers=outliers, tolerance=tolerance, ladder=ladder, seed=seed, clock=clock)
     return told(found, tolerance=tolerance, ladder=ladder, clock=clock)
 
@@ -122,13 +125,19 @@ def told(found: Examined, *, tolerance: float = TOLERANCE, ladder: Sequence[floa
 
 
 def _given(
-    shape: Shape | ArrayLike, weights: ArrayLike | None, normals: ArrayLike | None, labels: ArrayLike | None
+    shape: Shape | ArrayLike,
+    weights: ArrayLike | None,
+    normals: ArrayLike | None,
+    labels: ArrayLike | None,
+    viewpoint: ArrayLike | None,
 ) -> Shape:
     """The shape in 3-space."""
     if not isinstance(shape, Shape):
-        shape = Shape.of(shape, weights=weights, normals=normals, labels=labels)
-    elif not (weights is None and normals is None and labels is None):
-        raise InputError("weights, normals and labels belong to the Shape; give them there, or give an array of points")
+        shape = Shape.of(shape, weights=weights, normals=normals, labels=labels, viewpoint=viewpoint)
+    elif not (weights is None and normals is None and labels is None and viewpoint is None):
+        raise InputError(
+            "weights, normals, labels and viewpoint belong to the Shape; give them there, or give an array of points"
+        )
     if shape.dim != 3:
         raise InputError(f"{shape.source}: detect takes 3-D shapes; {_elsewhere(shape.dim)}")
     return shape

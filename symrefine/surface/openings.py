@@ -1,7 +1,8 @@
-"""Where a surface is open, so that what lies beyond was not seen: missing surface is no evidence against a symmetry.
+"""What was not seen of a surface: missing parts are no evidence against a symmetry.
 
 A patch of the image that meets no surface begins somewhere. Where it begins at an open border nobody looked beyond, and
-it is unseen; where it begins in the middle of a surface, the surface says that there is nothing: it contradicts.
+it is unseen; where it begins in the middle of a surface, the surface says that there is nothing: it contradicts. Where
+cameras are known, they say it better: a patch in space that they saw to be free contradicts, any other is unseen.
 """
 
 from dataclasses import dataclass, field
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from symrefine.geometry import Array
 from symrefine.shape import Index
+from symrefine.surface.cameras import Camera, cameras
 from symrefine.surface.neighbourhoods import WIDEST, Neighbourhoods, fit_planes, kd_tree
 from symrefine.surface.skin import LocalPlanes
 
@@ -31,16 +33,18 @@ MOST = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Openings:
-    """The open borders of a surface.
+    """The open borders of a surface, and the cameras that saw it.
 
     Attributes:
         line: [M] which local planes make one up.
         border: [M] which lie at one.
+        cameras: what saw it, in the frame of the surface; none if nothing is known of them.
         links: by stride, pairs [2, E] of every so many-th local planes that are neighbours, both ways.
     """
 
     line: Mask
     border: Mask
+    cameras: tuple[Camera, ...] = ()
     links: dict[int, Index] = field(default_factory=dict)
 
     def linked(self, cloud: LocalPlanes, stride: int) -> Index:
@@ -52,7 +56,7 @@ class Openings:
             self.links[stride] = np.concatenate([pairs, pairs[::-1]], axis=1)
         return self.links[stride]
 
-    def unseen(self, cloud: LocalPlanes, moved: Array, away: Mask, stride: int) -> Mask:
+    def unseen(self, cloud: LocalPlanes, moved: Array, away: Mask, stride: int, margin: float) -> Mask:
         """Which of every `stride`-th local planes, moved to [N, 3], lie where nobody looked.
 
         Args:
@@ -60,7 +64,13 @@ class Openings:
             moved: where an operation takes them.
             away: [N] those that meet no surface.
             stride: of the local planes.
+            margin: by how much space has to be free.
         """
+        if self.cameras:
+            found = away.copy()
+            for camera in self.cameras:
+                found[found] = ~camera.sees_through(moved[found], margin)
+            return found
         one, other = self.linked(cloud, stride)
         leave = away[one]
         begins = leave & ~away[other]
@@ -89,10 +99,18 @@ def _connected(one: Index, other: Index, count: int) -> Index:
     return connected_components(coo_array((np.ones(len(one)), (one, other)), shape=(count, count)), directed=False)[1]
 
 
-def openings(cloud: LocalPlanes, points: Array, tree: Any) -> Openings | None:
-    """The open borders of a surface of which points [N, 3] with their kd-tree are known; None if it is closed, or
-    known too coarsely to tell.
+def openings(cloud: LocalPlanes, points: Array, tree: Any, viewpoints: Array | None = None) -> Openings | None:
+    """What is open of a surface; None if it is closed, or known too coarsely to tell.
+
+    Args:
+        cloud: its local planes.
+        points: [N, 3] all that is known of it.
+        tree: kd-tree over them.
+        viewpoints: [N, 3] where each was seen from, or None.
     """
+    if viewpoints is not None:
+        none = np.zeros(len(cloud.points), dtype=bool)
+        return Openings(line=none, border=none, cameras=cameras(points, viewpoints))
     around = Neighbourhoods.of(points, tree, NEIGHBOURS).around(cloud.points)
     mean, normals, variances = fit_planes(around)
     aside = mean - cloud.points

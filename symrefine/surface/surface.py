@@ -79,7 +79,7 @@ class Surface:
         stride, found = self.stride(sources), misses.copy()
         for motion, miss in zip(motions, found, strict=True):
             moved = motion.apply(self.cloud.points[::stride])
-            miss[self.openings.unseen(self.cloud, moved, miss > self.far, stride)] = np.nan
+            miss[self.openings.unseen(self.cloud, moved, miss > self.far, stride, self.far * self.diagonal)] = np.nan
         return found
 
     def coverage(self, misses: Array, motions: Sequence[Isometry], *, sources: int) -> Coverage:
