@@ -129,7 +129,8 @@ def fitted(surface: Surface, start: Placed, *, before: int = 0) -> Hypothesis:
         # What holds without it asks for no belief in anything unseen.
         seen = [surface.seen(m, motions, sources=sources) for m, (_, motions) in zip(misses, parts, strict=True)]
         partly, partial = _all_judged(surface, parts, seen, placed.center)
-        partial = math.hypot(partial, surface.tolerance * _unseen(partly))
+        if not surface.openings.cameras:  # they say what they could not see
+            partial = math.hypot(partial, surface.tolerance * _unseen(partly))
         found, need = (partly, partial) if partial < need else (found, need)
     return Hypothesis(placed=placed, elements=found, need=need, history=history, before=before)
 

@@ -161,4 +161,4 @@ def shares(points: Array, rng: np.random.Generator) -> Array | None:
 
 def _area(points: Array) -> Array:
     away, _ = kd_tree(points).query(points, k=[AROUND + 1])
-    return np.asarray(away[:, 0] ** 2)
+    return np.asarray(np.minimum(away, np.quantile(away, 0.99))[:, 0] ** 2)  # lest a few lonely ones weigh all
