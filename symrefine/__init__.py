@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from symrefine.align.story import Alignment as Alignment
     from symrefine.align.story import align as align
+    from symrefine.complete import complete as complete
     from symrefine.detection.result import Detection as Detection
     from symrefine.detection.story import detect as detect
     from symrefine.errors import DegenerateShapeError as DegenerateShapeError
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "symrefine.load": ("load",),
     "symrefine.detection.story": ("detect",),
+    "symrefine.complete": ("complete",),
     "symrefine.align.story": ("align", "Alignment"),
     "symrefine.ntuples.derive": ("derive",),
     "symrefine.shape": ("Shape",),

@@ -99,7 +99,7 @@ def test_the_report_holds_what_was_agreed(record: dict[str, Any], data: Path) ->
     assert record["schema"] == "symrefine.detection/1"
     assert record["source"] == str(data / "box.ply")
     assert record["version"] == symrefine.__version__
-    assert record["options"] == {"tolerance": 0.02, "measure": None, "seed": 0}
+    assert record["options"] == {"tolerance": 0.02, "measure": None, "seed": 0, "outliers": "auto"}
     assert (record["point_group"], record["inversion"], record["undetermined"]) == ("D2h", True, None)
     assert len(record["center"]) == 3
     assert len(record["planes"]) == len(record["axes"]) == 3
@@ -110,8 +110,11 @@ def test_the_report_holds_what_was_agreed(record: dict[str, Any], data: Path) ->
         assert 0.0 <= alternative["forgiven"] < 1.0
     keys = "center diagonal tolerance planes axes near_misses staircase iterations ntuples timings"
     assert set(keys.split()) <= set(record)
-    assert set(record["planes"][0]) == {"normal", "offset", "residual", "confidence", "sigma"}
-    assert set(record["axes"][0]) == {"direction", "point", "order", "improper", "residual", "confidence", "sigma"}
+    assert set(record["planes"][0]) == {"normal", "offset", "residual", "confidence", "sigma", "coverage"}
+    axis = {"direction", "point", "order", "improper", "residual", "confidence", "sigma", "coverage"}
+    assert set(record["axes"][0]) == axis
+    assert record["outliers"] == {"count": 0, "clumps": 0, "share": 0.0}
+    assert record["at_least"] is False
     assert set(record["ntuples"]) == {"kind", "singular_values", "significance"}
     assert {step["point_group"] for step in record["staircase"]} == {"D2h"}
     assert [step["tolerance"] for step in record["staircase"]] == sorted({s["tolerance"] for s in record["staircase"]})

@@ -21,7 +21,9 @@ from symrefine.geometry import Array, Axis, Plane, random_orthogonal, rotation, 
 from symrefine.groups import PointGroup, point_group
 from symrefine.shape import Shape
 from symrefine.surface.misses import Deviation
+from symrefine.surface.surface import Coverage
 
+ALL = Coverage(supported=1.0, contradicted=0.0, unseen=0.0)
 CENTER = np.array([0.3, -1.2, 2.5])
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 SIDES = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]]
@@ -217,10 +219,19 @@ def test_planes_and_axes_keep_their_place_when_their_sign_is_chosen(box: tuple[S
     axis = Axis(point=CENTER, direction=np.array([0.0, 0.0, -1.0]))
     changed = replace(
         box[1],
-        planes=(FoundPlane(plane=plane, residual=miss, confidence=1.0, sigma_rad=math.nan, sigma=math.nan),),
+        planes=(
+            FoundPlane(plane=plane, residual=miss, confidence=1.0, sigma_rad=math.nan, sigma=math.nan, coverage=ALL),
+        ),
         axes=(
             FoundAxis(
-                axis=axis, order=math.inf, improper=False, residual=miss, confidence=0.5, sigma_rad=0.1, sigma=0.2
+                axis=axis,
+                order=math.inf,
+                improper=False,
+                residual=miss,
+                confidence=0.5,
+                sigma_rad=0.1,
+                sigma=0.2,
+                coverage=ALL,
             ),
         ),
     )

@@ -163,6 +163,7 @@ def view(mesh: Shape, direction: Array, rng: Rng, *, rough: bool = False) -> Dam
     hit, flying = np.isfinite(depth), np.zeros(depth.shape, dtype=bool)
     if rough:
         around = np.stack([np.roll(depth, s, axis=a) for a in (0, 1) for s in (-1, 1)])
+        depth = np.where(hit, depth, 0.0)
         around = np.where(np.isfinite(around), around, depth)
         far = around[rng.integers(4, size=depth.shape), np.arange(depth.shape[0])[:, None], np.arange(depth.shape[1])]
         flying = hit & (np.abs(far - depth) > 0.02 * mesh.diagonal) & (rng.random(depth.shape) < FLYING)

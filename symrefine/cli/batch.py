@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any, cast
 
 from symrefine import journal
 from symrefine.cli.outputs import check_beside, check_outputs, console, note, progress, text_writer, write_all
-from symrefine.cli.values import add_class_options, add_detection_options, count, detection_options, positive
+from symrefine.cli.values import (
+    add_class_options,
+    add_detection_options,
+    add_scan_options,
+    count,
+    detection_options,
+    positive,
+)
 from symrefine.errors import InputError, SymrefineError
 from symrefine.files import naming
 
@@ -46,6 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--workers", type=count, default=1, metavar="N", help="files done at the same time (default: %(default)s)"
     )
     add_class_options(parser)
+    add_scan_options(parser)
     add_detection_options(parser)
 
 

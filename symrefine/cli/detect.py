@@ -2,6 +2,7 @@
 
 import argparse
 import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -17,7 +18,15 @@ from symrefine.cli.outputs import (
     waiting,
     write_all,
 )
-from symrefine.cli.values import add_class_options, add_detection_options, detection_options, grey, natural, positive
+from symrefine.cli.values import (
+    add_class_options,
+    add_detection_options,
+    add_scan_options,
+    detection_options,
+    grey,
+    natural,
+    positive,
+)
 from symrefine.errors import InputError
 
 if TYPE_CHECKING:
@@ -61,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--strict", action="store_true", help=f"end with status {UNDETERMINED} where the answer is undetermined"
     )
     add_class_options(parser)
+    add_scan_options(parser)
     add_detection_options(parser)
 
 
@@ -101,7 +111,8 @@ def examine(
     how = {name: chosen for name, chosen in options.items() if name in ("measure", "labels", "weights")}
     shape = load(path, **how, threshold=threshold, invert=invert)
     load_s = time.perf_counter() - start
-    tolerance, seed = options["tolerance"], options["seed"]
+    tolerance, seed, outliers = options["tolerance"], options["seed"], options.get("outliers", "auto")
+    shape = seen_from(shape, options.get("viewpoint"))
     if shape.labels is not None and shape.dim != 3:
         raise InputError(
             f"{path}: points have {shape.dim} coordinates; labels are for objects in space, leave them out"
@@ -125,8 +136,19 @@ def examine(
     from symrefine.detection.story import LADDER, detect
     from symrefine.export.records import detection_record
 
-    detection = detect(shape, tolerance=tolerance, ladder=LADDER, seed=seed)
+    detection = detect(shape, outliers=outliers, tolerance=tolerance, ladder=LADDER, seed=seed)
     return shape, detection, detection_record(detection, shape, options=options, load_s=load_s)
+
+
+def seen_from(shape: "Shape", viewpoint: tuple[float, ...] | None) -> "Shape":
+    """The shape with the place of the camera, if one is given."""
+    if viewpoint is None:
+        return shape
+    import numpy as np
+
+    if shape.dim != 3 or shape.faces is not None:
+        raise InputError(f"{shape.source}: --viewpoint is for clouds in space, leave it out")
+    return replace(shape, viewpoint=np.array(viewpoint))
 
 
 def _writers(args: argparse.Namespace, shape: "Shape", detection: "Detection") -> dict[str, Writer]:

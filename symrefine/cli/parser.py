@@ -4,10 +4,10 @@ import argparse
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from symrefine.cli import align, batch, derive, detect, export, run, symmetrize, view
+from symrefine.cli import align, batch, complete, derive, detect, export, run, symmetrize, view
 from symrefine.errors import InputError
 
-_COMMANDS = (detect, align, derive, export, symmetrize, batch, run, view)
+_COMMANDS = (detect, align, derive, export, symmetrize, complete, batch, run, view)
 _DESCRIPTION = "Symmetry of 3-D shapes: mirror planes, rotation axes and the point group of a mesh or a point cloud."
 _EPILOG = (
     "`symrefine COMMAND --help` explains a command. Exit status: 0 done, 1 some files of a batch or runs failed, 2 bad "

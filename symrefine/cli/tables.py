@@ -37,6 +37,10 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
     yield _place(record)
     if record["classes"]:
         yield f"labels: {_count(record['classes']['count'], 'class', 'classes')}"
+    if record["outliers"]["count"]:
+        yield outliers(record["outliers"])
+    if record["at_least"]:
+        yield partial(record)
     yield from _apart(*_spatial(record))
     yield ""
     if record["planes"] or record["axes"] or record["inversion"] or record["near_misses"]:
@@ -48,6 +52,26 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
     if record["staircase"]:
         yield f"Group by tolerance: {staircase(record)}"
     yield f"{_count(record['iterations'], 'iteration')}, {_seconds(record)} s"
+
+
+def outliers(found: Record) -> str:
+    """How many points were taken as no part of the object: `1,214 points (6 %) taken as outliers`."""
+    clumps = f", {_count(found['clumps'], 'clump')} among them" if found["clumps"] else ""
+    return f"{found['count']:,} points ({100 * found['share']:.2g} %) taken as outliers{clumps}"
+
+
+def partial(record: Record) -> str:
+    """What was not seen, and what of the surface speaks for what was found."""
+    seen = [e["coverage"] for e in (*record["planes"], *record["axes"])]
+    if not seen:
+        return "parts of the surface were not seen: there may be more"
+    most = max(seen, key=lambda c: c["unseen"])
+    return (
+        "parts of the surface were not seen: there may be more; of what was seen "
+        f"{100 * min(c['supported'] for c in seen):.0f} % and more support each element, "
+        f"{100 * max(c['contradicted'] for c in seen):.2g} % and less contradict it, "
+        f"{100 * most['unseen']:.0f} % and less have an image where nobody looked"
+    )
 
 
 def _place(record: Record) -> str:
@@ -79,6 +103,7 @@ def headline(record: Record) -> str:
     if record["undetermined"]:
         return f"undetermined: {record['undetermined']}"
     means = _planar_meaning(record) if "lines" in record else meaning(point_group(name))
+    name = f"at least {name}" if record.get("at_least") else name
     return f"{name}, {means}; tolerance {100 * record['tolerance']:g} %, confidence {record['confidence']:.2f}"
 
 

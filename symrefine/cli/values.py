@@ -28,10 +28,29 @@ def add_detection_options(parser: argparse.ArgumentParser, counts_as: str = "sym
     )
 
 
+def add_scan_options(parser: argparse.ArgumentParser) -> None:
+    """The options that say how points were taken."""
+    parser.add_argument(
+        "--outliers",
+        choices=("auto", "none"),
+        default="auto",
+        help="auto: points of a cloud that belong to no surface, single or in clumps, are set apart and told; none: "
+        "all points count (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--viewpoint",
+        type=place,
+        metavar="X,Y,Z",
+        help="where the camera stood that saw the points, in their frame: space in front of them, or beside their "
+        "outline, was seen to be free (default: the VIEWPOINT of a .pcd where that is not the origin)",
+    )
+
+
 def detection_options(args: argparse.Namespace) -> dict[str, Any]:
     """What was chosen of the options of a detection, for its record; names of fields only where one is given."""
     named = {name: given for name in ("labels", "weights") if (given := getattr(args, name, None)) is not None}
-    return {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed} | named
+    scan = {name: given for name in ("outliers", "viewpoint") if (given := getattr(args, name, None)) is not None}
+    return {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed} | scan | named
 
 
 def add_class_options(parser: argparse.ArgumentParser) -> None:
@@ -70,6 +89,14 @@ def grey(text: str) -> float | Literal["otsu"]:
     if not 0.0 < value < 1.0:
         raise argparse.ArgumentTypeError(f"{text!r} is not a grey value between 0 (black) and 1 (white), nor 'otsu'")
     return value
+
+
+def place(text: str) -> tuple[float, ...]:
+    """Three finite coordinates, separated by commas."""
+    values = tuple(_float(part) for part in text.split(","))
+    if len(values) != 3 or not all(math.isfinite(v) for v in values):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a place X,Y,Z of three numbers, such as 0,0,-1.5")
+    return values
 
 
 def positive(text: str) -> float:

@@ -104,7 +104,7 @@ def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
     if not _ends_there(surface, whole.largest) or _left_over(whole.largest, part.largest):
         return replace(part, at_least=True)
     if _size(part.largest.placed) <= _size(whole.largest.placed):
-        return whole
+        return replace(whole, at_least=surface.openings.evident)
     # To believe that what ends so evenly is missing a part takes as much as to believe in as much as was seen.
     rival = replace(part.largest, need=math.hypot(part.largest.need, surface.tolerance))
     return replace(whole, small=(*whole.small, rival), at_least=True)

@@ -6,18 +6,19 @@ the table that everything else reads.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
 
+from symrefine.decide.posterior import EVEN, EVEN_MIRROR
 from symrefine.errors import DegenerateShapeError
 from symrefine.fit.placed import Operations, Placed, common_center, elements
 from symrefine.fit.refine import Iterate, refine
 from symrefine.geometry import Array, Isometry
 from symrefine.groups import PointGroup, from_elements, is_subgroup
 from symrefine.propose.votes import AGREE_RAD
-from symrefine.surface.misses import LIMITS, Deviation
+from symrefine.surface.misses import LIMITS, SHARES, Deviation
 from symrefine.surface.surface import Coverage, Surface
 
 # Local planes that are moved: at a glance by each operation; in a look by all together; in a fit and when judged by all
@@ -130,8 +131,16 @@ def fitted(surface: Surface, start: Placed, *, before: int = 0) -> Hypothesis:
         seen = [surface.seen(m, motions, sources=sources) for m, (_, motions) in zip(misses, parts, strict=True)]
         partly, partial = _all_judged(surface, parts, seen, placed.center)
         if not surface.openings.cameras:  # they say what they could not see
-            partial = math.hypot(partial, surface.tolerance * _unseen(partly))
-        found, need = (partly, partial) if partial < need else (found, need)
+            # A lone mirror is forgiven more for being made inexactly, not for what nobody saw of it.
+            whole = surface.tolerance * (EVEN_MIRROR / EVEN if placed.group.name == "Cs" else 1.0)
+            beliefs = [whole * _belief(e) for e in partly]
+            partly = tuple(replace(e, need=math.hypot(e.need, b)) for e, b in zip(partly, beliefs, strict=True))
+            # More than half of the operations of a group generate it (Lagrange), so that the others follow.
+            partial = math.hypot(partial, sorted(beliefs)[len(beliefs) // 2])
+        # What is unseen under no element by more than a detail is rather that: a flag, on one side.
+        most = max(e.coverage.unseen for e in partly)
+        if partial < need and (surface.openings.cameras or most > SHARES[1]):
+            found, need = partly, partial
     return Hypothesis(placed=placed, elements=found, need=need, history=history, before=before)
 
 
@@ -140,14 +149,9 @@ def exact_need(floor: float) -> float:
     return max(EXACT, 0.5 * floor)
 
 
-def _unseen(found: Sequence[Element]) -> float:
-    """Surface that half of the elements and one carry to where nobody looked, over that carried onto itself.
-
-    More than half of the operations of a group generate it (Lagrange), so that the others follow. To believe in as much
-    as was seen needs a whole tolerance.
-    """
-    each = sorted(e.coverage.unseen / max(e.coverage.supported, 1e-9) for e in found)
-    return each[len(each) // 2]
+def _belief(found: Element) -> float:
+    """What an element asks to believe: 1 where as much of its image was not seen as was; areas grow with lengths."""
+    return math.sqrt(found.coverage.unseen / max(found.coverage.supported, 1e-9))
 
 
 def _moved_each(operations: int) -> int:

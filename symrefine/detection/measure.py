@@ -41,16 +41,16 @@ class Measured:
 
     Attributes:
         shape: without what was taken as outliers.
-        outliers: indices, ascending, of the points that were.
-        clumps: how many groups of them stand apart from the body.
+        strays: indices of the points that were for being far from all others.
+        clumps: of each group of points that was for standing apart from the body, and where they are.
         classes: of its points or faces, that must match.
         moments: to order 8.
         vectors: the n-tuples of them.
     """
 
     shape: Shape
-    outliers: Index
-    clumps: int
+    strays: Index
+    clumps: tuple[tuple[Index, Array], ...]
     classes: Index | None
     moments: Moments
     vectors: NTuples
@@ -66,30 +66,31 @@ class Measured:
         return fixed_subspace(self.vectors)
 
 
-def measure(shape: Shape, *, outliers: Outliers = "auto") -> Measured:
+def measure(shape: Shape, *, outliers: Outliers = "auto", apart: bool = True) -> Measured:
     """Moments to order 8 and the n-tuples of them, of the points that belong to the object.
+
+    `apart` says whether clumps apart from the body count as outliers.
 
     Raises:
         InputError: another word for outliers.
     """
     if outliers not in get_args(Outliers):
         raise InputError(f"outliers is {outliers!r}; expected one of {list(get_args(Outliers))}")
-    away, clumps = np.empty(0, dtype=np.int64), 0
+    strays: Index = np.empty(0, dtype=np.int64)
+    clumps: tuple[tuple[Index, Array], ...] = ()
+    massive = np.arange(len(shape.points))
     if shape.faces is None and shape.weights is not None and not shape.weights.all():
         massive = np.flatnonzero(shape.weights > 0)
         shape = part(shape, massive)  # points of no mass are no part of the object
-    else:
-        massive = np.arange(len(shape.points))
     if shape.faces is None and not is_few(shape):
-        seen = sampling(shape.points, np.random.default_rng(0), outliers=outliers == "auto")
-        away, clumps = massive[np.sort(np.concatenate([seen.strays, *seen.clumps]))], len(seen.clumps)
-        shape = part(shape, seen.kept) if away.size else shape
+        seen = sampling(shape.points, np.random.default_rng(0), outliers=outliers == "auto", apart=apart)
+        strays, clumps = massive[seen.strays], tuple((massive[c], shape.points[c]) for c in seen.clumps)
+        shape = part(shape, seen.kept) if len(seen.kept) < len(massive) else shape
         shape = replace(shape, weights=seen.shares) if shape.weights is None and seen.shares is not None else shape
     classes = _classes(shape)
     moments = _moments(shape, classes, parts=0 if is_few(shape) or shape.faces is not None else PARTS)
-    return Measured(
-        shape=shape, outliers=away, clumps=clumps, classes=classes, moments=moments, vectors=ntuples(moments)
-    )
+    vectors = ntuples(moments)
+    return Measured(shape=shape, strays=strays, clumps=clumps, classes=classes, moments=moments, vectors=vectors)
 
 
 def is_few(shape: Shape) -> bool:

@@ -10,6 +10,7 @@ from symrefine.ntuples.contract import NTuples
 from symrefine.ntuples.rank import FixedSubspace
 from symrefine.shape import Index
 from symrefine.surface.misses import Deviation
+from symrefine.surface.surface import Coverage
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -17,7 +18,8 @@ class FoundPlane:
     """A mirror plane in input units: its miss as fractions of the diagonal, and the probability that it is meant.
 
     `sigma_rad` is the standard deviation of the normal in its least certain direction, `sigma` that of the offset in
-    input units: both from the joint refinement of the whole group; NaN where there was none.
+    input units: both from the joint refinement of the whole group; NaN where there was none. `coverage` says how much
+    of the surface its image supports, contradicts and leaves unseen.
     """
 
     plane: Plane
@@ -25,6 +27,7 @@ class FoundPlane:
     confidence: float
     sigma_rad: float
     sigma: float
+    coverage: Coverage
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,7 +35,7 @@ class FoundAxis:
     """A rotation axis (or rotoreflection, if `improper`) in input units; `order` is `math.inf` for revolution.
 
     `sigma_rad` and `sigma` (input units) are standard deviations of direction and position, each where it is least
-    certain; NaN where no refinement told them.
+    certain; NaN where no refinement told them. `coverage` as of `FoundPlane`.
     """
 
     axis: Axis
@@ -42,6 +45,7 @@ class FoundAxis:
     confidence: float
     sigma_rad: float
     sigma: float
+    coverage: Coverage
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,7 +97,8 @@ class Detection(ReadOnly):
         points: [M, 3] the points the refinement used, normalised units.
         outliers: indices, ascending, of the points that were taken as no part of the object.
         at_least: whether the surface has open borders beyond which nobody looked: the object may have more symmetry.
-        clumps: how many of these are groups of points apart from the body, rather than single strays.
+        clumps: how many groups of them stand apart from the body, the others being single strays.
+        outlier_share: of all points.
         timings: seconds by stage; everything else is a function of the input and the options alone.
     """
 
@@ -118,6 +123,7 @@ class Detection(ReadOnly):
     history: tuple[Iterate, ...]
     points: Array
     outliers: Index
+    outlier_share: float
     clumps: int
     at_least: bool
     origin: Array

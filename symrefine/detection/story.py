@@ -17,7 +17,8 @@ from symrefine.errors import InputError
 from symrefine.fit.refine import Iterate
 from symrefine.geometry import Array, Axis, Plane, check_tolerance, cross_matrix
 from symrefine.shape import Shape
-from symrefine.surface.misses import TOLERANCE
+from symrefine.surface.misses import TOLERANCE, disc_distances
+from symrefine.surface.neighbourhoods import kd_tree
 from symrefine.surface.surface import Surface
 
 # Tolerances of the staircase that the command line tells.
@@ -106,14 +107,48 @@ def examined(
     """
     for t in (tolerance, *ladder):
         check_tolerance(t)
+    found = _examined(shape, outliers, tolerance, ladder, seed, clock, apart=True)
+    if any(_belongs(found, points, tolerance) for _, points in found.measured.clumps):
+        found = _examined(shape, outliers, tolerance, ladder, seed, clock, apart=False)
+    return found
+
+
+def _examined(
+    shape: Shape,
+    outliers: Outliers,
+    tolerance: float,
+    ladder: Sequence[float],
+    seed: int,
+    clock: Clock,
+    *,
+    apart: bool,
+) -> Examined:
     with clock("moments"):
-        measured = measure(shape, outliers=outliers)
+        measured = measure(shape, outliers=outliers, apart=apart)
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed), tolerance)
     with clock("search"):
         pool = Pool() if doubt(measured, surface, tolerance) else explore(surface, evidence, tolerance)
         links = chain(surface, pool, BEYOND * max((tolerance, *ladder)))
     return Examined(measured=measured, surface=surface, pool=pool, links=links)
+
+
+def _belongs(found: Examined, clump: Array, tolerance: float) -> bool:
+    """Whether points apart from the body are a part of it: an element carries most of them to where they may be.
+
+    That is onto the surface, onto themselves or, where cameras are known, to where they could not see.
+    """
+    surface, moments = found.surface, found.measured.moments
+    points, margin = (clump - moments.center) / moments.scale, surface.far * surface.diagonal
+    own, against = kd_tree(points), []
+    elements = found.links[found.decided(tolerance).index].elements
+    for motion in (m for e in elements for m in e.operations.motions(e.center)):
+        moved = motion.apply(points)
+        off = (disc_distances(surface.cloud, moved) > margin) & (own.query(moved)[0] > margin)
+        for camera in () if surface.openings is None else surface.openings.cameras:
+            off &= camera.sees_through(moved, margin)
+        against.append(off.mean())
+    return min(against, default=1.0) < 0.5
 
 
 def told(found: Examined, *, tolerance: float = TOLERANCE, ladder: Sequence[float] = (), clock: Clock) -> Detection:
@@ -169,6 +204,7 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
     names, needs = [h.group.name for h in links], [h.need for h in links]
     told = alternatives(names, needs, decision, -1 if reason else index)
     history = chosen.history
+    outliers = np.sort(np.concatenate([measured.strays, *(indices for indices, _ in measured.clumps)]))
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
     planes = [e for e in chosen.elements if e.operations.kind == "plane"]
     turns = [e for e in chosen.elements if e.operations.kind in ("axis", "improper")]
@@ -186,6 +222,7 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
                 confidence=sure[id(e)],
                 sigma_rad=(known := _uncertainty(history, e))[0],
                 sigma=known[1] * scale,
+                coverage=e.coverage,
             )
             for e in sorted(planes, key=lambda e: e.need)
         ),
@@ -198,6 +235,7 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
                 confidence=sure[id(e)],
                 sigma_rad=(known := _uncertainty(history, e))[0],
                 sigma=known[1] * scale,
+                coverage=e.coverage,
             )
             for e in sorted(turns, key=lambda e: (-e.operations.order, e.need))
         ),
@@ -214,9 +252,10 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
         vectors=measured.vectors,
         history=history,
         points=surface.cloud.points,
-        outliers=measured.outliers,
+        outliers=outliers,
+        outlier_share=len(outliers) / (len(outliers) + len(measured.shape.points)),
         at_least=found.pool.at_least and not reason,
-        clumps=measured.clumps,
+        clumps=len(measured.clumps),
         origin=origin,
         scale=scale,
         timings=clock.seconds,

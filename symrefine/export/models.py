@@ -182,6 +182,17 @@ def npz_bytes(**arrays: NDArray[Any]) -> bytes:
     return stream.getvalue()
 
 
+def marked_bytes(suffix: str, points: Array, inferred: NDArray[np.bool_]) -> bytes:
+    """Points [N, 3] with a mark for those that nobody saw, as .npz or else .ply."""
+    if suffix == ".npz":
+        return npz_bytes(points=points, inferred=inferred)
+    table = np.zeros(len(points), dtype=[("place", "<f8", (3,)), ("inferred", "u1")])
+    table["place"], table["inferred"] = points, inferred
+    head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]
+    head += [*(f"property double {name}" for name in _POSITION), "property uchar inferred", "end_header", ""]
+    return "\n".join(head).encode("ascii") + table.tobytes()
+
+
 _WRITERS: dict[str, Callable[[Shape], bytes]] = {
     ".npy": _npy,
     ".npz": _npz,

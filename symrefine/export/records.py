@@ -24,6 +24,7 @@ SUBSPACE_SCHEMA = "symrefine.detection_nd/1"
 ALIGNMENT_SCHEMA = "symrefine.alignment/1"
 
 Record = dict[str, Any]
+_COVERAGE = ("supported", "contradicted", "unseen")
 
 # Digits that are kept: what lies beyond differs between processors.
 _DIGITS = 12
@@ -47,8 +48,11 @@ def detection_record(
         **_opening(SCHEMA, shape, options),
         "classes": _classes(shape),
         **_answer(d),
+        "at_least": bool(d.at_least),
+        "outliers": {"count": len(d.outliers), "clumps": int(d.clumps), "share": number(d.outlier_share)},
         "planes": [
-            _placed(p.plane, scale) | _held(p) | {"sigma": _sigma(p.sigma_rad, "offset", p.sigma)} for p in d.planes
+            _placed(p.plane, scale) | _held(p) | {"sigma": _sigma(p.sigma_rad, "offset", p.sigma)} | _covered(p)
+            for p in d.planes
         ],
         "axes": [
             {
@@ -58,6 +62,7 @@ def detection_record(
                 "improper": bool(a.improper),
                 **_held(a),
                 "sigma": _sigma(a.sigma_rad, "position", a.sigma),
+                **_covered(a),
             }
             for a in d.axes
         ],
@@ -263,6 +268,11 @@ def _direction(direction: Array) -> list[float | str | None]:
 def _held(found: Any) -> Record:
     """How well what was found holds."""
     return {"residual": _residual(found.residual), "confidence": number(found.confidence)}
+
+
+def _covered(found: Any) -> Record:
+    """Shares of the surface that the image supports (of what moves), contradicts and leaves unseen."""
+    return {"coverage": {name: number(getattr(found.coverage, name), 1.0) for name in _COVERAGE}}
 
 
 def _turned_down(miss: Any) -> Record:

@@ -150,4 +150,5 @@ def _arrays(
         "normals": content.normals,
         "weights": content.weights if weights is None else point_weights(content, weights),
         "labels": content.labels if labels is None else point_classes(content, labels),
+        "viewpoint": content.viewpoint,
     }

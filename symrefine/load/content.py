@@ -57,6 +57,7 @@ class Content:
         point_lines: line of the file that each point stands in, for text formats.
         face_lines: the same for the faces.
         first_index: number the format gives its first vertex (1 in OBJ), for messages.
+        viewpoint: [3] where the sensor stood, in the frame of the points, or None.
         split: the format repeats a vertex for each face or each attribute (STL, glTF).
     """
 
@@ -70,6 +71,7 @@ class Content:
     point_lines: Sequence[int] | None = None
     face_lines: Sequence[int] | None = None
     first_index: int = 0
+    viewpoint: Array | None = None
     split: bool = False
 
     def name(self, kind: Literal["point", "face"], row: int) -> str:

@@ -31,6 +31,7 @@ class _Header:
     encoding: str
     size: int
     lines: int
+    viewpoint: Array | None
 
     @property
     def record(self) -> np.dtype[np.void]:
@@ -42,7 +43,7 @@ class _Header:
 
 
 def read_pcd(data: bytes, path: Path) -> Content:
-    """Content of a PCD file; the viewpoint is where the sensor stood and moves no point.
+    """Content of a PCD file; the viewpoint is where the sensor stood and moves no point (see `_viewpoint`).
 
     Fields are those of one value a point beside places, normals and colours (which PCD packs into one number); of
     compressed files, none.
@@ -64,6 +65,7 @@ def read_pcd(data: bytes, path: Path) -> Content:
         normals=table[:, 3:6] if normals else None,
         point_fields={name: table[:, k] for k, name in enumerate(others, start=places)},
         point_lines=lines,
+        viewpoint=header.viewpoint,
     )
 
 
@@ -101,8 +103,23 @@ def _interpret(entries: dict[str, list[str]], size: int, lines: int) -> _Header:
         raise InputError(f"line {lines}: DATA {shorten(encoding)}; expected one of {', '.join(_ENCODINGS)}")
     return _Header(
         names=names, types=types, counts=_whole(counts, "COUNT"), points=_points(entries),
-        encoding=encoding, size=size, lines=lines,
+        encoding=encoding, size=size, lines=lines, viewpoint=_viewpoint(entries.get("VIEWPOINT")),
     )  # fmt: skip
+
+
+def _viewpoint(words: list[str] | None) -> Array | None:
+    """Where the sensor stood; the origin, which writers put where they know nothing, counts as unknown."""
+    if words is None:
+        return None
+    try:
+        values = np.array([float(word) for word in words])
+    except ValueError:
+        values = np.empty(0)
+    if len(values) != 7 or not np.isfinite(values).all():
+        raise InputError(
+            f"VIEWPOINT {shorten(' '.join(words))} in the header; expected seven numbers, the place and a quaternion"
+        )
+    return values[:3] if values[:3].any() else None
 
 
 def _points(entries: dict[str, list[str]]) -> int:

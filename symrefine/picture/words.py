@@ -49,7 +49,8 @@ def headline(detection: Detection) -> str:
     """The result in one line: the group with its meaning, or why there is none."""
     if detection.undetermined:
         return f"Undetermined: {detection.undetermined}"
-    return f"{symbol(detection.point_group)}: {meaning(detection.group)}"
+    least = "At least " if detection.at_least else ""
+    return f"{least}{symbol(detection.point_group)}: {meaning(detection.group)}"
 
 
 def symbol(name: str) -> str:

@@ -14,17 +14,21 @@ from numpy.typing import NDArray
 from symrefine.geometry import Array
 from symrefine.shape import Index
 from symrefine.surface.cameras import Camera, cameras
-from symrefine.surface.neighbourhoods import WIDEST, Neighbourhoods, fit_planes, kd_tree
+from symrefine.surface.neighbourhoods import FLAT, WIDEST, Neighbourhoods, fit_planes, kd_tree
 from symrefine.surface.skin import LocalPlanes
 
 Mask = NDArray[np.bool_]
 # Neighbours that tell a border: the middle of half a disc lies 0.75 of its width off the point, that of a whole disc 0,
-# with a standard deviation of 0.12 for so many; edges of solids reach 0.4.
-NEIGHBOURS, ASIDE = 32, 0.45
+# with a standard deviation of 0.12 for so many. At the edge of a solid it is 0.4, but the neighbourhood is bent there:
+# more than so many times as thick as most.
+NEIGHBOURS, ASIDE = 32, 0.4
 # A surface counts as open from this share of local planes on that lie farther aside than this: on 76 closed objects it
 # stays below 0.11 %, where 5 % of the surface are missing it is 0.2 % and more. Neighbourhoods so much narrower than
 # long are wires, which end anyway.
 OPEN, FAR_ASIDE, WIRE = 0.0012, 0.55, 0.2
+BENT = 1.8
+# So much of it leaves no doubt: four times what closed objects reach.
+EVIDENT = 0.005
 # Neighbours by which the patches of an image hang together.
 LINKS = 6
 # A patch is unseen if one in so many of the places where it begins is at a border: of true ones more than half are.
@@ -38,12 +42,14 @@ class Openings:
     Attributes:
         line: [M] which local planes make one up.
         border: [M] which lie at one.
+        evident: whether they are too long to be a whim of the sample.
         cameras: what saw it, in the frame of the surface; none if nothing is known of them.
         links: by stride, pairs [2, E] of every so many-th local planes that are neighbours, both ways.
     """
 
     line: Mask
     border: Mask
+    evident: bool
     cameras: tuple[Camera, ...] = ()
     links: dict[int, Index] = field(default_factory=dict)
 
@@ -82,9 +88,10 @@ class Openings:
         _, target = cloud.nearest(moved[met], None if classes is None else classes[met])
         there, here = self.border[target][back], self.border[::stride][met][back]
         own = patch[one[begins]]
+        at_border = there & ~here
         # A border that is carried onto a border says nothing: there the object may end on both sides.
-        at_border, telling = there & ~here, ~(there & here)
-        free = MOST * np.bincount(own, at_border, len(moved)) > np.bincount(own, telling, len(moved))
+        both = np.bincount(own, there & here, len(moved))
+        free = MOST * np.bincount(own, at_border, len(moved)) > np.bincount(own, minlength=len(moved)) - both
         found = away & free[patch]
         # What lies next to such a patch already reaches beyond the border.
         found[other[begins][free[own] & at_border]] = True
@@ -110,7 +117,7 @@ def openings(cloud: LocalPlanes, points: Array, tree: Any, viewpoints: Array | N
     """
     if viewpoints is not None:
         none = np.zeros(len(cloud.points), dtype=bool)
-        return Openings(line=none, border=none, cameras=cameras(points, viewpoints))
+        return Openings(line=none, border=none, evident=True, cameras=cameras(points, viewpoints))
     around = Neighbourhoods.of(points, tree, NEIGHBOURS).around(cloud.points)
     mean, normals, variances = fit_planes(around)
     aside = mean - cloud.points
@@ -119,12 +126,15 @@ def openings(cloud: LocalPlanes, points: Array, tree: Any, viewpoints: Array | N
     if np.median(width) > WIDEST:
         return None
     aside = np.linalg.norm(aside, axis=1) / np.maximum(width, 1e-300)
-    sheet = variances[:, 1] > WIRE**2 * variances[:, 2]
-    if _lines(cloud, sheet & (aside > FAR_ASIDE)).mean() < OPEN:
+    thick = np.sqrt(variances[:, 0])
+    thin = thick < np.maximum(BENT * np.median(thick), 0.5 * FLAT * width)
+    sheet = thin & (variances[:, 1] > WIRE**2 * variances[:, 2])
+    share = _lines(cloud, sheet & (aside > FAR_ASIDE)).mean()
+    if share < OPEN:
         return None
-    line = _lines(cloud, aside > ASIDE)
+    line = _lines(cloud, thin & (aside > ASIDE))
     near = kd_tree(cloud.points[line]).query(cloud.points)[0] < 2.0 * np.median(cloud.reach)
-    return Openings(line=line, border=near)
+    return Openings(line=line, border=near, evident=bool(share > EVIDENT))
 
 
 def _lines(cloud: LocalPlanes, chosen: Mask) -> Mask:

@@ -47,8 +47,10 @@ class Sampling:
     shares: Array | None = None
 
 
-def sampling(points: Array, rng: np.random.Generator, *, outliers: bool) -> Sampling:
+def sampling(points: Array, rng: np.random.Generator, *, outliers: bool, apart: bool = True) -> Sampling:
     """How points [N, 3] were sampled; with `outliers` those that belong to no surface are set apart.
+
+    With `apart` too, clumps apart from the body are as well.
 
     Of points that fill a volume none is set apart, and all count alike.
     """
@@ -60,9 +62,9 @@ def sampling(points: Array, rng: np.random.Generator, *, outliers: bool) -> Samp
         return Sampling(kept=every, strays=none)
     away = strays(points, rng) if outliers else none
     body = np.setdiff1d(every, away)
-    apart = tuple(body[c] for c in clumps(points[body], rng)) if outliers else ()
-    kept = np.setdiff1d(body, np.concatenate([none, *apart]))
-    return Sampling(kept=kept, strays=away, clumps=apart, shares=shares(points[kept], rng))
+    groups = tuple(body[c] for c in clumps(points[body], rng)) if outliers and apart else ()
+    kept = np.setdiff1d(body, np.concatenate([none, *groups]))
+    return Sampling(kept=kept, strays=away, clumps=groups, shares=shares(points[kept], rng))
 
 
 def strays(points: Array, rng: np.random.Generator) -> Index:

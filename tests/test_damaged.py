@@ -1,0 +1,277 @@
+"""Damaged clouds: strays, clumps, density, open borders, cameras, completion, and the bench that measures them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+
+from experiments.objects import damage
+from experiments.objects.poses import Pose
+from experiments.objects.shapes import bottle, box, join, mug, sample, stool, table
+from experiments.studies import damaged
+from symrefine.complete import complete
+from symrefine.detection.measure import gather, measure
+from symrefine.detection.story import detect
+from symrefine.errors import InputError
+from symrefine.geometry import Isometry, householder, line_angle_rad, random_orthogonal
+from symrefine.propose.votes import mirror_votes, revolution, turn_votes
+from symrefine.shape import CAMERAS, Shape
+from symrefine.surface.cameras import cameras
+from symrefine.surface.sampling import sampling
+
+BRICK = join([box((0, 0, 0), (1.0, 0.7, 0.5))])
+# One corner off, so that it has no symmetry.
+NOTCHED = join([box((0, 0, 0), (1.0, 0.7, 0.5)), box((0.45, 0.3, 0.35), (0.3, 0.25, 0.3))])
+
+
+def surface_of(points, **more):
+    measured = measure(Shape(points=points, **more))
+    return gather(measured, np.random.default_rng(0))[1]
+
+
+def posed(points, seed):
+    pose = Pose.random(np.random.default_rng(seed))
+    return pose.of(points), pose
+
+
+# Strays, clumps, density
+
+
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.3])
+def test_strays_are_found_and_nothing_else(share):
+    made = damage.outliers(table(), share, np.random.default_rng(1))
+    points, _ = posed(made.points, 2)
+    found = np.zeros(len(points), dtype=bool)
+    found[sampling(points, np.random.default_rng(0), outliers=True).strays] = True
+    assert found[made.strays == 0].mean() < 0.001
+    # What lies within a few spacings of the surface cannot be told from it.
+    assert found[made.strays == 1].mean() > 0.75
+
+
+@pytest.mark.parametrize("make", [table, mug, bottle, lambda: stool(5), lambda: BRICK])
+@pytest.mark.parametrize("ratio", [1.0, 10.0])
+def test_a_surface_has_no_strays_however_uneven(make, ratio):
+    points = damage.uneven(make(), ratio, np.random.default_rng(3)).points
+    seen = sampling(points, np.random.default_rng(0), outliers=True)
+    assert len(seen.strays) < 0.002 * len(points)
+    assert seen.clumps == ()
+    if ratio > 1.0:
+        assert seen.shares is not None
+
+
+def test_a_volume_has_no_strays():
+    cloud = np.random.default_rng(4).normal(size=(8000, 3))
+    assert len(sampling(cloud, np.random.default_rng(0), outliers=True).strays) == 0
+
+
+def test_shares_undo_a_density_that_falls_off():
+    made = damage.uneven(BRICK, 10.0, np.random.default_rng(5))
+    shares = sampling(made.points, np.random.default_rng(0), outliers=True).shares
+    spread = np.linalg.norm(made.points.mean(axis=0))
+    assert np.linalg.norm(np.average(made.points, axis=0, weights=shares)) < 0.2 * spread
+
+
+def test_outliers_are_told_and_can_be_kept():
+    made = damage.outliers(table(), 0.1, np.random.default_rng(6))
+    points, _ = posed(made.points, 7)
+    found = detect(points)
+    assert found.point_group == "C4v"
+    assert (made.strays[found.outliers] == 1).all()
+    assert found.outlier_share == pytest.approx(len(found.outliers) / len(points))
+    assert len(detect(points, outliers="none").outliers) == 0
+    with pytest.raises(InputError, match="outliers is 'some'; expected one of"):
+        detect(points, outliers="some")
+
+
+def test_a_clump_apart_is_told_and_a_part_apart_is_not():
+    points = sample(BRICK, 12000, 0.001, np.random.default_rng(8))
+    blob = np.array([1.1, 0.2, 0.3]) + 0.03 * np.random.default_rng(9).normal(size=(500, 3))
+    found = detect(np.concatenate([points, blob]))
+    assert (found.point_group, found.clumps) == ("D2h", 1)
+    assert found.outliers.min() >= 12000
+    # The same on both sides is a part of it, and so is a lone one on an axis.
+    both = detect(np.concatenate([points, blob, -blob]))
+    assert both.clumps == 0
+    on_axis = sample(join([box((1.0, 0, 0), (0.1, 0.1, 0.1))]), 500, 0.001, np.random.default_rng(10))
+    lone = detect(np.concatenate([points, on_axis]))
+    assert (lone.point_group, lone.clumps) == ("C2v", 0)
+
+
+# Open borders
+
+
+@pytest.mark.parametrize("make", [lambda: BRICK, lambda: stool(3), bottle])
+def test_what_is_closed_has_no_borders(make):
+    found = detect(sample(make(), 20000, 0.002, np.random.default_rng(11)))
+    assert not found.at_least
+    assert all(p.coverage.unseen == 0.0 for p in found.planes)
+
+
+@pytest.mark.parametrize(("make", "group"), [(table, "C4v"), (lambda: BRICK, "D2h"), (bottle, "Cinfv")])
+@pytest.mark.parametrize("kind", ["hole", "cut"])
+def test_missing_surface_is_no_evidence_against(make, group, kind):
+    made = damage.KINDS[kind][0](make(), 0.15, np.random.default_rng(12))
+    points, pose = posed(made.points, 13)
+    found = detect(points)
+    assert found.at_least
+    # A surface of revolution may be told by a finite number of its mirrors: at least that.
+    assert found.point_group == group or (group == "Cinfv" and found.group.symbol.family == "Cv")
+    assert found.confidence > 0.5
+    true = pose.of(np.zeros((1, 3)))[0]
+    for plane in found.planes:
+        assert abs(plane.plane.signed_distance(true)) < 0.02 * found.diagonal
+        assert plane.coverage.contradicted < 0.02
+        assert plane.coverage.supported + plane.coverage.contradicted + plane.coverage.unseen < 1.0 + 1e-9
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_part_without_counterpart_is_hardly_explained_away(seed):
+    """Where the cut took just what would have contradicted, the answer is not sure."""
+    made = damage.cut(NOTCHED, 0.1, np.random.default_rng(seed))
+    found = detect(posed(made.points, 15)[0])
+    assert found.point_group == "C1" or found.confidence < 0.95
+
+
+def test_the_corner_of_a_cube_says_at_least():
+    squares = [np.random.default_rng(k).random((5000, 3)) for k in range(3)]
+    for k, square in enumerate(squares):
+        square[:, k] = 0.0
+    found = detect(posed(np.concatenate(squares), 16)[0])
+    assert (found.point_group, found.at_least) == ("C3v", True)
+
+
+# Votes
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 10**6))
+def test_votes_know_no_centroid(seed):
+    rng = np.random.default_rng(seed)
+    points = damage.cut(table(), 0.2, rng).points @ (turn := random_orthogonal(rng)).T
+    surface = surface_of(points)
+    found = mirror_votes(surface.cloud.points, surface.cloud.normals, rng)
+    for normal in turn.T[:2]:
+        assert min(line_angle_rad(v.direction, normal) for v in found) < np.radians(8.0)
+    again = mirror_votes(surface.cloud.points + 5.0, surface.cloud.normals, np.random.default_rng(0))
+    assert len(again) > 0
+
+
+def test_turns_are_voted_for_with_their_order():
+    angles = 2.0 * np.pi * np.arange(3) / 3.0
+    blades = [box((0.5, 0.0, 0.0), (0.7, 0.3, 0.04))]
+    blade = sample(join(blades), 4000, 0.0, np.random.default_rng(17))
+    tilt = np.array([[1, 0, 0], [0, np.cos(0.5), -np.sin(0.5)], [0, np.sin(0.5), np.cos(0.5)]])
+    turns = [np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1.0]]) for a in angles]
+    surface = surface_of(np.concatenate([blade @ tilt.T @ r.T for r in turns]))
+    votes = turn_votes(surface.cloud.points, surface.cloud.normals, np.random.default_rng(0))
+    along = [order for v, order in votes if abs(v.direction[2]) > np.cos(np.radians(8.0))]
+    assert 3 in along
+
+
+def test_the_axis_of_a_revolution_meets_its_normals():
+    rng = np.random.default_rng(18)
+    turn = random_orthogonal(rng)
+    points = damage.cut(bottle(), 0.2, rng).points @ turn.T + np.array([1.0, 2.0, -0.5])
+    surface = surface_of(points)
+    direction, through = revolution(surface.cloud.points, surface.cloud.normals)
+    assert line_angle_rad(direction, turn[:, 2]) < np.radians(1.0)
+    measured = measure(Shape(points=points))
+    axis_point = (np.array([1.0, 2.0, -0.5]) - measured.moments.center) / measured.moments.scale
+    assert np.linalg.norm(np.cross(axis_point - through, direction)) < 0.02
+
+
+# Cameras
+
+
+def test_a_camera_sees_through_what_is_in_front_and_beside():
+    grid = np.stack(np.meshgrid(np.linspace(-1, 1, 60), np.linspace(-1, 1, 60), [0.0]), axis=-1).reshape(-1, 3)
+    (camera,) = cameras(grid, np.broadcast_to([0.0, 0.0, 4.0], grid.shape))
+    asked = np.array([[0.0, 0, 1], [0, 0, -1], [2.0, 0, 0], [0.3, 0.2, 0.05]])
+    assert camera.sees_through(asked, 0.1).tolist() == [True, False, True, False]
+
+
+@pytest.mark.parametrize("kind", ["views", "rough views"])
+def test_two_views_from_opposite_sides_show_a_table(kind):
+    made = damage.KINDS[kind][0](table(), 2.0, np.random.default_rng(19))
+    points, pose = posed(made.points, 20)
+    found = detect(points, viewpoint=pose.of(made.viewpoint))
+    assert found.point_group == "C4v"
+    assert found.at_least
+
+
+def test_free_space_contradicts_what_borders_leave_open():
+    """Mirrored across the face that the camera looks at, a box would stand in front of itself."""
+    made = damage.view(BRICK, np.array([1.0, 0.0, 0.0]), np.random.default_rng(21))
+    surface = surface_of(made.points, viewpoint=made.viewpoint)
+    moments = measure(Shape(points=made.points)).moments
+    across = Isometry.about((np.array([0.6, 0, 0]) - moments.center) / moments.scale, householder([1.0, 0, 0]))
+    misses = surface.misses([across])
+    seen = surface.seen(misses, [across])
+    assert surface.openings.cameras
+    assert np.isfinite(seen).mean() > 0.95
+    assert surface.coverage(seen, [across], sources=10**9).contradicted > 0.9
+
+
+@pytest.mark.parametrize(
+    ("viewpoint", "says"),
+    [
+        ([0.0, 1.0], r"viewpoint has shape \(2,\); expected \(3,\)"),
+        (np.zeros((7, 3)), "one for each point"),
+        ([np.nan, 0, 0], "viewpoints hold NaN"),
+        (np.random.default_rng(0).random((300, 3)), f"at most {CAMERAS}"),
+    ],
+)
+def test_what_is_no_viewpoint_is_refused(viewpoint, says):
+    with pytest.raises(InputError, match=says):
+        Shape(points=np.random.default_rng(1).random((300, 3)), viewpoint=viewpoint)
+
+
+def test_a_mesh_has_no_viewpoint():
+    with pytest.raises(InputError, match="a viewpoint is for clouds"):
+        replace(BRICK, viewpoint=np.zeros(3))
+
+
+# Completion
+
+
+def test_a_cut_object_is_completed():
+    whole = sample(BRICK, 20000, 0.0, np.random.default_rng(22))
+    made = damage.cut(BRICK, 0.2, np.random.default_rng(24))
+    full = complete(Shape(points=made.points))
+    assert not full.inferred[: len(made.points)].any()
+    inferred = full.points[full.inferred]
+    assert len(inferred) > 1000
+    assert np.quantile(cKDTree(whole).query(inferred)[0], 0.98) < 0.02 * BRICK.diagonal
+    # What was cut off is there again.
+    assert np.quantile(cKDTree(full.points).query(whole)[0], 0.95) < 0.02 * BRICK.diagonal
+
+
+def test_nothing_is_completed_without_a_symmetry():
+    with pytest.raises(InputError, match="nothing to complete it by"):
+        complete(Shape(points=sample(NOTCHED, 8000, 0.0, np.random.default_rng(24))))
+    with pytest.raises(InputError, match="completion is for clouds"):
+        complete(BRICK)
+
+
+# The bench
+
+
+@pytest.mark.parametrize("kind", list(damage.KINDS))
+def test_damage_leaves_points_of_the_object_and_strays(kind):
+    make, strengths = damage.KINDS[kind]
+    made = make(BRICK, strengths[0], np.random.default_rng(25))
+    assert made.points.shape == (len(made.strays), 3)
+    own = made.points[made.strays == 0]
+    inside = np.abs(own) <= np.array([0.5, 0.35, 0.25]) + 0.05
+    assert inside.all()
+    assert (made.viewpoint is None) == (not kind.endswith("views"))
+
+
+def test_a_row_of_the_bench():
+    row = damaged.run(damaged.Case(family="shape", name="crate", kind="cut", strength=0.05))
+    assert (row.truth, row.false, row.contradicted) == ("D2h", 0, False)
+    assert row.found <= row.shown <= 3
+    assert "recall" in damaged.line([row])
