@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.clock import Clock
+from symrefine.detection.examination import examined
 from symrefine.detection.measure import Outliers, is_few
 from symrefine.detection.result import Detection
-from symrefine.detection.story import examined, told
+from symrefine.detection.story import told
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Isometry
 from symrefine.groups import PointGroup

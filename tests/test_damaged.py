@@ -1,5 +1,6 @@
 """Damaged clouds: strays, clumps, density, open borders, cameras, completion, and the bench that measures them."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -12,11 +13,13 @@ from experiments.objects import damage
 from experiments.objects.poses import Pose
 from experiments.objects.shapes import bottle, box, join, mug, sample, stool, table
 from experiments.studies import damaged
+from symrefine.cli import invoke
 from symrefine.complete import complete
 from symrefine.detection.measure import gather, measure
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.geometry import Isometry, householder, line_angle_rad, random_orthogonal
+from symrefine.load import load
 from symrefine.propose.votes import mirror_votes, revolution, turn_votes
 from symrefine.shape import CAMERAS, Shape
 from symrefine.surface.cameras import cameras
@@ -254,6 +257,74 @@ def test_nothing_is_completed_without_a_symmetry():
         complete(Shape(points=sample(NOTCHED, 8000, 0.0, np.random.default_rng(24))))
     with pytest.raises(InputError, match="completion is for clouds"):
         complete(BRICK)
+
+
+# Command line
+
+
+@pytest.fixture(scope="module")
+def scans(tmp_path_factory):
+    """A folder with a cut object, one with strays, and a view as PCD with its camera."""
+    folder = tmp_path_factory.mktemp("scans")
+    np.savetxt(folder / "cut.xyz", damage.cut(BRICK, 0.2, np.random.default_rng(24)).points)
+    np.savetxt(folder / "strays.xyz", damage.outliers(BRICK, 0.1, np.random.default_rng(30)).points)
+    made = damage.view(BRICK, np.array([0.6, 0.48, 0.64]), np.random.default_rng(31))
+    eye = " ".join(map(str, made.viewpoint[0]))
+    head = f"VERSION 0.7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {len(made.points)}\nHEIGHT 1\n"
+    rows = "\n".join(" ".join(map(repr, row)) for row in made.points.tolist())
+    (folder / "view.pcd").write_text(f"{head}VIEWPOINT {eye} 1 0 0 0\nPOINTS {len(made.points)}\nDATA ascii\n{rows}\n")
+    return folder
+
+
+def test_the_report_says_what_was_left_out_and_not_seen(scans, capsys):
+    assert invoke(["detect", str(scans / "strays.xyz"), "--json", "-"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["point_group"] == "D2h"
+    assert 0.05 < record["outliers"]["share"] < 0.11
+    assert invoke(["detect", str(scans / "cut.xyz")]) == 0
+    out = capsys.readouterr().out
+    assert "at least D2h" in out
+    assert "were not seen: there may be more" in out
+    assert invoke(["detect", str(scans / "strays.xyz"), "--outliers", "none", "--json", "-"]) == 0
+    assert json.loads(capsys.readouterr().out)["outliers"]["count"] == 0
+
+
+def test_the_viewpoint_of_a_pcd_counts(scans, capsys):
+    shape = load(scans / "view.pcd")
+    assert shape.viewpoint is not None
+    assert invoke(["detect", str(scans / "view.pcd"), "--json", "-"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["at_least"] is True
+    assert all(set(p["coverage"]) == {"supported", "contradicted", "unseen"} for p in record["planes"])
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["detect", "cut.xyz", "--viewpoint", "1,2"], "is not a place X,Y,Z of three numbers"),
+        (["detect", "cut.xyz", "--outliers", "some"], "invalid choice"),
+        (["complete", "cut.xyz", "-o", "full.obj"], "cannot mark what is inferred"),
+        (["complete", "nothing.xyz", "-o", "full.ply"], "no such file"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(scans, capsys, monkeypatch, words, says):
+    monkeypatch.chdir(scans)
+    assert invoke(words) == 2
+    assert says in capsys.readouterr().err
+    assert not (scans / words[-1]).exists()
+
+
+def test_complete_marks_what_it_inferred(scans, capsys):
+    out = scans / "full.npz"
+    assert invoke(["complete", str(scans / "cut.xyz"), "-o", str(out), "--json", "-"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    with np.load(out) as made:
+        assert made["inferred"].sum() == record["inferred"] > 1000
+        assert len(made["points"]) == record["seen"] + record["inferred"]
+    assert invoke(["complete", str(scans / "cut.xyz"), "-o", str(scans / "full.ply")]) == 0
+    assert "points seen" in capsys.readouterr().out
+    again = load(scans / "full.ply", labels="inferred")
+    assert again.labels.sum() == record["inferred"]
 
 
 # The bench

@@ -36,7 +36,8 @@ from experiments.studies.calibration import Judged, bins, plausible, plot, summa
 from experiments.studies.jobs import add_jobs, in_order
 from symrefine.clock import Clock
 from symrefine.decide.posterior import BLURRED, EVEN, EVEN_MIRROR, STEEPNESS, UNKNOWN, sharpness, strain
-from symrefine.detection.story import examined, told
+from symrefine.detection.examination import examined
+from symrefine.detection.story import told
 from symrefine.errors import InputError
 from symrefine.files import check_target, whole
 from symrefine.shape import Shape

@@ -92,6 +92,18 @@ def fit(detection: Detection) -> str:
     )
 
 
+def scanned(detection: Detection) -> str:
+    """What the points lack: outliers among them, parts that were not seen; empty where there is nothing to say."""
+    d = detection
+    clumps = f", {count(d.clumps, 'clump')} among them" if d.clumps else ""
+    said = (
+        [f"{len(d.outliers):,} points ({percent(d.outlier_share)}) taken as outliers{clumps}."]
+        if len(d.outliers)
+        else []
+    )
+    return " ".join([*said, *(["Parts of the surface were not seen: there may be more."] if d.at_least else [])])
+
+
 def kind_name(kind: str, order: float = 0.0) -> str:
     """What an element is called: a plane, an axis, an improper one, the inversion."""
     return "revolution" if kind == "axis" and math.isinf(order) else _KINDS[kind]

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from symrefine.detection.result import Detection
 from symrefine.fit.refine import Iterate
 from symrefine.picture.rows import found_rows, near_miss_rows
-from symrefine.picture.words import TUPLES, coordinates, fit, headline, percent
+from symrefine.picture.words import TUPLES, coordinates, fit, headline, percent, scanned
 from symrefine.shape import Shape
 from symrefine.surface.misses import Deviation
 
@@ -14,7 +14,7 @@ from symrefine.surface.misses import Deviation
 def markdown(detection: Detection, shape: Shape) -> str:
     """The report as a page."""
     d = detection
-    parts = [f"# {headline(d)}", f"`{shape.source}`. {fit(d)}".rstrip()]
+    parts = [f"# {headline(d)}", " ".join([f"`{shape.source}`.", fit(d), scanned(d)]).replace("  ", " ").rstrip()]
     found = [(r.name, r.kind, r.vector, *_misses(r.residual)) for r in found_rows(d)]
     if found:
         parts.append(_table(("", "kind", "normal or direction", "mean %", "95 %"), found))

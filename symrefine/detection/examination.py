@@ -1,0 +1,104 @@
+"""What a decision is made from: a shape measured, its candidates fitted and judged, and joined to a chain of groups."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from symrefine.clock import Clock
+from symrefine.decide.chain import Pool, chain, explore
+from symrefine.decide.hypotheses import Hypothesis
+from symrefine.decide.posterior import BEYOND, Decision, Link, decide
+from symrefine.detection.measure import Measured, Outliers, doubt, gather, measure
+from symrefine.geometry import Array, check_tolerance
+from symrefine.shape import Shape
+from symrefine.surface.misses import TOLERANCE, disc_distances
+from symrefine.surface.neighbourhoods import kd_tree
+from symrefine.surface.surface import Surface
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Examined:
+    """What a decision is made from: the table of needs as a chain of groups, each inside the next, C1 first."""
+
+    measured: Measured
+    surface: Surface
+    pool: Pool
+    links: tuple[Hypothesis, ...]
+
+    def decided(self, tolerance: float) -> Decision:
+        """The likeliest group of the chain at a tolerance."""
+        known = [Link(need=h.need, lone_mirror=h.group.name == "Cs") for h in self.links[1:]]
+        return decide(known, tolerance, self.surface.floor)
+
+    def doubt(self, tolerance: float) -> str:
+        """Why the data support no decision at a tolerance, or nothing if they do."""
+        return doubt(self.measured, self.surface, tolerance) or self._nothing_carries(tolerance)
+
+    def _nothing_carries(self, tolerance: float) -> str:
+        """The groups between which it stands, where even the likeliest is more likely wrong than right."""
+        probabilities = self.decided(tolerance).probabilities
+        if max(probabilities) >= 0.5:
+            return ""
+        by = sorted(zip(probabilities, self.links, strict=True), key=lambda k: -k[0])
+        told = ", ".join(f"{h.group.name} ({100 * p:.0f} %)" for p, h in by[:3])
+        return f"no group is more likely than not: {told}"
+
+
+def examined(
+    shape: Shape,
+    *,
+    outliers: Outliers = "auto",
+    tolerance: float = TOLERANCE,
+    ladder: Sequence[float] = (),
+    seed: int = 0,
+    clock: Clock,
+) -> Examined:
+    """Everything before the decision: what the moments propose, fitted, judged and put into a chain.
+
+    Args and errors as of `detect`.
+    """
+    for t in (tolerance, *ladder):
+        check_tolerance(t)
+    found = _examined(shape, outliers, tolerance, ladder, seed, clock, apart=True)
+    if any(_belongs(found, points, tolerance) for _, points in found.measured.clumps):
+        found = _examined(shape, outliers, tolerance, ladder, seed, clock, apart=False)
+    return found
+
+
+def _examined(
+    shape: Shape,
+    outliers: Outliers,
+    tolerance: float,
+    ladder: Sequence[float],
+    seed: int,
+    clock: Clock,
+    *,
+    apart: bool,
+) -> Examined:
+    with clock("moments"):
+        measured = measure(shape, outliers=outliers, apart=apart)
+    with clock("local_planes"):
+        evidence, surface = gather(measured, np.random.default_rng(seed), tolerance)
+    with clock("search"):
+        pool = Pool() if doubt(measured, surface, tolerance) else explore(surface, evidence, tolerance)
+        links = chain(surface, pool, BEYOND * max((tolerance, *ladder)))
+    return Examined(measured=measured, surface=surface, pool=pool, links=links)
+
+
+def _belongs(found: Examined, clump: Array, tolerance: float) -> bool:
+    """Whether points apart from the body are a part of it: an element carries most of them to where they may be.
+
+    That is onto the surface, onto themselves or, where cameras are known, to where they could not see.
+    """
+    surface, moments = found.surface, found.measured.moments
+    points, margin = (clump - moments.center) / moments.scale, surface.far * surface.diagonal
+    own, against = kd_tree(points), []
+    elements = found.links[found.decided(tolerance).index].elements
+    for motion in (m for e in elements for m in e.operations.motions(e.center)):
+        moved = motion.apply(points)
+        off = (disc_distances(surface.cloud, moved) > margin) & (own.query(moved)[0] > margin)
+        for camera in () if surface.openings is None else surface.openings.cameras:
+            off &= camera.sees_through(moved, margin)
+        against.append(off.mean())
+    return min(against, default=1.0) < 0.5
