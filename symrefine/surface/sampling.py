@@ -142,9 +142,9 @@ def clumps(points: Array, rng: np.random.Generator) -> list[Index]:
 
 
 def _gap(points: Array, some: NDArray[np.bool_], reach: Array) -> bool:
-    """Whether some of the points [N, 3] stand as far from all others as strays stand from one another."""
+    """Whether some of the points [N, 3] stand farther from all others than from their own neighbours."""
     between = kd_tree(points[~some]).query(points[some])[0]
-    return bool(between.min() > FAR * np.median(reach[some]))
+    return bool(between.min() > np.median(reach[some]))
 
 
 def shares(points: Array, rng: np.random.Generator) -> Array | None:
