@@ -156,11 +156,15 @@ def _with(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float) 
     return pool
 
 
+def _hopeless(surface: Surface) -> float:
+    """What a candidate may seem to need at a glance, from how far it may be off."""
+    return HOPELESS if surface.openings is None else HOPELESS_VOTES
+
+
 def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tuple[Placed, float]]:
     """The starts that are new with what they seem to need at a glance, large groups that look good first."""
-    hopeless = HOPELESS if surface.openings is None else HOPELESS_VOTES
     new = [s for s in starts if not pool.has(s, exact_need(surface.floor))]
-    seen = zip(new, glances(surface, new, hopeless), strict=True)
+    seen = zip(new, glances(surface, new, _hopeless(surface)), strict=True)
     return sorted(seen, key=lambda k: k[1] / math.log2(1.0 + _size(k[0])))
 
 
@@ -170,12 +174,11 @@ def _size(placed: Placed) -> float:
 
 def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float) -> Pool:
     """The pool with candidates fitted, but for those that the group so far has anyway."""
-    hopeless = HOPELESS if surface.openings is None else HOPELESS_VOTES
     for start, glance in _glanced(surface, pool, starts):
         least = exact_need(surface.floor)
         if pool.has(start, least) or _is_image(start, glance, pool):
             continue
-        if glance >= hopeless:
+        if glance >= _hopeless(surface):
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
             continue
         moved, needs = looked_at(surface, start)

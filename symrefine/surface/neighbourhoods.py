@@ -108,6 +108,15 @@ class Neighbourhoods:
         return _added(self.sums, near.ravel(), np.arange(0, near.size + 1, self.count))
 
 
+def connected_parts(one: Index, other: Index, count: int) -> Index:
+    """Number of the part that each of `count` nodes belongs to, from pairs of linked ones, [E] and [E]."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    links = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
+    return np.asarray(connected_components(links, directed=False)[1])
+
+
 def choose_neighbours(
     points: Array, tree: Any, rng: np.random.Generator, *, probes: int = 120, thin: float = 0.0
 ) -> int:

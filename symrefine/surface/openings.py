@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from symrefine.geometry import Array
 from symrefine.shape import Index
 from symrefine.surface.cameras import Camera, cameras
-from symrefine.surface.neighbourhoods import FLAT, WIDEST, Neighbourhoods, fit_planes, kd_tree
+from symrefine.surface.neighbourhoods import FLAT, WIDEST, Neighbourhoods, connected_parts, fit_planes, kd_tree
 from symrefine.surface.skin import LocalPlanes
 
 Mask = NDArray[np.bool_]
@@ -82,7 +82,7 @@ class Openings:
         begins = leave & ~away[other]
         if not begins.any():
             return np.zeros(len(moved), dtype=bool)
-        patch = _connected(one[leave & ~begins], other[leave & ~begins], len(moved))
+        patch = connected_parts(one[leave & ~begins], other[leave & ~begins], len(moved))
         met, back = np.unique(other[begins], return_inverse=True)
         classes = cloud.classes(slice(None, None, stride))
         _, target = cloud.nearest(moved[met], None if classes is None else classes[met])
@@ -96,14 +96,6 @@ class Openings:
         # What lies next to such a patch already reaches beyond the border.
         found[other[begins][free[own] & at_border]] = True
         return found
-
-
-def _connected(one: Index, other: Index, count: int) -> Index:
-    """Which part each of `count` nodes belongs to, given pairs of linked ones."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    return connected_components(coo_array((np.ones(len(one)), (one, other)), shape=(count, count)), directed=False)[1]
 
 
 def openings(cloud: LocalPlanes, points: Array, tree: Any, viewpoints: Array | None = None) -> Openings | None:

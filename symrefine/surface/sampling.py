@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from symrefine.geometry import Array
 from symrefine.shape import Index
-from symrefine.surface.neighbourhoods import FLAT, fills_volume, fit_planes, kd_tree, sums_of
+from symrefine.surface.neighbourhoods import FLAT, connected_parts, fills_volume, fit_planes, kd_tree, sums_of
 
 # Points that are asked first, and neighbours that tell of the surroundings of a point.
 ASKED, AROUND = 5000, 16
@@ -122,18 +122,13 @@ def clumps(points: Array, rng: np.random.Generator) -> list[Index]:
 
     Points belong together if one is among the nearest of the other, whatever the density.
     """
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components
-
     some = rng.permutation(len(points))[:ASKED]
     tree = kd_tree(points[some])
     away, near = tree.query(points[some], k=[*range(2, AROUND // 2 + 2)])
-    ends = np.arange(0, near.size + 1, near.shape[1])
-    links = csr_array((np.ones(near.size), near.ravel(), ends), shape=(len(some), len(some)))
-    count, part = connected_components(links, directed=False)
-    if count == 1 or np.median(away[:, -1]) == 0.0:
-        return []
+    part = connected_parts(np.repeat(np.arange(len(some)), near.shape[1]), near.ravel(), len(some))
     sizes = np.bincount(part)
+    if len(sizes) == 1 or np.median(away[:, -1]) == 0.0:
+        return []
     alike = (sizes >= COUNTERPART * sizes[:, None]) & (sizes <= sizes[:, None] / COUNTERPART)
     small = np.flatnonzero((sizes <= CLUMP * len(some)) & (alike.sum(axis=1) == 1))
     apart = [k for k in small if _gap(points[some], part == k, away[:, -1])]
