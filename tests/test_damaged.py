@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from experiments.objects import damage
+from experiments.objects.built_symmetry import specimen
 from experiments.objects.poses import Pose
 from experiments.objects.shapes import bottle, box, join, mug, sample, stool, table
 from experiments.studies import damaged
@@ -87,6 +88,33 @@ def test_outliers_are_told_and_can_be_kept():
     assert len(detect(points, outliers="none").outliers) == 0
     with pytest.raises(InputError, match="outliers is 'some'; expected one of"):
         detect(points, outliers="some")
+
+
+@pytest.mark.parametrize("noise_rel", [0.0, 0.003])
+def test_a_clump_that_touches_the_body_is_told(noise_rel):
+    rng = np.random.default_rng(3)
+    points = sample(table(), 19000, noise_rel, rng)
+    size = np.linalg.norm(np.ptp(points, axis=0))
+    clump = points[points[:, 0].argmax()] + [0.05 * size, 0.0, 0.0] + 0.04 * size * rng.normal(size=(1000, 3))
+    pose = Pose.random(rng)
+    found = detect(pose.of(np.concatenate([points, clump])))
+    assert found.point_group == "C4v"
+    assert found.clumps == 1
+    told = np.intersect1d(found.outliers, np.arange(19000, 20000))
+    assert len(told) > 700
+    assert len(found.outliers) - len(told) < 100
+    assert detect(np.concatenate([points, clump]), outliers="none").point_group != "C4v"
+
+
+@pytest.mark.parametrize(
+    ("mesh", "group"), [(mug(), "Cs"), (specimen("shape", "bossed_prism")[0], "D3h")], ids=["mug", "prism"]
+)
+@pytest.mark.parametrize("noise_rel", [0.003, 0.01])
+def test_what_breaks_a_symmetry_is_no_clump(mesh, group, noise_rel):
+    points = sample(mesh, 20000, noise_rel, np.random.default_rng(4))
+    found = detect(points)
+    assert found.clumps == 0
+    assert found.undetermined or found.point_group == group
 
 
 def test_a_clump_apart_is_told_and_a_part_apart_is_not():

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -30,6 +31,10 @@ class Examined:
         """The likeliest group of the chain at a tolerance."""
         known = [Link(need=h.need, lone_mirror=h.group.name == "Cs") for h in self.links[1:]]
         return decide(known, tolerance, self.surface.floor)
+
+    def order(self, tolerance: float) -> float:
+        """Order of the group that is decided, 0 if none is."""
+        return 0 if self.doubt(tolerance) else self.links[self.decided(tolerance).index].group.order
 
     def doubt(self, tolerance: float) -> str:
         """Why the data support no decision at a tolerance, or nothing if they do."""
@@ -60,10 +65,22 @@ def examined(
     """
     for t in (tolerance, *ladder):
         check_tolerance(t)
-    found = _examined(shape, outliers, tolerance, ladder, seed, clock, apart=True)
-    if any(_belongs(found, points, tolerance) for _, points in found.measured.clumps):
-        found = _examined(shape, outliers, tolerance, ladder, seed, clock, apart=False)
+    examine = partial(_examined, shape, outliers, tolerance, ladder, seed, clock)
+    found = examine(apart=True, blobs=False)
+    apart = not _has_parts_apart(found, tolerance)
+    if not apart:
+        found = examine(apart=False, blobs=False)
+    if found.measured.blobs:
+        # What fills a volume beside a surface is taken for a clump only where it alone hides a symmetry.
+        without = examine(apart=apart, blobs=True)
+        if without.order(tolerance) > found.order(tolerance) and not _has_parts_apart(without, tolerance):
+            return without
     return found
+
+
+def _has_parts_apart(found: Examined, tolerance: float) -> bool:
+    """Whether something that was set apart is a part of the object."""
+    return any(_belongs(found, points, tolerance) for _, points in found.measured.clumps)
 
 
 def _examined(
@@ -75,9 +92,10 @@ def _examined(
     clock: Clock,
     *,
     apart: bool,
+    blobs: bool,
 ) -> Examined:
     with clock("moments"):
-        measured = measure(shape, outliers=outliers, apart=apart)
+        measured = measure(shape, outliers=outliers, apart=apart, blobs=blobs)
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed), tolerance)
     with clock("search"):

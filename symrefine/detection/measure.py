@@ -42,7 +42,9 @@ class Measured:
     Attributes:
         shape: without what was taken as outliers.
         strays: indices of the points that were for being far from all others.
-        clumps: of each group of points that was for standing apart from the body, and where they are.
+        clumps: of each group of points that was for standing apart from the body, or filling a volume beside it, and
+            where they are.
+        blobs: whether some that fill a volume are still in it.
         classes: of its points or faces, that must match.
         moments: to order 8.
         vectors: the n-tuples of them.
@@ -51,6 +53,7 @@ class Measured:
     shape: Shape
     strays: Index
     clumps: tuple[tuple[Index, Array], ...]
+    blobs: bool
     classes: Index | None
     moments: Moments
     vectors: NTuples
@@ -66,10 +69,10 @@ class Measured:
         return fixed_subspace(self.vectors)
 
 
-def measure(shape: Shape, *, outliers: Outliers = "auto", apart: bool = True) -> Measured:
+def measure(shape: Shape, *, outliers: Outliers = "auto", apart: bool = True, blobs: bool = False) -> Measured:
     """Moments to order 8 and the n-tuples of them, of the points that belong to the object.
 
-    `apart` says whether clumps apart from the body count as outliers.
+    `apart` says whether clumps apart from the body count as outliers, `blobs` whether those do that touch it.
 
     Raises:
         InputError: another word for outliers.
@@ -78,19 +81,24 @@ def measure(shape: Shape, *, outliers: Outliers = "auto", apart: bool = True) ->
         raise InputError(f"outliers is {outliers!r}; expected one of {list(get_args(Outliers))}")
     strays: Index = np.empty(0, dtype=np.int64)
     clumps: tuple[tuple[Index, Array], ...] = ()
+    more = False
     massive = np.arange(len(shape.points))
     if shape.faces is None and shape.weights is not None and not shape.weights.all():
         massive = np.flatnonzero(shape.weights > 0)
         shape = part(shape, massive)  # points of no mass are no part of the object
     if shape.faces is None and not is_few(shape):
-        seen = sampling(shape.points, np.random.default_rng(0), outliers=outliers == "auto", apart=apart)
+        auto = outliers == "auto"
+        seen = sampling(shape.points, np.random.default_rng(0), outliers=auto, apart=apart, blobs=blobs)
+        more = bool(seen.blobs)
         strays, clumps = massive[seen.strays], tuple((massive[c], shape.points[c]) for c in seen.clumps)
         shape = part(shape, seen.kept) if len(seen.kept) < len(massive) else shape
         shape = replace(shape, weights=seen.shares) if shape.weights is None and seen.shares is not None else shape
     classes = _classes(shape)
     moments = _moments(shape, classes, parts=0 if is_few(shape) or shape.faces is not None else PARTS)
     vectors = ntuples(moments)
-    return Measured(shape=shape, strays=strays, clumps=clumps, classes=classes, moments=moments, vectors=vectors)
+    return Measured(
+        shape=shape, strays=strays, clumps=clumps, blobs=more, classes=classes, moments=moments, vectors=vectors
+    )
 
 
 def is_few(shape: Shape) -> bool:

@@ -149,6 +149,22 @@ def _variances(points: Array, near: Index) -> Array:
     return fit_planes(sums_of(points[near.ravel()]).reshape(*near.shape, -1).sum(axis=1))[2]
 
 
+def blobness(points: Array, near: Index) -> Array:
+    """Thickness over length [M] of neighbourhoods [M, k] of points [N, 3], over that of points at random in a ball."""
+    values = _variances(points, near)
+    return np.sqrt(values[:, 0] / np.maximum(values[:, 2], 1e-300)) / _ball_thickness(near.shape[1])
+
+
+@lru_cache(maxsize=32)
+def _ball_thickness(k: int) -> float:
+    """Median thickness over length of k points at random in a ball."""
+    rng = np.random.default_rng(0)
+    ball = rng.standard_normal((400, k, 3))
+    ball *= rng.random((400, k, 1)) ** (1.0 / 3.0) / np.linalg.norm(ball, axis=2, keepdims=True)
+    values = _variances(ball.reshape(-1, 3), np.arange(400 * k).reshape(400, k))
+    return float(np.median(np.sqrt(values[:, 0] / values[:, 2])))
+
+
 def flatness_of(values: Array) -> Array:
     """Thickness over the smaller width [M] from variances [M, 3] in ascending order: 0 for a plane, 1 for a blob."""
     return np.sqrt(values[:, 0] / np.maximum(values[:, 1], 1e-300))

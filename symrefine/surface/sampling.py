@@ -5,14 +5,26 @@ decided here depends on the surroundings of a point alone, so that it breaks no 
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.geometry import Array
 from symrefine.shape import Index
-from symrefine.surface.neighbourhoods import FLAT, connected_parts, fills_volume, fit_planes, kd_tree, sums_of
+from symrefine.surface.misses import SHARES
+from symrefine.surface.neighbourhoods import (
+    FLAT,
+    blobness,
+    choose_neighbours,
+    connected_parts,
+    fills_volume,
+    fit_planes,
+    kd_tree,
+    sums_of,
+)
 
+Mask = NDArray[np.bool_]
 # Points that are asked first, and neighbours that tell of the surroundings of a point.
 ASKED, AROUND = 5000, 16
 # A stray has its neighbours so many times as far away as half of the points have theirs: what 8 neighbours vary by on
@@ -26,8 +38,11 @@ LAST = 0.001
 # Standard deviation of the logarithm of the density along some direction from which on points are no even sample: half
 # that of a fall-off of 3:1. Objects with thin parts at one end have it too; their weights do no harm.
 UNEVEN = 0.1
-# A clump apart from the body holds at most this share of the points, and has no counterpart: none of half its size.
+# A clump holds at most this share of the points, so many that it counts, and has no counterpart: none of half its size.
 CLUMP, COUNTERPART = 0.1, 0.5
+# Neighbourhoods as thick as this, over that of points at random in a ball, fill a volume: the finest details of objects
+# reach 0.87 where noise leaves them visible at all.
+FILLED = 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,73 +52,130 @@ class Sampling:
     Attributes:
         kept: [K] indices, ascending.
         strays: indices of those far from all others.
-        clumps: indices of each group of points apart from the body, with no counterpart.
+        clumps: indices of each group of points that was set apart from the body, with no counterpart.
+        blobs: of each group of those kept that touches the body, fills a volume and has no counterpart.
         shares: [K] surface that each of the kept stands for; None where they are an even sample.
     """
 
     kept: Index
     strays: Index
     clumps: tuple[Index, ...] = ()
+    blobs: tuple[Index, ...] = ()
     shares: Array | None = None
 
 
-def sampling(points: Array, rng: np.random.Generator, *, outliers: bool, apart: bool = True) -> Sampling:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Surroundings:
+    """Points with what is around each of them, itself left out.
+
+    Attributes:
+        points: [N, 3].
+        tree: kd-tree over them.
+        away: [N, AROUND] distances of the neighbours, nearest first.
+        near: [N, AROUND] indices of the neighbours.
+    """
+
+    points: Array
+    tree: Any
+    away: Array
+    near: Index
+
+    @classmethod
+    def of(cls, points: Array) -> "Surroundings":
+        """The surroundings of points [N, 3]; N > AROUND."""
+        tree = kd_tree(points)
+        away, near = tree.query(points, k=[*range(2, AROUND + 2)])
+        return cls(points=points, tree=tree, away=away, near=near)
+
+    @property
+    def reach(self) -> Array:
+        """Distance [N] of the neighbour in the middle."""
+        return np.asarray(self.away[:, AROUND // 2 - 1])
+
+
+def sampling(
+    points: Array, rng: np.random.Generator, *, outliers: bool, apart: bool = True, blobs: bool = False
+) -> Sampling:
     """How points [N, 3] were sampled; with `outliers` those that belong to no surface are set apart.
 
-    With `apart` too, clumps apart from the body are as well.
-
-    Of points that fill a volume none is set apart, and all count alike.
+    With `apart` clumps apart from the body are as well, and with `blobs` those that touch it. Of points that fill a
+    volume none is set apart, and all count alike.
     """
-    every, none = np.arange(len(points)), np.empty(0, dtype=np.int64)
-    some = points[rng.permutation(len(points))[:ASKED]]
-    spread = some.std()
-    some = (some - some.mean(axis=0)) / spread if spread > 0.0 else some
-    if spread == 0.0 or fills_volume(some, kd_tree(some), np.random.default_rng(0)):
-        return Sampling(kept=every, strays=none)
-    away = strays(points, rng) if outliers else none
-    body = np.setdiff1d(every, away)
-    groups = tuple(body[c] for c in clumps(points[body], rng)) if outliers and apart else ()
-    kept = np.setdiff1d(body, np.concatenate([none, *groups]))
-    return Sampling(kept=kept, strays=away, clumps=groups, shares=shares(points[kept], rng))
+    kept: Index = np.arange(len(points))
+    taken: list[Index] = []
+    lone: list[Index] = []
+    some = _some(points, rng)
+    spread = points[some].std()
+    if spread == 0.0 or len(points) <= AROUND:
+        return Sampling(kept=kept, strays=kept[:0])
+    points = (points - points[some].mean(axis=0)) / spread
+    around = Surroundings.of(points[some])
+    if fills_volume(around.points, around.tree, np.random.default_rng(0)):
+        return Sampling(kept=kept, strays=kept[:0])
+    if outliers and _alone(around).any():
+        kept = _without_strays(points)
+        around = _around(points[kept], rng)
+    strays = np.setdiff1d(np.arange(len(points)), kept)
+    if outliers and apart and (found := clumps(points[kept], around)):
+        taken += [kept[c] for c in found]
+        kept = np.setdiff1d(kept, np.concatenate(taken))
+        around = _around(points[kept], rng)
+    if outliers:
+        lone = [kept[b] for b in filled(points[kept], around, rng)]
+    if blobs and lone:
+        taken += lone
+        kept = np.setdiff1d(kept, np.concatenate(lone))
+        around = _around(points[kept], rng)
+    return Sampling(
+        kept=kept,
+        strays=strays,
+        clumps=tuple(taken),
+        blobs=() if blobs else tuple(lone),
+        shares=shares(points[kept], around),
+    )
 
 
-def strays(points: Array, rng: np.random.Generator) -> Index:
-    """Indices, ascending, of points [N, 3] that lie on no surface: far from others, and in no plane with them.
+def _around(points: Array, rng: np.random.Generator) -> Surroundings:
+    """The surroundings of some of points [N, 3]."""
+    return Surroundings.of(points[_some(points, rng)])
+
+
+def _some(points: Array, rng: np.random.Generator) -> Index:
+    """Indices of points [N, 3] at random, and of the farthest, lest a few strays are missed."""
+    away = ((points - np.median(points, axis=0)) ** 2).sum(axis=1)
+    return np.union1d(rng.permutation(len(points))[:ASKED], np.argpartition(away, -1 - AROUND)[-AROUND:])
+
+
+def _without_strays(points: Array) -> Index:
+    """Indices, ascending, of points [N, 3] but for those on no surface: far from others, in no plane with them.
 
     Sparse parts of a surface are flat, more so than dense ones; strays near a surface are not in its plane. Each round
     sees clearer, as strays among strays look less alone.
     """
-    away = ((points - np.median(points, axis=0)) ** 2).sum(axis=1)
-    some = np.union1d(
-        rng.permutation(len(points))[:ASKED], np.argsort(away)[-AROUND:]
-    )  # lest a few far ones are missed
-    if not _alone(points[some]).any():
-        return np.empty(0, dtype=np.int64)
     kept = np.arange(len(points))
     while len(kept) > AROUND:
-        alone = _alone(points[kept])
+        alone = _alone(Surroundings.of(points[kept]))
         kept = kept[~alone]
         if alone.sum() <= LAST * len(points):
             break
-    return np.setdiff1d(np.arange(len(points)), kept)
+    return kept
 
 
-def _alone(points: Array) -> NDArray[np.bool_]:
-    """Which of points [N, 3] are far from the others and in no plane with them."""
-    away, near = kd_tree(points).query(points, k=[*range(2, AROUND + 2)])
-    reach = away[:, AROUND // 2 - 1]
+def _alone(around: Surroundings) -> Mask:
+    """Which of some points are far from the others and in no plane with them."""
+    points, reach = around.points, around.reach
     # Points that are repeated have no spacing to be far by.
     sparse = np.flatnonzero(reach > FAR * np.median(reach)) if np.median(reach) > 0.0 else np.empty(0, dtype=np.int64)
     found = np.zeros(len(points), dtype=bool)
     if sparse.size:
-        sums = sums_of(points[near[sparse].ravel()]).reshape(len(sparse), AROUND, -1).sum(axis=1)
+        sums = sums_of(points[around.near[sparse].ravel()]).reshape(len(sparse), AROUND, -1).sum(axis=1)
         mean, normals, variances = fit_planes(sums)
         across = np.abs(np.einsum("ni,ni->n", normals, points[sparse] - mean))
         thick = np.sqrt(variances[:, 0] / np.maximum(variances[:, 2], 1e-300))
-        loose = (thick > FLAT) | (across > FLAT * away[sparse, -1])
+        loose = (thick > FLAT) | (across > FLAT * around.away[sparse, -1])
         # As random points are among themselves, or far from what is dense around: thin parts, sampled sparsely, are not
         if not _scattered(points[sparse[loose]], np.ptp(points, axis=0)):
-            loose &= reach[sparse] > FAR * reach[near[sparse]].min(axis=1)
+            loose &= reach[sparse] > FAR * reach[around.near[sparse]].min(axis=1)
         found[sparse] = loose
     return found
 
@@ -117,45 +189,89 @@ def _scattered(points: Array, box: Array) -> bool:
     return bool(4.0 / 3.0 * np.pi * np.median(away) ** 3 * len(points) > CROWDED * np.prod(box))
 
 
-def clumps(points: Array, rng: np.random.Generator) -> list[Index]:
+def clumps(points: Array, around: Surroundings) -> list[Index]:
     """Indices, ascending, of each group of points [N, 3] apart from the body that is small and has no counterpart.
 
-    Points belong together if one is among the nearest of the other, whatever the density.
+    Points hang together if each is among the nearest of the other, whatever the density: a few between two dense parts
+    join nothing. `around` tells of some of the points.
     """
-    some = rng.permutation(len(points))[:ASKED]
-    tree = kd_tree(points[some])
-    away, near = tree.query(points[some], k=[*range(2, AROUND // 2 + 2)])
-    part = connected_parts(np.repeat(np.arange(len(some)), near.shape[1]), near.ravel(), len(some))
-    sizes = np.bincount(part)
-    if len(sizes) == 1 or np.median(away[:, -1]) == 0.0:
+    count = len(around.points)
+    one, other = np.repeat(np.arange(count), AROUND), around.near.ravel()
+    mutual = np.isin(one * count + other, other * count + one)
+    part = connected_parts(one[mutual], other[mutual], count)
+    apart = [m for m in _lone(part) if _gap(around, m)] if np.median(around.reach) > 0.0 else []
+    return _members(points, around, apart)
+
+
+def filled(points: Array, around: Surroundings, rng: np.random.Generator) -> list[Index]:
+    """Indices, ascending, of each small group of points [N, 3] with no counterpart that fills a volume by the body.
+
+    Neighbourhoods there look like points at random in a ball: among some of the points, and among all in neighbourhoods
+    so large that noise does not make the surface look so too. `around` tells of some of the points.
+    """
+    thick = blobness(around.points, around.near)[around.near].mean(axis=1)
+    within = thick > FILLED
+    one, other = np.repeat(np.arange(len(within)), AROUND), around.near.ravel()
+    inside = within[one] & within[other]
+    part = np.where(within, connected_parts(one[inside], other[inside], len(within)), -1)
+    small = [m for k in np.flatnonzero(_small(np.bincount(part + 1)[1:], len(part))) for m in (part == k,)]
+    if not small:
         return []
+    tree = kd_tree(points)
+    size = 2 * choose_neighbours(points, tree, rng)
+    enough = 2 * size * len(part) / len(points)  # fewer tell nothing of neighbourhoods so large
+    for m in small:
+        if m.sum() < enough or np.median(blobness(points, tree.query(around.points[m], k=size)[1])) < FILLED:
+            part[m] = -1
+    return _members(points, around, [_grown(m, around) for m in _lone(part)])
+
+
+def _small(sizes: Index, count: int) -> Mask:
+    """Which parts of so many points are too small to be the body, and large enough to be seen."""
+    return np.asarray((sizes <= CLUMP * count) & (sizes > SHARES[-1] * count))
+
+
+def _lone(part: Index) -> list[Mask]:
+    """Small parts, given the number of each point's part, that none other is about as large as; -1 is no part."""
+    sizes = np.bincount(part + 1)[1:]
     alike = (sizes >= COUNTERPART * sizes[:, None]) & (sizes <= sizes[:, None] / COUNTERPART)
-    small = np.flatnonzero((sizes <= CLUMP * len(some)) & (alike.sum(axis=1) == 1))
-    apart = [k for k in small if _gap(points[some], part == k, away[:, -1])]
-    owner = part[tree.query(points)[1]] if apart else part
-    return [np.flatnonzero(owner == k) for k in apart]
+    return [part == k for k in np.flatnonzero(_small(sizes, len(part)) & (alike.sum(axis=1) == 1))]
 
 
-def _gap(points: Array, some: NDArray[np.bool_], reach: Array) -> bool:
-    """Whether some of the points [N, 3] stand farther from all others than from their own neighbours."""
-    between = kd_tree(points[~some]).query(points[some])[0]
-    return bool(between.min() > np.median(reach[some]))
+def _gap(around: Surroundings, some: Mask) -> bool:
+    """Whether nine in ten of some points stand farther from all others than from their own neighbours."""
+    between = kd_tree(around.points[~some]).query(around.points[some])[0]
+    return bool(np.quantile(between, 0.1) > np.median(around.reach[some]))
 
 
-def shares(points: Array, rng: np.random.Generator) -> Array | None:
+def _grown(some: Mask, around: Surroundings) -> Mask:
+    """Some points with those that most neighbours of are among them: a core with its rim."""
+    while (more := some | (some[around.near].mean(axis=1) > 0.5)).sum() > some.sum():
+        some = more
+    return some
+
+
+def _members(points: Array, around: Surroundings, groups: list[Mask]) -> list[Index]:
+    """Indices of all points [N, 3] that belong to each of some groups, as the nearest of some points do."""
+    if not groups:
+        return []
+    nearest = around.tree.query(points)[1]
+    return [np.flatnonzero(m[nearest]) for m in groups]
+
+
+def shares(points: Array, around: Surroundings) -> Array | None:
     """How much surface each of points [N, 3] stands for, from the distance of its neighbours; None where all are even.
 
     What counts is how the density falls off along some direction: that is what a scanner does, and what shifts moments.
+    `around` tells of some of the points.
     """
-    some = points[rng.permutation(len(points))[:ASKED]]
-    place = np.column_stack([np.ones(len(some)), some - some.mean(axis=0)])
-    area = _area(some)
+    area = _area(around.away[:, -1])
     if not area.all():
         return None  # points are repeated
+    place = np.column_stack([np.ones(len(area)), around.points - around.points.mean(axis=0)])
     trend = place @ np.linalg.lstsq(place, np.log(area), rcond=None)[0]
-    return _area(points) if trend.std() > UNEVEN else None
+    return _area(kd_tree(points).query(points, k=[AROUND + 1])[0][:, 0]) if trend.std() > UNEVEN else None
 
 
-def _area(points: Array) -> Array:
-    away, _ = kd_tree(points).query(points, k=[AROUND + 1])
-    return np.asarray(np.minimum(away, np.quantile(away, 0.99))[:, 0] ** 2)  # lest a few lonely ones weigh all
+def _area(away: Array) -> Array:
+    return np.asarray(np.minimum(away, np.quantile(away, 0.99)) ** 2)  # lest a few lonely ones weigh all
