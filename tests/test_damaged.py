@@ -21,6 +21,7 @@ from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.geometry import Isometry, householder, line_angle_rad, random_orthogonal
 from symrefine.load import load
+from symrefine.picture.words import scanned
 from symrefine.propose.votes import mirror_votes, revolution, turn_votes
 from symrefine.shape import CAMERAS, Shape
 from symrefine.surface.cameras import cameras
@@ -62,8 +63,8 @@ def test_a_surface_has_no_strays_however_uneven(make, ratio):
     seen = sampling(points, np.random.default_rng(0), outliers=True)
     assert len(seen.strays) < 0.002 * len(points)
     assert seen.clumps == ()
-    if ratio > 1.0:
-        assert seen.shares is not None
+    assert (seen.shares is not None) == (len(seen.even) < len(seen.kept)) == (ratio > 1.0)
+    assert np.isin(seen.even, seen.kept).all()
 
 
 def test_a_volume_has_no_strays():
@@ -71,11 +72,24 @@ def test_a_volume_has_no_strays():
     assert len(sampling(cloud, np.random.default_rng(0), outliers=True).strays) == 0
 
 
-def test_shares_undo_a_density_that_falls_off():
-    made = damage.uneven(BRICK, 10.0, np.random.default_rng(5))
-    shares = sampling(made.points, np.random.default_rng(0), outliers=True).shares
+@pytest.mark.parametrize("ratio", [10.0, 100.0])
+def test_an_even_sample_undoes_a_density_that_falls_off(ratio):
+    made = damage.uneven(BRICK, ratio, np.random.default_rng(5))
+    seen = sampling(made.points, np.random.default_rng(0), outliers=True)
     spread = np.linalg.norm(made.points.mean(axis=0))
-    assert np.linalg.norm(np.average(made.points, axis=0, weights=shares)) < 0.2 * spread
+    assert np.linalg.norm(np.average(made.points[seen.even], axis=0, weights=seen.shares)) < 0.25 * spread
+
+
+@pytest.mark.parametrize("make", [table, lambda: stool(5), lambda: BRICK])
+def test_a_density_that_falls_off_hides_nothing_and_is_told(make):
+    clean = detect(damage.clean(make(), 0.0, np.random.default_rng(6)).points)
+    points, _ = posed(damage.uneven(make(), 100.0, np.random.default_rng(6)).points, 7)
+    found = detect(points)
+    assert found.point_group == clean.point_group
+    assert clean.even_sample is None
+    assert found.even_sample is not None
+    assert 1000 < found.even_sample < 0.5 * len(points)
+    assert f"decided by {found.even_sample:,} points, more evenly spread" in scanned(found)
 
 
 def test_outliers_are_told_and_can_be_kept():

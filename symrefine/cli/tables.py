@@ -8,7 +8,7 @@ from typing import Any
 from rich.table import Table
 
 from symrefine.groups import point_group
-from symrefine.picture.words import TUPLES, kind_name, meaning
+from symrefine.picture.words import TUPLES, evened, kind_name, meaning, taken_out
 
 Record = dict[str, Any]
 
@@ -37,8 +37,8 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
     yield _place(record)
     if record["classes"]:
         yield f"labels: {_count(record['classes']['count'], 'class', 'classes')}"
-    if record["outliers"]["count"]:
-        yield outliers(record["outliers"])
+    out = record["outliers"]
+    yield from filter(None, (taken_out(out["count"], out["share"], out["clumps"]), evened(record["even_sample"])))
     if record["at_least"]:
         yield partial(record)
     yield from _apart(*_spatial(record))
@@ -52,12 +52,6 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
     if record["staircase"]:
         yield f"Group by tolerance: {staircase(record)}"
     yield f"{_count(record['iterations'], 'iteration')}, {_seconds(record)} s"
-
-
-def outliers(found: Record) -> str:
-    """How many points were taken as no part of the object: `1,214 points (6 %) taken as outliers`."""
-    clumps = f", {_count(found['clumps'], 'clump')} among them" if found["clumps"] else ""
-    return f"{found['count']:,} points ({100 * found['share']:.2g} %) taken as outliers{clumps}"
 
 
 def partial(record: Record) -> str:

@@ -15,6 +15,7 @@ from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import FixedSubspace, fixed_subspace
 from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
+from symrefine.surface.cameras import Camera, cameras
 from symrefine.surface.misses import TOLERANCE, noise_distances
 from symrefine.surface.neighbourhoods import fills_volume, kd_tree
 from symrefine.surface.openings import openings
@@ -40,7 +41,9 @@ class Measured:
     """A shape with the classes of its points or faces, its moments and its n-tuples.
 
     Attributes:
-        shape: without what was taken as outliers.
+        shape: without what was taken as outliers, and of a density that falls off a more even sample.
+        count: of its points, with those that were too many in dense parts.
+        scan: all of these with where they were seen from, if that is known.
         strays: indices of the points that were for being far from all others.
         clumps: of each group of points that was for standing apart from the body, or filling a volume beside it, and
             where they are.
@@ -51,6 +54,8 @@ class Measured:
     """
 
     shape: Shape
+    count: int
+    scan: Shape | None
     strays: Index
     clumps: tuple[tuple[Index, Array], ...]
     blobs: bool
@@ -81,23 +86,36 @@ def measure(shape: Shape, *, outliers: Outliers = "auto", apart: bool = True, bl
         raise InputError(f"outliers is {outliers!r}; expected one of {list(get_args(Outliers))}")
     strays: Index = np.empty(0, dtype=np.int64)
     clumps: tuple[tuple[Index, Array], ...] = ()
-    more = False
+    scan, more = None, False
     massive = np.arange(len(shape.points))
     if shape.faces is None and shape.weights is not None and not shape.weights.all():
         massive = np.flatnonzero(shape.weights > 0)
         shape = part(shape, massive)  # points of no mass are no part of the object
+    count = len(shape.points)
     if shape.faces is None and not is_few(shape):
         auto = outliers == "auto"
         seen = sampling(shape.points, np.random.default_rng(0), outliers=auto, apart=apart, blobs=blobs)
         more = bool(seen.blobs)
         strays, clumps = massive[seen.strays], tuple((massive[c], shape.points[c]) for c in seen.clumps)
-        shape = part(shape, seen.kept) if len(seen.kept) < len(massive) else shape
-        shape = replace(shape, weights=seen.shares) if shape.weights is None and seen.shares is not None else shape
+        count = len(seen.kept)
+        scan = part(shape, seen.kept) if shape.viewpoint is not None else None
+        if shape.weights is None and seen.shares is not None:
+            shape = replace(part(shape, seen.even), weights=seen.shares)
+        elif len(seen.kept) < len(massive):
+            shape = part(shape, seen.kept)
     classes = _classes(shape)
     moments = _moments(shape, classes, parts=0 if is_few(shape) or shape.faces is not None else PARTS)
     vectors = ntuples(moments)
     return Measured(
-        shape=shape, strays=strays, clumps=clumps, blobs=more, classes=classes, moments=moments, vectors=vectors
+        shape=shape,
+        count=count,
+        scan=scan,
+        strays=strays,
+        clumps=clumps,
+        blobs=more,
+        classes=classes,
+        moments=moments,
+        vectors=vectors,
     )
 
 
@@ -195,7 +213,7 @@ def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLE
     shape, moments = measured.shape, measured.moments
     points, normals, weights, labels = _cloud(shape, measured.classes, rng)
     local = (points - moments.center) / moments.scale
-    viewpoints = None if shape.viewpoint is None else (shape.viewpoint - moments.center) / moments.scale
+    views = () if measured.scan is None else _cameras(measured.scan, moments)
     evidence = Evidence(
         moments=moments,
         tuples=measured.tuples,
@@ -205,7 +223,7 @@ def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLE
     )
     if is_few(shape):
         return evidence, Surface(cloud=isolated_points(local, labels), diagonal=tight_diagonal(local))
-    return evidence, _surface(local, normals, weights, labels, shape.faces is not None, tolerance, viewpoints, rng)
+    return evidence, _surface(local, normals, weights, labels, shape.faces is not None, tolerance, views, rng)
 
 
 def _surface(
@@ -215,33 +233,39 @@ def _surface(
     labels: Index | None,
     exact: bool,
     tolerance: float,
-    viewpoints: Array | None,
+    views: tuple[Camera, ...],
     rng: np.random.Generator,
 ) -> Surface:
     """Local planes (points, where they fill a volume) with what noise alone shows."""
     tree = None if exact else kd_tree(local)
     if tree is not None and normals is None and fills_volume(local, tree, np.random.default_rng(0)):
         return _volume(local, labels, rng)
-    chance = None if exact or np.ptp(weights) == 0.0 else weights / weights.sum()
+    uneven = None if exact or np.ptp(weights) == 0.0 else weights
     whole = make_skin(local, rng, normals=normals, exact=exact, tree=tree)
 
     def half(some: Index) -> LocalPlanes:
         # As many neighbours as in the whole, so that noise is the same; exact normals need none.
         own = normals[some] if exact and normals is not None else None
         skin = Skin(points=local[some], normals=own, neighbours=whole.neighbours, given=None)
-        pick = drawn(len(some), SAMPLES if exact else PLANES // 2, rng)
+        pick = drawn(len(some), SAMPLES if exact else PLANES // 2, rng, None if uneven is None else uneven[some])
         return skin.local_planes(pick, None if labels is None else labels[some])
 
-    pick = drawn(len(local), SAMPLES if exact else PLANES, rng, chance)
+    pick = drawn(len(local), SAMPLES if exact else PLANES, rng, uneven)
     # Neighbours stand together in memory, and any stride takes an even part of the surface.
     cloud = whole.local_planes(pick[kd_tree(local[pick]).indices], labels)
     diagonal = tight_diagonal(cloud.points)
     noise = noise_distances(len(local), half, rng)
     surface = Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, tolerance=tolerance)
     # Where noise alone needs all that is allowed, nobody sees what is open.
-    if exact or (surface.floor >= tolerance and viewpoints is None):
+    if exact or (surface.floor >= tolerance and not views):
         return surface
-    return replace(surface, openings=openings(cloud, local, tree, viewpoints))
+    return replace(surface, openings=openings(cloud, local, tree, views))
+
+
+def _cameras(scan: Shape, moments: Moments) -> tuple[Camera, ...]:
+    """What saw a scan, in normalised units."""
+    assert scan.viewpoint is not None
+    return cameras(*((p - moments.center) / moments.scale for p in (scan.points, scan.viewpoint)))
 
 
 def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Surface:

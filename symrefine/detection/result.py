@@ -99,6 +99,8 @@ class Detection(ReadOnly):
         at_least: whether the surface has open borders beyond which nobody looked: the object may have more symmetry.
         clumps: how many groups of them stand apart from the body, the others being single strays.
         outlier_share: of all points.
+        even_sample: how many points, more evenly spread, it was decided by where the density falls off; None where by
+            all.
         timings: seconds by stage; everything else is a function of the input and the options alone.
     """
 
@@ -125,6 +127,7 @@ class Detection(ReadOnly):
     outliers: Index
     outlier_share: float
     clumps: int
+    even_sample: int | None
     at_least: bool
     origin: Array
     scale: float

@@ -50,6 +50,7 @@ def detection_record(
         **_answer(d),
         "at_least": bool(d.at_least),
         "outliers": {"count": len(d.outliers), "clumps": int(d.clumps), "share": number(d.outlier_share)},
+        "even_sample": d.even_sample,
         "planes": [
             _placed(p.plane, scale) | _held(p) | {"sigma": _sigma(p.sigma_rad, "offset", p.sigma)} | _covered(p)
             for p in d.planes

@@ -95,13 +95,20 @@ def fit(detection: Detection) -> str:
 def scanned(detection: Detection) -> str:
     """What the points lack: outliers among them, parts that were not seen; empty where there is nothing to say."""
     d = detection
-    clumps = f", {count(d.clumps, 'clump')} among them" if d.clumps else ""
-    said = (
-        [f"{len(d.outliers):,} points ({percent(d.outlier_share)}) taken as outliers{clumps}."]
-        if len(d.outliers)
-        else []
-    )
-    return " ".join([*said, *(["Parts of the surface were not seen: there may be more."] if d.at_least else [])])
+    told = taken_out(len(d.outliers), d.outlier_share, d.clumps), evened(d.even_sample)
+    unseen = "Parts of the surface were not seen: there may be more." if d.at_least else ""
+    return " ".join(said for said in (*(f"{t[:1].upper()}{t[1:]}." for t in told if t), unseen) if said)
+
+
+def taken_out(outliers: int, share: float, clumps: int) -> str:
+    """How many points were taken as no part of the object, if any: `1,214 points (6 %) taken as outliers`."""
+    among = f", {count(clumps, 'clump')} among them" if clumps else ""
+    return f"{outliers:,} points ({percent(share)}) taken as outliers{among}" if outliers else ""
+
+
+def evened(sample: int | None) -> str:
+    """By how many points it was decided, where that was not all of them."""
+    return "" if sample is None else f"the density falls off: decided by {sample:,} points, more evenly spread"
 
 
 def kind_name(kind: str, order: float = 0.0) -> str:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from symrefine.geometry import Array
 from symrefine.shape import Index
-from symrefine.surface.cameras import Camera, cameras
+from symrefine.surface.cameras import Camera
 from symrefine.surface.neighbourhoods import FLAT, WIDEST, Neighbourhoods, connected_parts, fit_planes, kd_tree
 from symrefine.surface.skin import LocalPlanes
 
@@ -98,18 +98,18 @@ class Openings:
         return found
 
 
-def openings(cloud: LocalPlanes, points: Array, tree: Any, viewpoints: Array | None = None) -> Openings | None:
+def openings(cloud: LocalPlanes, points: Array, tree: Any, cameras: tuple[Camera, ...] = ()) -> Openings | None:
     """What is open of a surface; None if it is closed, or known too coarsely to tell.
 
     Args:
         cloud: its local planes.
         points: [N, 3] all that is known of it.
         tree: kd-tree over them.
-        viewpoints: [N, 3] where each was seen from, or None.
+        cameras: what saw it, where that is known.
     """
-    if viewpoints is not None:
+    if cameras:
         none = np.zeros(len(cloud.points), dtype=bool)
-        return Openings(line=none, border=none, evident=True, cameras=cameras(points, viewpoints))
+        return Openings(line=none, border=none, evident=True, cameras=cameras)
     around = Neighbourhoods.of(points, tree, NEIGHBOURS).around(cloud.points)
     mean, normals, variances = fit_planes(around)
     aside = mean - cloud.points

@@ -1,4 +1,4 @@
-"""How a cloud was sampled: which of its points belong to no surface, and how much surface each other one stands for.
+"""How a cloud was sampled: which points belong to no surface, and how much surface each of the others stands for.
 
 A few thousand of the points tell whether there is anything to be done at all; only then all of them are asked. What is
 decided here depends on the surroundings of a point alone, so that it breaks no symmetry.
@@ -15,6 +15,7 @@ from symrefine.shape import Index
 from symrefine.surface.misses import SHARES
 from symrefine.surface.neighbourhoods import (
     FLAT,
+    WIDEST,
     blobness,
     choose_neighbours,
     connected_parts,
@@ -36,8 +37,12 @@ CROWDED = 1.0
 # A round that finds fewer strays than this share is the last: what remains lies within the spacing of the surface.
 LAST = 0.001
 # Standard deviation of the logarithm of the density along some direction from which on points are no even sample: half
-# that of a fall-off of 3:1. Objects with thin parts at one end have it too; their weights do no harm.
+# that of a fall-off of 3:1. Objects with thin parts at one end have it too; that does them no harm.
 UNEVEN = 0.1
+# Density over the least up to which weights make up for it: there neighbourhoods are one step of sizes narrower.
+DENSER = 2.0
+# Share of the points beyond which they are too lonely to say how dense a surface was sampled.
+LONELY = 0.99
 # A clump holds at most this share of the points, so many that it counts, and has no counterpart: none of half its size.
 CLUMP, COUNTERPART = 0.1, 0.5
 # Neighbourhoods as thick as this, over that of points at random in a ball, fill a volume: the finest details of objects
@@ -47,17 +52,19 @@ FILLED = 0.9
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sampling:
-    """Which points of a cloud make the object, and how much of its surface each of them stands for.
+    """Which points of a cloud make the object.
 
     Attributes:
-        kept: [K] indices, ascending.
+        kept: indices, ascending.
+        even: those of them that sample the surface at about the same density: all where they do.
+        shares: [len(even)] surface that each of these stands for; None where they are an even sample.
         strays: indices of those far from all others.
         clumps: indices of each group of points that was set apart from the body, with no counterpart.
         blobs: of each group of those kept that touches the body, fills a volume and has no counterpart.
-        shares: [K] surface that each of the kept stands for; None where they are an even sample.
     """
 
     kept: Index
+    even: Index
     strays: Index
     clumps: tuple[Index, ...] = ()
     blobs: tuple[Index, ...] = ()
@@ -99,7 +106,7 @@ def sampling(
     """How points [N, 3] were sampled; with `outliers` those that belong to no surface are set apart.
 
     With `apart` clumps apart from the body are as well, and with `blobs` those that touch it. Of points that fill a
-    volume none is set apart, and all count alike.
+    volume none is set apart, and all are kept.
     """
     kept: Index = np.arange(len(points))
     taken: list[Index] = []
@@ -107,11 +114,11 @@ def sampling(
     some = _some(points, rng)
     spread = points[some].std()
     if spread == 0.0 or len(points) <= AROUND:
-        return Sampling(kept=kept, strays=kept[:0])
+        return Sampling(kept=kept, even=kept, strays=kept[:0])
     points = (points - points[some].mean(axis=0)) / spread
     around = Surroundings.of(points[some])
     if fills_volume(around.points, around.tree, np.random.default_rng(0)):
-        return Sampling(kept=kept, strays=kept[:0])
+        return Sampling(kept=kept, even=kept, strays=kept[:0])
     if outliers and _alone(around).any():
         kept = _without_strays(points)
         around = _around(points[kept], rng)
@@ -126,12 +133,14 @@ def sampling(
         taken += lone
         kept = np.setdiff1d(kept, np.concatenate(lone))
         around = _around(points[kept], rng)
+    even, shares = _evened(points[kept], rng) if _is_uneven(around) else (slice(None), None)
     return Sampling(
         kept=kept,
+        even=kept[even],
+        shares=shares,
         strays=strays,
         clumps=tuple(taken),
         blobs=() if blobs else tuple(lone),
-        shares=shares(points[kept], around),
     )
 
 
@@ -259,19 +268,30 @@ def _members(points: Array, around: Surroundings, groups: list[Mask]) -> list[In
     return [np.flatnonzero(m[nearest]) for m in groups]
 
 
-def shares(points: Array, around: Surroundings) -> Array | None:
-    """How much surface each of points [N, 3] stands for, from the distance of its neighbours; None where all are even.
-
-    What counts is how the density falls off along some direction: that is what a scanner does, and what shifts moments.
-    `around` tells of some of the points.
-    """
-    area = _area(around.away[:, -1])
-    if not area.all():
-        return None  # points are repeated
+def _is_uneven(around: Surroundings) -> bool:
+    """Whether the density falls off along some direction, as that of a scanner does; it is what shifts moments."""
+    area = _area(around)
+    if not area.all() or np.median(around.away[:, -1]) > WIDEST:
+        return False  # points are repeated, or so few that the shape decides how far away their neighbours are
     place = np.column_stack([np.ones(len(area)), around.points - around.points.mean(axis=0)])
     trend = place @ np.linalg.lstsq(place, np.log(area), rcond=None)[0]
-    return _area(kd_tree(points).query(points, k=[AROUND + 1])[0][:, 0]) if trend.std() > UNEVEN else None
+    return bool(trend.std() > UNEVEN)
 
 
-def _area(away: Array) -> Array:
-    return np.asarray(np.minimum(away, np.quantile(away, 0.99)) ** 2)  # lest a few lonely ones weigh all
+def _evened(points: Array, rng: np.random.Generator) -> tuple[Index, Array]:
+    """Indices, ascending, of points [N, 3] drawn such that none lie much closer than the sparsest do, and their shares.
+
+    Weights alone would even out moments. But a dense part is known more finely than its image in a sparse one, and what
+    the two miss one another by is no noise that halves of the cloud would show.
+    """
+    around = Surroundings.of(points)
+    area = _area(around)[around.near].mean(axis=1)
+    chance = np.minimum(DENSER * area / np.quantile(area, LONELY), 1.0)
+    even = np.flatnonzero(rng.random(len(points)) < chance)
+    return even, (area / chance)[even]
+
+
+def _area(around: Surroundings) -> Array:
+    """How much surface [N] each point stands for, up to a factor."""
+    away = around.away[:, -1]
+    return np.asarray(np.minimum(away, np.quantile(away, LONELY)) ** 2)

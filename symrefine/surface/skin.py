@@ -206,8 +206,9 @@ def local_planes(
     return make_skin(points, rng, normals=normals, exact=exact, tree=tree).local_planes(pick, labels)
 
 
-def drawn(size: int, count: int, rng: np.random.Generator, chance: Array | None = None) -> Index:
-    """Indices, ascending, of `count` points of `size`, or of all; each is drawn with its chance [size]."""
+def drawn(size: int, count: int, rng: np.random.Generator, weights: Array | None = None) -> Index:
+    """Indices, ascending, of `count` points of `size`, or of all; each is drawn as often as its weight [size] says."""
+    chance = None if weights is None else weights / weights.sum()
     return np.sort(rng.choice(size, min(count, size), replace=False, p=chance))
 
 
