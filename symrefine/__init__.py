@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from symrefine.groups import PointGroup as PointGroup
     from symrefine.groups import point_group as point_group
     from symrefine.load import load as load
+    from symrefine.load import load_depth as load_depth
     from symrefine.ntuples.derive import derive as derive
     from symrefine.shape import Shape as Shape
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 # Where each public name comes from.
 _HOMES = {
-    "symrefine.load": ("load",),
+    "symrefine.load": ("load", "load_depth"),
     "symrefine.detection.story": ("detect",),
     "symrefine.complete": ("complete",),
     "symrefine.align.story": ("align", "Alignment"),

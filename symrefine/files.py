@@ -114,3 +114,20 @@ def is_only_writer(descriptor: int) -> bool:
 
 def _is_replaceable(path: Path) -> bool:
     return path.is_file() or not path.exists()
+
+
+def file_bytes(file: Path) -> bytes:
+    """What a file holds.
+
+    Raises:
+        InputError: it is missing, unreadable or empty.
+    """
+    try:
+        data = file.read_bytes()
+    except FileNotFoundError:
+        raise InputError("no such file") from None
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}") from None
+    if not data:
+        raise InputError("is empty (0 bytes)")
+    return data

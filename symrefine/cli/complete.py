@@ -4,9 +4,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from symrefine.cli.detect import seen_from
+from symrefine.cli.detect import read_scan
 from symrefine.cli.outputs import bytes_writer, check_outputs, json_writer, note, tell, waiting, write_all
-from symrefine.cli.values import add_detection_options, add_scan_options, detection_options
+from symrefine.cli.values import add_depth_options, add_detection_options, add_scan_options, detection_options
 from symrefine.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--out", required=True, metavar="OUT", help="file to write: .ply or .npz")
     parser.add_argument("--json", metavar="FILE|-", help="write the figures as JSON; - is stdout, with no table")
     add_scan_options(parser)
+    add_depth_options(parser)
     add_detection_options(parser)
 
 
@@ -34,14 +35,13 @@ def run(args: argparse.Namespace) -> int:
     """Detect, complete, write, print how much was seen and inferred."""
     from symrefine.complete import complete
     from symrefine.export.models import marked_bytes
-    from symrefine.load import load
 
     check_outputs({"--out": args.out, "--json": args.json}, [Path(args.path)])
     suffix = Path(args.out).suffix.lower()
     if suffix not in (".ply", ".npz"):
         raise InputError(f"--out {args.out}: cannot mark what is inferred in {suffix or 'that'}; write .ply or .npz")
     with waiting("completing"):
-        shape = seen_from(load(args.path, measure=args.measure), args.viewpoint)
+        shape = read_scan(args.path, detection_options(args))
         made = complete(shape, outliers=args.outliers, tolerance=args.tolerance, seed=args.seed)
         record = _record(args, shape, made)
         data = marked_bytes(suffix, made.points, made.inferred)

@@ -20,6 +20,7 @@ from symrefine.cli.outputs import (
 )
 from symrefine.cli.values import (
     add_class_options,
+    add_depth_options,
     add_detection_options,
     add_scan_options,
     detection_options,
@@ -40,7 +41,7 @@ DESCRIPTION = (
     "Find the mirror planes, rotation axes and point group of the mesh or point cloud in PATH (.ply .stl .obj .off "
     ".glb .gltf .pcd .xyz .csv .txt .npy .npz), or the mirror lines and turns of a picture (.png .jpg .jpeg .bmp) or "
     "of points with two coordinates (.csv .txt .npy .npz), or the hyperplanes of symmetry of points with 4 to 8 "
-    "coordinates. Prints a table; lengths are in the units of the file, misses in percent of the bounding-box diagonal."
+    "coordinates. With --intrinsics PATH is a depth image. Prints a table; lengths are in the units of the file, misses in percent of the bounding-box diagonal."
 )
 
 
@@ -71,6 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_class_options(parser)
     add_scan_options(parser)
+    add_depth_options(parser)
     add_detection_options(parser)
 
 
@@ -105,14 +107,12 @@ def examine(
     The detection is a `PlanarDetection`, a `Detection` or a `SubspaceDetection`, as the points have two, three or more
     coordinates.
     """
-    from symrefine.load import IMAGES, load
+    from symrefine.load import IMAGES
 
     start = time.perf_counter()
-    how = {name: chosen for name, chosen in options.items() if name in ("measure", "labels", "weights")}
-    shape = load(path, **how, threshold=threshold, invert=invert)
+    shape = read_scan(path, options, threshold=threshold, invert=invert)
     load_s = time.perf_counter() - start
     tolerance, seed, outliers = options["tolerance"], options["seed"], options.get("outliers", "auto")
-    shape = seen_from(shape, options.get("viewpoint"))
     if shape.labels is not None and shape.dim != 3:
         raise InputError(
             f"{path}: points have {shape.dim} coordinates; labels are for objects in space, leave them out"
@@ -140,8 +140,23 @@ def examine(
     return shape, detection, detection_record(detection, shape, options=options, load_s=load_s)
 
 
-def seen_from(shape: "Shape", viewpoint: tuple[float, ...] | None) -> "Shape":
-    """The shape with the place of the camera, if one is given."""
+def read_scan(path: str, options: dict[str, Any], **picture: Any) -> "Shape":
+    """The shape in a file as `detection_options` say, and `picture`: a depth image, or a cloud that a camera saw."""
+    from symrefine.load import load, load_depth
+
+    known = ("intrinsics", "depth_scale", "mask", "viewpoint", "measure", "labels", "weights")
+    said = {name: given for name in known if (given := options.get(name)) is not None}
+    depth = {name: said.pop(name) for name in ("depth_scale", "mask") if name in said}
+    if "intrinsics" in said:
+        camera = said.pop("intrinsics")
+        idle = [name for name, given in (said | picture).items() if given not in (None, False)]
+        if idle:
+            raise InputError(f"{path}: is read as a depth image, so {_option(idle[0])} does not apply; leave it out")
+        return load_depth(path, camera, **depth)
+    if depth:
+        raise InputError(f"{path}: {_option(next(iter(depth)))} goes with --intrinsics, which make it a depth image")
+    viewpoint = said.pop("viewpoint", None)
+    shape = load(path, **said, **picture)
     if viewpoint is None:
         return shape
     import numpy as np
@@ -149,6 +164,10 @@ def seen_from(shape: "Shape", viewpoint: tuple[float, ...] | None) -> "Shape":
     if shape.dim != 3 or shape.faces is not None:
         raise InputError(f"{shape.source}: --viewpoint is for clouds in space, leave it out")
     return replace(shape, viewpoint=np.array(viewpoint))
+
+
+def _option(name: str) -> str:
+    return "--" + name.replace("_", "-")
 
 
 def _writers(args: argparse.Namespace, shape: "Shape", detection: "Detection") -> dict[str, Writer]:

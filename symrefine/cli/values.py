@@ -46,10 +46,30 @@ def add_scan_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_depth_options(parser: argparse.ArgumentParser) -> None:
+    """The options that make a picture a depth image."""
+    parser.add_argument(
+        "--intrinsics",
+        type=intrinsics,
+        metavar="FX,FY,CX,CY",
+        help="PATH is a depth image (.png of 16 bits, or .npy), taken by a pinhole camera of these, in pixels",
+    )
+    parser.add_argument(
+        "--depth-scale",
+        type=positive,
+        metavar="X",
+        help="lengths in one unit of depth (default: 0.001 for whole numbers, metres of millimetres; else 1)",
+    )
+    parser.add_argument(
+        "--mask", metavar="FILE", help="image of the size of the depth image that is not black where the object is"
+    )
+
+
 def detection_options(args: argparse.Namespace) -> dict[str, Any]:
     """What was chosen of the options of a detection, for its record; names of fields only where one is given."""
     named = {name: given for name in ("labels", "weights") if (given := getattr(args, name, None)) is not None}
-    scan = {name: given for name in ("outliers", "viewpoint") if (given := getattr(args, name, None)) is not None}
+    how = ("outliers", "viewpoint", "intrinsics", "depth_scale", "mask")
+    scan = {name: given for name in how if (given := getattr(args, name, None)) is not None}
     return {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed} | scan | named
 
 
@@ -96,6 +116,16 @@ def place(text: str) -> tuple[float, ...]:
     values = tuple(_float(part) for part in text.split(","))
     if len(values) != 3 or not all(math.isfinite(v) for v in values):
         raise argparse.ArgumentTypeError(f"{text!r} is not a place X,Y,Z of three numbers, such as 0,0,-1.5")
+    return values
+
+
+def intrinsics(text: str) -> tuple[float, ...]:
+    """Focal lengths above 0 and the principal point of a camera, separated by commas."""
+    values = tuple(_float(part) for part in text.split(","))
+    if len(values) != 4 or not all(math.isfinite(v) for v in values) or min(values[:2]) <= 0.0:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not FX,FY,CX,CY in pixels, FX and FY above 0, such as 615,615,320,240"
+        )
     return values
 
 

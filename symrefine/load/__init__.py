@@ -16,7 +16,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from symrefine.errors import InputError, about
+from symrefine.files import file_bytes
 from symrefine.load.content import Content, check_distinct, check_finite
+from symrefine.load.depth import load_depth
 from symrefine.load.gltf import read_glb, read_gltf
 from symrefine.load.image import FORMATS, Threshold, read_image
 from symrefine.load.labels import point_classes, point_weights
@@ -29,7 +31,7 @@ from symrefine.load.stl import read_stl
 from symrefine.load.tables import read_npy, read_npz, read_table, read_xyz
 from symrefine.shape import Shape
 
-__all__ = ["IMAGES", "READERS", "load"]
+__all__ = ["IMAGES", "READERS", "load", "load_depth"]
 
 # A reader gets the bytes of a file, its path where others lie beside it or another program reads it, and of a table of
 # any columns the names of those that it shall take beside coordinates. It says what is wrong, not in which file.
@@ -114,25 +116,13 @@ def _content(file: Path, named: Collection[str], *, threshold: Threshold | None,
     if suffix in IMAGES:
         if named:
             raise InputError("is a picture: labels and weights apply to meshes and clouds only")
-        return read_image(_read(file), suffix, threshold=threshold, invert=invert)
+        return read_image(file_bytes(file), suffix, threshold=threshold, invert=invert)
     images = " ".join(sorted(IMAGES))
     if suffix not in READERS:
         raise InputError(f"unknown suffix {file.suffix!r}; known are {' '.join(READERS)}, and images {images}")
     if threshold is not None or invert:
         raise InputError(f"is no picture: threshold and invert apply to {images} only")
-    return _READERS[suffix](_read(file), file, named)
-
-
-def _read(file: Path) -> bytes:
-    try:
-        data = file.read_bytes()
-    except FileNotFoundError:
-        raise InputError("no such file") from None
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}") from None
-    if not data:
-        raise InputError("is empty (0 bytes)")
-    return data
+    return _READERS[suffix](file_bytes(file), file, named)
 
 
 def _arrays(

@@ -46,7 +46,7 @@ def read_image(data: bytes, suffix: str, *, threshold: Threshold | None, invert:
     Raises:
         InputError: damaged, animated, too large, of one grey value only.
     """
-    grey = _grey(_open(data, suffix))
+    grey = _grey(open_image(data, suffix))
     if np.ptp(grey) == 0.0:
         size = f"{grey.shape[1]} x {grey.shape[0]} pixels"
         raise InputError(f"all {size} have the same grey value {grey.flat[0]:.3g}: there is no object")
@@ -121,7 +121,7 @@ def otsu(grey: Array) -> float:
     return float(edges[1 + best[[0, -1]]].mean())
 
 
-def _open(data: bytes, suffix: str) -> "Image":
+def open_image(data: bytes, suffix: str) -> "Image":
     """The picture as a viewer shows it, complete and undamaged."""
     from PIL import Image, ImageOps, UnidentifiedImageError
 

@@ -115,7 +115,7 @@ def _check_names(names: list[str], line: int) -> bool:
 
 def read_npy(data: bytes) -> Content:
     """Points of n-space: one array [N, n] of real numbers."""
-    points = _numbers(_read_array(io.BytesIO(data)), "the array")
+    points = _numbers(read_array(io.BytesIO(data)), "the array")
     _refuse_hidden_normals(points, "save points and normals in an .npz, or 6-D points as `points` in an .npz")
     _check_shape(points)
     return Content(points=points)
@@ -180,11 +180,12 @@ def _read_archive(data: bytes) -> dict[str, NDArray[Any]]:
     arrays = {}
     for name, member in members.items():
         with about(name):
-            arrays[name.removesuffix(".npy")] = _read_array(io.BytesIO(member))
+            arrays[name.removesuffix(".npy")] = read_array(io.BytesIO(member))
     return arrays
 
 
-def _read_array(stream: io.BytesIO) -> NDArray[Any]:
+def read_array(stream: io.BytesIO) -> NDArray[Any]:
+    """The array of an .npy file, of any type but objects."""
     try:
         array: NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)
     except Exception as error:  # noqa: BLE001 (NumPy evaluates the header: many types; nothing else in the block)
