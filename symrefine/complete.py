@@ -5,18 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from symrefine.clock import Clock
-from symrefine.detection.examination import examined
 from symrefine.detection.measure import Outliers, is_few
 from symrefine.detection.result import Detection
-from symrefine.detection.story import told
+from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Isometry
-from symrefine.groups import PointGroup
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.neighbourhoods import kd_tree
-from symrefine.surface.surface import Surface
 
 # Turns that stand for those of a surface of revolution.
 ROUND = 36
@@ -39,6 +35,19 @@ class Completion:
     detection: Detection
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Verdicts:
+    """What a scan says of its images under the symmetry found in it.
+
+    Attributes:
+        contradicted: [N] which of its points have an image where the scan says that there is nothing.
+        inferred: [K, 3] images where nobody looked, in the units of the scan.
+    """
+
+    contradicted: NDArray[np.bool_]
+    inferred: Array
+
+
 def complete(shape: Shape, *, outliers: Outliers = "auto", tolerance: float = TOLERANCE, seed: int = 0) -> Completion:
     """The points of a scan and their images where nobody looked, under the group that is found in it.
 
@@ -53,36 +62,35 @@ def complete(shape: Shape, *, outliers: Outliers = "auto", tolerance: float = TO
     """
     if shape.faces is not None or shape.dim != 3 or is_few(shape):
         raise InputError(f"{shape.source}: completion is for clouds of the surface of an object in space")
-    clock = Clock()
-    known = examined(shape, outliers=outliers, tolerance=tolerance, seed=seed, clock=clock)
-    found = told(known, tolerance=tolerance, clock=clock)
+    found = detect(shape, outliers=outliers, tolerance=tolerance, seed=seed)
     if found.undetermined or found.point_group == "C1":
         why = found.undetermined or "no symmetry was found"
         raise InputError(f"{shape.source}: nothing to complete it by: {why}")
     seen = np.delete(shape.points, found.outliers, axis=0)
-    local = (seen - found.origin) / found.scale
-    images, contradicted = _images(known.surface, found.group, (found.center - found.origin) / found.scale, local)
-    points = np.concatenate([seen, found.origin + found.scale * images])
+    said = verdicts(found, seen)
+    points = np.concatenate([seen, said.inferred])
     return Completion(
         points=points,
         inferred=np.arange(len(points)) >= len(seen),
-        contradicted=contradicted,
+        contradicted=int(said.contradicted.sum()),
         detection=found,
     )
 
 
-def _images(surface: Surface, group: PointGroup, center: Array, points: Array) -> tuple[Array, int]:
-    """Images of points [N, 3] where nobody looked, and how many points have one where there is nothing."""
+def verdicts(found: Detection, points: Array) -> Verdicts:
+    """What points [N, 3] of the scan in which a group was found say of their images under it."""
+    surface, group = found.surface, found.group
+    center, local = ((x - found.origin) / found.scale for x in (found.center, points))
     every = (group if group.is_finite else group.sampled(ROUND)).operations()
     motions = [Isometry.about(center, m) for m in every if not np.allclose(m, np.eye(3))]
     misses = surface.misses(motions)
     unseen = np.isnan(surface.seen(misses, motions))
-    owner = surface.cloud.tree.query(points)[1] if surface.cloud.labels is None else np.arange(len(points))
-    found: Array = np.empty((0, 3))
+    owner = surface.cloud.tree.query(local)[1] if surface.cloud.labels is None else np.arange(len(local))
+    images: Array = np.empty((0, 3))
     for motion, hidden in zip(motions, unseen, strict=True):
-        new = motion.apply(points[hidden[owner]])
-        if len(found) and len(new):  # where another image lies already, one is enough
-            new = new[kd_tree(found).query(new)[0] > 2.0 * surface.cloud.spacing]
-        found = np.concatenate([found, new])
+        new = motion.apply(local[hidden[owner]])
+        if len(images) and len(new):  # where another image lies already, one is enough
+            new = new[kd_tree(images).query(new)[0] > 2.0 * surface.cloud.spacing]
+        images = np.concatenate([images, new])
     against = np.asarray((~unseen & (misses > surface.far)).any(axis=0))
-    return found, int(against[owner].sum())
+    return Verdicts(contradicted=against[owner], inferred=found.origin + found.scale * images)

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.objects.shapes import asymmetric, bottle, sample, table
+from experiments.objects import damage
+from experiments.objects.shapes import asymmetric, bottle, sample, stool, table
+from symrefine.complete import complete
 from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
 from symrefine.errors import InputError, SymrefineError
-from symrefine.geometry import rotation
+from symrefine.geometry import rotation, unit
 from symrefine.picture.scene import make_scene
 from symrefine.shape import Shape
 from symrefine.viewer import open_recording, opening, record
@@ -141,6 +143,27 @@ def test_same_input_gives_same_content(tilted: Case, tmp_path: Path) -> None:
     other = Shape(points=shape.points[:-1])
     record(detection, other, tmp_path / "other.rrd")
     assert rerun("rrd", "compare", path, tmp_path / "other.rrd").returncode != 0
+
+
+def test_a_scan_shows_what_was_seen_and_what_is_inferred(tmp_path: Path) -> None:
+    made = damage.view(stool(5), unit(np.array([0.5, -0.8, 0.35])), np.random.default_rng(5))
+    detection, shape, path = recorded(Shape(points=made.points, viewpoint=made.viewpoint), tmp_path)
+    assert detection.at_least
+    expected = {f"/object/{name}" for name in ("cloud", "inferred", "cameras", "cameras/free_space", "candidates")}
+    assert expected <= entities(path)
+    counts = {name: len(column(rows(path, f"/object/{name}")[0], "positions")) for name in ("cloud", "inferred")}
+    assert counts["cloud"] <= len(shape.points) - len(detection.outliers)
+    assert counts["inferred"] == len(complete(shape).points) - (len(shape.points) - len(detection.outliers))
+    (eye,) = column(rows(path, "/object/cameras")[0], "positions")
+    np.testing.assert_allclose(eye, made.viewpoint[0] - detection.center, rtol=1e-5)
+
+
+def test_outliers_are_told_apart(tmp_path: Path) -> None:
+    made = damage.outliers(table(), 0.05, np.random.default_rng(6))
+    detection, _, path = recorded(Shape(points=made.points), tmp_path)
+    shown = {name: len(column(rows(path, f"/object/{name}")[0], "positions")) for name in ("cloud", "outliers")}
+    assert shown["outliers"] == len(detection.outliers) > 0
+    assert sum(shown.values()) == len(made.points)
 
 
 def test_no_symmetry_no_iterations(shapeless: Case) -> None:

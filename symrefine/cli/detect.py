@@ -41,7 +41,8 @@ DESCRIPTION = (
     "Find the mirror planes, rotation axes and point group of the mesh or point cloud in PATH (.ply .stl .obj .off "
     ".glb .gltf .pcd .xyz .csv .txt .npy .npz), or the mirror lines and turns of a picture (.png .jpg .jpeg .bmp) or "
     "of points with two coordinates (.csv .txt .npy .npz), or the hyperplanes of symmetry of points with 4 to 8 "
-    "coordinates. With --intrinsics PATH is a depth image. Prints a table; lengths are in the units of the file, misses in percent of the bounding-box diagonal."
+    "coordinates. With --intrinsics PATH is a depth image. Prints a table; lengths are in the units of the file, "
+    "misses in percent of the bounding-box diagonal."
 )
 
 

@@ -10,7 +10,7 @@ from symrefine.ntuples.contract import NTuples
 from symrefine.ntuples.rank import FixedSubspace
 from symrefine.shape import Index
 from symrefine.surface.misses import Deviation
-from symrefine.surface.surface import Coverage
+from symrefine.surface.surface import Coverage, Surface
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,6 +70,19 @@ class NearMiss:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Candidate:
+    """A group that moments or votes proposed, where a glance or a coarse fit left it, in input units.
+
+    `excess` is the smallest tolerance at which it may hold, by a few points, over the tolerance asked for.
+    """
+
+    point_group: str
+    direction: Array
+    point: Array
+    excess: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Detection(ReadOnly):
     """Everything `detect` found, in the frame and units of the input.
 
@@ -95,6 +108,8 @@ class Detection(ReadOnly):
         vectors: the n-tuples themselves, dimensionless.
         history: the iterates of that refinement, in normalised units; `scale` and `origin` undo the normalisation.
         points: [M, 3] the points the refinement used, normalised units.
+        surface: what judged all candidates: these points with normals, noise, and where nobody looked.
+        candidates: what was proposed and given up before a full fit, the nearest misses first.
         outliers: indices, ascending, of the points that were taken as no part of the object.
         at_least: whether the surface has open borders beyond which nobody looked: the object may have more symmetry.
         clumps: how many groups of them stand apart from the body, the others being single strays.
@@ -124,6 +139,8 @@ class Detection(ReadOnly):
     vectors: NTuples
     history: tuple[Iterate, ...]
     points: Array
+    surface: Surface = field(repr=False)
+    candidates: tuple[Candidate, ...]
     outliers: Index
     outlier_share: float
     clumps: int

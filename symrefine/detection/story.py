@@ -12,7 +12,7 @@ from symrefine.decide.hypotheses import Element, Hypothesis
 from symrefine.decide.posterior import NEAR, Decision, alternatives
 from symrefine.detection.examination import Examined, examined
 from symrefine.detection.measure import Outliers
-from symrefine.detection.result import Detection, FoundAxis, FoundPlane, NearMiss, Step
+from symrefine.detection.result import Candidate, Detection, FoundAxis, FoundPlane, NearMiss, Step
 from symrefine.errors import InputError
 from symrefine.fit.refine import Iterate
 from symrefine.geometry import Array, Axis, Plane, cross_matrix
@@ -163,6 +163,16 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
         vectors=measured.vectors,
         history=history,
         points=surface.cloud.points,
+        surface=surface,
+        candidates=tuple(
+            Candidate(
+                point_group=start.group.name,
+                direction=start.group.frame[2],
+                point=origin + scale * start.center,
+                excess=need / tolerance,
+            )
+            for start, need in sorted((*found.pool.looked, *found.pool.hopeless), key=lambda k: k[1])
+        ),
         outliers=outliers,
         outlier_share=len(outliers) / (len(outliers) + measured.count),
         at_least=found.pool.at_least and not reason,

@@ -7,13 +7,16 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
+from symrefine.complete import Verdicts, verdicts
 from symrefine.detection.result import Detection, FoundAxis
 from symrefine.geometry import Array, Plane, ReadOnly, unit
 from symrefine.picture.words import order_name
 from symrefine.shape import Shape
 
 Colour = tuple[int, int, int]
+Mask = NDArray[np.bool_]
 
 # Okabe and Ito's colours, which colour-blind people tell apart too, without those that white swallows.
 PALETTE: tuple[Colour, ...] = (
@@ -22,6 +25,11 @@ PALETTE: tuple[Colour, ...] = (
 OBJECT: Colour = (168, 178, 194)
 AXIS: Colour = (38, 42, 52)
 MISS: Colour = (120, 120, 128)
+# What was seen and agrees is grey like any object; no plane has these.
+INFERRED: Colour = (116, 190, 96)
+CONTRADICTED: Colour = (200, 30, 70)
+# Points that tell how space was seen to be free.
+RAYS = 200
 # How far planes and axes stick out of the object, in diagonals.
 MARGIN, AXIS_MARGIN = 0.06, 0.16
 # Axes this close together are one line with two names.
@@ -124,14 +132,46 @@ class Stage(ReadOnly):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Scan(ReadOnly):
+    """The points of a scan that shows a part of an object.
+
+    Attributes:
+        seen: [N, 3] without outliers.
+        contradicted: [N] which of them have an image where the scan says that there is nothing.
+        inferred: [K, 3] images where nobody looked.
+        rays: [R, 2, 3] from a camera to what it saw: space that is free; none where cameras are not known.
+    """
+
+    seen: Array
+    contradicted: Mask
+    inferred: Array
+    rays: Array
+
+    @property
+    def points(self) -> Array:
+        """[N + K, 3] what was seen, then what is inferred."""
+        return np.concatenate([self.seen, self.inferred])
+
+    @property
+    def colours(self) -> Array:
+        """[N + K, 3] of these points, 0 to 1."""
+        seen = np.where(self.contradicted[:, None], CONTRADICTED, OBJECT)
+        return np.concatenate([seen, np.tile(INFERRED, (len(self.inferred), 1))]) / 255.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Scene:
-    """What there is to draw beside the shape: planes and axes found, and the candidates turned down."""
+    """What there is to draw beside the shape: planes and axes found, and the candidates turned down.
+
+    Of a scan that shows a part of an object, `scan` has what was seen and what is inferred.
+    """
 
     stage: Stage
     planes: tuple[Quad, ...]
     axes: tuple[Line, ...]
     missed_planes: tuple[Quad, ...]
     missed_axes: tuple[Line, ...]
+    scan: Scan | None = None
 
     @property
     def main_axes(self) -> tuple[Line, ...]:
@@ -156,6 +196,26 @@ def make_scene(detection: Detection, shape: Shape) -> Scene:
         axes=_lines(detection, stage),
         missed_planes=missed_planes,
         missed_axes=missed_axes,
+        scan=_scan(detection, shape) if detection.at_least else None,
+    )
+
+
+def _scan(detection: Detection, shape: Shape) -> Scan:
+    """The verdicts on all points; what nothing was found in says nothing of images."""
+    kept = np.setdiff1d(np.arange(len(shape.points)), detection.outliers)
+    seen, rays = shape.points[kept], np.empty((0, 2, 3))
+    if shape.viewpoint is not None:
+        some = slice(None, None, max(1, len(kept) // RAYS))
+        rays = np.stack([shape.viewpoint[kept[some]], seen[some]], axis=1) - detection.center
+    if detection.point_group == "C1":
+        said = Verdicts(contradicted=np.zeros(len(seen), dtype=bool), inferred=seen[:0])
+    else:
+        said = verdicts(detection, seen)
+    return Scan(
+        seen=seen - detection.center,
+        contradicted=said.contradicted,
+        inferred=said.inferred - detection.center,
+        rays=rays,
     )
 
 

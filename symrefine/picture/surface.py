@@ -40,20 +40,26 @@ class Surface(ReadOnly):
 
 
 def make_surface(shape: Shape, scene: Scene) -> Surface:
-    """The shape, or a part of the points of a large cloud; those that lie in a plane have its colour."""
+    """The shape, or a part of the points of a large cloud; those that lie in a plane have its colour.
+
+    Of a scan that shows a part of an object, its points without outliers and what is inferred.
+    """
     stage = scene.stage
     if shape.faces is not None:
         corners, scale = shape.points - stage.center, 0.03 * stage.diagonal
         _, normals = triangle_areas_and_normals(corners, shape.faces)
         plain = _plain(len(normals))
         return Surface(points=corners, normals=normals, colours=plain, faces=shape.faces, radius=0.0, depth_scale=scale)
-    step = max(1, -(-len(shape.points) // MOST_POINTS))
-    points = shape.points[::step] - stage.center
+    every = shape.points - stage.center if scene.scan is None else scene.scan.points
+    step = max(1, -(-len(every) // MOST_POINTS))
+    points = every[::step]
     radius = COVER * stage.diagonal * _spacing(points / stage.diagonal)
+    plain = _plain(len(points)) if scene.scan is None else scene.scan.colours[::step]
+    known = None if scene.scan is not None else shape.normals
     return Surface(
         points=points,
-        normals=_normals(points / stage.diagonal) if shape.normals is None else shape.normals[::step],
-        colours=_tinted(points, scene.planes, 0.9 * radius),
+        normals=_normals(points / stage.diagonal) if known is None else known[::step],
+        colours=_tinted(plain, points, scene.planes, 0.9 * radius),
         faces=None,
         radius=radius,
         depth_scale=0.06 * stage.diagonal,
@@ -64,9 +70,9 @@ def _plain(count: int) -> Array:
     return np.tile(np.array(OBJECT) / 255.0, (count, 1))
 
 
-def _tinted(points: Array, planes: tuple[Quad, ...], width: float) -> Array:
-    """Colours of points: those of the planes they are closer to than `width`."""
-    colours = _plain(len(points))
+def _tinted(plain: Array, points: Array, planes: tuple[Quad, ...], width: float) -> Array:
+    """Colours of points: those of the planes they are closer to than `width`, else the plain ones."""
+    colours = plain.copy()
     for quad in planes:
         near = np.abs((points - quad.corners[0]) @ quad.normal) < width
         if near.mean() < FLAT:

@@ -100,6 +100,13 @@ def scanned(detection: Detection) -> str:
     return " ".join(said for said in (*(f"{t[:1].upper()}{t[1:]}." for t in told if t), unseen) if said)
 
 
+def verdicts_told(detection: Detection) -> str:
+    """What the colours of a scan mean that shows a part of an object; empty of any other."""
+    if not detection.at_least or detection.point_group == "C1":
+        return ""
+    return "Green: inferred, where nobody looked. Red: seen, with an image where the scan says there is nothing."
+
+
 def taken_out(outliers: int, share: float, clumps: int) -> str:
     """How many points were taken as no part of the object, if any: `1,214 points (6 %) taken as outliers`."""
     among = f", {count(clumps, 'clump')} among them" if clumps else ""

@@ -10,7 +10,7 @@ from symrefine.detection.result import Detection
 from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.picture.measures import rms_series, series, turn_series_deg
 from symrefine.picture.rows import found_rows, near_miss_rows
-from symrefine.picture.words import TUPLES, coordinates, fit, headline, meaning, percent, scanned, symbol
+from symrefine.picture.words import TUPLES, coordinates, fit, headline, meaning, percent, scanned, symbol, verdicts_told
 from symrefine.report.charts import bar_chart, line_chart
 from symrefine.report.style import STYLE
 from symrefine.shape import Shape
@@ -72,7 +72,7 @@ def _facts(d: Detection, shape: Shape) -> str:
         ("Confidence", "none" if d.undetermined else f"{d.confidence:.2f}"),
     ]
     if said := scanned(d):
-        facts.append(("Scan", said))
+        facts.append(("Scan", f"{said} {verdicts_told(d)}".rstrip()))
     if d.iterations:
         facts.append(("Iterations", str(d.iterations)))
     items = "".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in facts)

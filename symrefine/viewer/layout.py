@@ -26,7 +26,7 @@ def blueprint(detection: Detection, scene: Scene, scale: float) -> Any:
     refined = len(detection.history) > 1
     views = [_view("Result", scene, scale, ["- /object/refinement/**"])]
     if refined:
-        without = ("cloud", "mesh", "planes/**", "ntuples", "near_misses/**")
+        without = ("cloud", "inferred", "contradicted", "outliers", "mesh", "planes/**", "ntuples", "near_misses/**")
         views.append(_view("Refinement", scene, scale, [f"- /object/{entity}" for entity in without]))
     report = rrb.TextDocumentView(origin="/report", name="Report")
     log = rrb.TextLogView(origin="/log", name="Log")
@@ -41,8 +41,9 @@ def blueprint(detection: Detection, scene: Scene, scale: float) -> Any:
 
 
 def _view(name: str, scene: Scene, scale: float, without: list[str]) -> Any:
-    """A 3-D view from where the scene shows best; near misses, and planes that crowd it, are switched off."""
-    hidden = ["object/near_misses", *(["object/planes", "object/refinement/planes"] if scene.crowded else [])]
+    """A 3-D view from where the scene shows best; what else was tried, cameras, and planes that crowd it are off."""
+    crowd = ("object/planes", "object/refinement/planes") if scene.crowded else ()
+    hidden = ("object/near_misses", "object/candidates", "object/cameras", *crowd)
     camera = look_at(scene, aspect=1.1, fov_rad=FOV_RAD, fill=FILL)
     return rrb.Spatial3DView(
         origin="/",

@@ -24,8 +24,19 @@ from symrefine.geometry import Array, Plane
 from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.picture.measures import series, theta_series_deg, turn_series_deg
 from symrefine.picture.scene import AXIS as DARK
-from symrefine.picture.scene import MISS, OBJECT, Colour, Line, Quad, Scene, make_scene, plane_colour
-from symrefine.shape import Shape
+from symrefine.picture.scene import (
+    CONTRADICTED,
+    INFERRED,
+    MISS,
+    OBJECT,
+    Colour,
+    Line,
+    Quad,
+    Scene,
+    make_scene,
+    plane_colour,
+)
+from symrefine.shape import Index, Shape
 from symrefine.viewer.layout import SERIES, blueprint
 from symrefine.viewer.text import iteration_line, markdown, report_lines
 
@@ -38,6 +49,8 @@ TUPLE: Colour = (240, 228, 66)
 AXIS: Colour = (245, 247, 250)
 OPACITY, MISS_OPACITY = 60, 40
 MATCHED: Colour = (110, 120, 138)
+OUTLIER: Colour = (190, 70, 110)
+RAY: Colour = (70, 90, 80)
 # Radius of a point and length of the longest n-tuple, in diagonals.
 POINT, ARROW = 0.0035, 0.42
 
@@ -80,7 +93,8 @@ def _errors_of_the_system() -> Iterator[None]:
 
 
 def _log(stream: Any, detection: Detection, shape: Shape, scene: Scene) -> None:
-    _log_shape(stream, shape, scene)
+    _log_shape(stream, detection, shape, scene)
+    _log_candidates(stream, detection, scene)
     _log_found(stream, scene)
     _log_tuples(stream, detection, scene)
     _log_refinement(stream, detection, scene)
@@ -100,17 +114,49 @@ def _identity(detection: Detection, shape: Shape) -> str:
     return digest.hexdigest()[:32]
 
 
-def _log_shape(stream: Any, shape: Shape, scene: Scene) -> None:
-    points = (shape.points - scene.stage.center).astype(np.float32)
+def _log_shape(stream: Any, detection: Detection, shape: Shape, scene: Scene) -> None:
     stream.log("object", rr.Transform3D(scale=display_scale(scene)), static=True)
+    points = (shape.points - scene.stage.center).astype(np.float32)
     if shape.faces is None:
-        radius = POINT * scene.stage.diagonal
-        stream.log("object/cloud", rr.Points3D(points, colors=[OBJECT], radii=[radius]), static=True)
+        _log_cloud(stream, points, detection.outliers, scene)
         return
     corners = points[shape.faces].reshape(-1, 3)
     normals = np.repeat(triangle_areas_and_normals(points, shape.faces)[1], 3, axis=0)
     mesh = rr.Mesh3D(vertex_positions=corners, vertex_normals=normals, albedo_factor=[*OBJECT, 255])
     stream.log("object/mesh", mesh, static=True)
+
+
+def _log_cloud(stream: Any, points: Array, outliers: Index, scene: Scene) -> None:
+    """Points by what is known of them; of an incomplete scan also those that are inferred, and what cameras saw."""
+    parts = {"cloud": (np.delete(points, outliers, axis=0), OBJECT), "outliers": (points[outliers], OUTLIER)}
+    if scan := scene.scan:
+        parts["cloud"] = (scan.seen[~scan.contradicted], OBJECT)
+        parts |= {
+            "contradicted": (scan.seen[scan.contradicted], _bright(CONTRADICTED)),
+            "inferred": (scan.inferred, _bright(INFERRED)),
+            "cameras": (np.unique(scan.rays[:, 0], axis=0), AXIS),
+        }
+        if len(scan.rays):
+            rays = rr.LineStrips3D(list(scan.rays), colors=[RAY], radii=[_pixels(0.4)])
+            stream.log("object/cameras/free_space", rays, static=True)
+    for name, (some, colour) in parts.items():
+        if len(some):
+            seen = rr.Points3D(some, colors=[colour], radii=[POINT * scene.stage.diagonal])
+            stream.log(f"object/{name}", seen, static=True)
+
+
+def _log_candidates(stream: Any, detection: Detection, scene: Scene) -> None:
+    """What was proposed and given up, as lines: of a mirror a piece of its normal; the darker, the worse it looked."""
+    size, lines, colours = scene.stage.diagonal, [], []
+    for found in detection.candidates:
+        foot = found.point - scene.stage.center
+        half = 0.5 * size if found.point_group != "Cs" else 0.06 * size
+        lines.append([foot - half * found.direction, foot + half * found.direction])
+        share = 1.0 / max(found.excess, 1.0)
+        colours.append([round(b + share * (t - b)) for b, t in zip(MISS, TUPLE, strict=True)])
+    if lines:
+        proposed = rr.LineStrips3D(lines, colors=colours, radii=[_pixels(0.8)])
+        stream.log("object/candidates", proposed, static=True)
 
 
 def _log_found(stream: Any, scene: Scene) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from symrefine.detection.result import Detection
 from symrefine.fit.refine import Iterate
 from symrefine.picture.rows import found_rows, near_miss_rows
-from symrefine.picture.words import TUPLES, coordinates, fit, headline, percent, scanned
+from symrefine.picture.words import TUPLES, coordinates, fit, headline, percent, scanned, verdicts_told
 from symrefine.shape import Shape
 from symrefine.surface.misses import Deviation
 
@@ -14,7 +14,8 @@ from symrefine.surface.misses import Deviation
 def markdown(detection: Detection, shape: Shape) -> str:
     """The report as a page."""
     d = detection
-    parts = [f"# {headline(d)}", " ".join([f"`{shape.source}`.", fit(d), scanned(d)]).replace("  ", " ").rstrip()]
+    told = (f"`{shape.source}`.", fit(d), scanned(d), verdicts_told(d))
+    parts = [f"# {headline(d)}", " ".join(said for said in told if said)]
     found = [(r.name, r.kind, r.vector, *_misses(r.residual)) for r in found_rows(d)]
     if found:
         parts.append(_table(("", "kind", "normal or direction", "mean %", "95 %"), found))
