@@ -121,10 +121,13 @@ def _ends_there(surface: Surface, found: Hypothesis) -> bool:
 
 
 def _left_over(seen: Hypothesis, found: Hypothesis) -> bool:
-    """Whether one hole or cut in a body with the symmetry found leaves what is seen: a mirror of what is round."""
-    return not found.placed.group.is_finite and seen.placed.group.name in (
-        ("Cinfv", "Cs") if found.placed.group.name == "Kh" else ("Cs",)
-    )
+    """Whether one hole or cut in a body with the symmetry found easily leaves what is seen: mirrors through its middle.
+
+    A hole is round, so that of a group only what keeps its middle is left; of a ball, all about it.
+    """
+    if not seen.group.is_finite:
+        return (seen.group.name, found.group.name) == ("Cinfv", "Kh")
+    return seen.group.name == "Cs" or (seen.group.symbol.family in ("C", "Cv") and found.group.is_finite)
 
 
 def _of_whole(surface: Surface, evidence: Evidence, limit: float) -> Pool:
@@ -273,6 +276,8 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
         if found is None:
             rest = [h for h in rest if h not in batch]
             continue
+        # What holds together holds in every part of it, though a part alone may not tell what was not seen.
+        found = replace(found, need=min([found.need, *(h.need for h in known if h.holds(found.placed))]))
         links.append(replace(found, need=max(found.need, here.need)))
         if found.need > limit:
             break

@@ -137,9 +137,9 @@ def fitted(surface: Surface, start: Placed, *, before: int = 0) -> Hypothesis:
             partly = tuple(replace(e, need=math.hypot(e.need, b)) for e, b in zip(partly, beliefs, strict=True))
             # More than half of the operations of a group generate it (Lagrange), so that the others follow.
             partial = math.hypot(partial, sorted(beliefs)[len(beliefs) // 2])
-        # What is unseen under no element by more than a detail is rather that: a flag, on one side.
+        # Where it is not sure that anything was missed, what is unseen by no more than a detail is rather that: a flag.
         most = max(e.coverage.unseen for e in partly)
-        if partial < need and (surface.openings.cameras or most > SHARES[1]):
+        if partial < need and (surface.openings.evident or most > SHARES[1]):
             found, need = partly, partial
     return Hypothesis(placed=placed, elements=found, need=need, history=history, before=before)
 
