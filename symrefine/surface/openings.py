@@ -91,7 +91,8 @@ class Openings:
         at_border = there & ~here
         # A border that is carried onto a border says nothing: there the object may end on both sides.
         both = np.bincount(own, there & here, len(moved))
-        free = MOST * np.bincount(own, at_border, len(moved)) > np.bincount(own, minlength=len(moved)) - both
+        every = np.bincount(own, minlength=len(moved))
+        free = (MOST * np.bincount(own, at_border, len(moved)) >= every - both) & (every > 0)
         found = away & free[patch]
         # What lies next to such a patch already reaches beyond the border.
         found[other[begins][free[own] & at_border]] = True
