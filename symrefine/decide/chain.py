@@ -39,10 +39,14 @@ SUPPORTED = 0.15
 # Share of its open borders that a group carries onto open borders where the object ends there: flat plates 1, mugs 0.75
 # and more, chance up to 0.6.
 KEPT = 2.0 / 3.0
+# Mirrors or axes of a group from which on a hole often lies on one of them by chance, and its border is kept by that.
+PLACES = 3
 # A coarse fit on few points may need so many times what a fine one does.
 COARSE = 3.5
 # Needs within this factor are the same, as the elements of a true group miss alike.
 ALIKE = 1.5
+# Candidates of a surface with openings that are looked at: where little was seen many seem possible at a glance.
+LOOKED = 24
 # Candidates turned down after a look that are fitted all the same where nothing else was: the nearest misses.
 TOLD = 2
 # Elements that are joined one by one, where all of a level together make no group.
@@ -101,7 +105,7 @@ def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
     if surface.openings is None:
         return whole
     part = _of_part(surface, whole, limit)
-    if not _ends_there(surface, whole.largest) or _left_over(whole.largest, part.largest):
+    if not _ends_there(surface, whole.largest) or _places(whole.largest, part.largest) >= PLACES:
         return replace(part, at_least=True)
     if _size(part.largest.placed) <= _size(whole.largest.placed):
         return replace(whole, at_least=surface.openings.evident)
@@ -120,14 +124,18 @@ def _ends_there(surface: Surface, found: Hypothesis) -> bool:
     return bool(near) and float(np.median([surface.openings.border[n].mean() for n in near])) > KEPT
 
 
-def _left_over(seen: Hypothesis, found: Hypothesis) -> bool:
-    """Whether one hole or cut in a body with the symmetry found easily leaves what is seen: mirrors through its middle.
+def _places(seen: Hypothesis, found: Hypothesis) -> float:
+    """Mirrors or axes of a group through which a hole leaves the symmetry that is seen: a hole is round.
 
-    A hole is round, so that of a group only what keeps its middle is left; of a ball, all about it.
+    So what is left keeps its middle: one mirror, or the turns and mirrors about an axis; of what is round, any mirror.
     """
+    if seen.group.name == "Cs":
+        return len(found.group.mirrors()) if found.group.is_finite else math.inf
     if not seen.group.is_finite:
-        return (seen.group.name, found.group.name) == ("Cinfv", "Kh")
-    return seen.group.name == "Cs" or (seen.group.symbol.family in ("C", "Cv") and found.group.is_finite)
+        return math.inf if (seen.group.name, found.group.name) == ("Cinfv", "Kh") else 1.0
+    if seen.group.symbol.family not in ("C", "Cv") or not found.group.is_finite:
+        return 1.0
+    return sum(order % seen.group.symbol.fold == 0 for _, order in found.group.rotation_axes())
 
 
 def _of_whole(surface: Surface, evidence: Evidence, limit: float) -> Pool:
@@ -168,7 +176,8 @@ def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tup
     """The starts that are new with what they seem to need at a glance, large groups that look good first."""
     new = [s for s in starts if not pool.has(s, exact_need(surface.floor))]
     seen = zip(new, glances(surface, new, _hopeless(surface)), strict=True)
-    return sorted(seen, key=lambda k: k[1] / math.log2(1.0 + _size(k[0])))
+    best = sorted(seen, key=lambda k: k[1] / math.log2(1.0 + _size(k[0])))
+    return best if surface.openings is None else best[:LOOKED]
 
 
 def _size(placed: Placed) -> float:

@@ -117,31 +117,52 @@ def start_error(surface: Surface) -> float:
 
 
 def fitted(surface: Surface, start: Placed, *, before: int = 0) -> Hypothesis:
-    """The group fitted as a whole from where it stands, and judged."""
+    """The group fitted as a whole from where it stands, and judged.
+
+    Of a surface with openings it may stay where it stands: what lies behind them is matched with what does not.
+    """
     state = start.framed()
     stride = surface.stride(_moved_each(len(state.standard)))
     history = tuple(refine(surface.cloud, state, start_error_rad=START_ERROR, stride=stride))
-    placed = start.moved(history[-1].state)
+    found = _placed(surface, start.moved(history[-1].state), history, before)
+    if surface.openings is None or found.need <= exact_need(surface.floor):
+        return found
+    return min(found, _placed(surface, start, history[:1], before), key=lambda h: h.need)
+
+
+def _placed(surface: Surface, placed: Placed, history: tuple[Iterate, ...], before: int) -> Hypothesis:
+    """A group judged where a fit put it."""
     parts = [(part, part.motions(placed.center)) for part in elements(placed.group)]
     sources = _moved_each(len(parts))
     misses = [surface.misses(motions, sources=sources) for _, motions in parts]
     found, need = _all_judged(surface, parts, misses, placed.center)
     if surface.openings is not None and need > exact_need(surface.floor):
         # What holds without it asks for no belief in anything unseen.
-        seen = [surface.seen(m, motions, sources=sources) for m, (_, motions) in zip(misses, parts, strict=True)]
-        partly, partial = _all_judged(surface, parts, seen, placed.center)
-        if not surface.openings.cameras:  # they say what they could not see
-            # A lone mirror is forgiven more for being made inexactly, not for what nobody saw of it.
-            whole = surface.tolerance * (EVEN_MIRROR / EVEN if placed.group.name == "Cs" else 1.0)
-            beliefs = [whole * _belief(e) for e in partly]
-            partly = tuple(replace(e, need=math.hypot(e.need, b)) for e, b in zip(partly, beliefs, strict=True))
-            # More than half of the operations of a group generate it (Lagrange), so that the others follow.
-            partial = math.hypot(partial, sorted(beliefs)[len(beliefs) // 2])
-        # Where it is not sure that anything was missed, what is unseen by no more than a detail is rather that: a flag.
+        partly, partial = _seen_judged(surface, parts, misses, placed)
+        # What is unseen under no element by more than a detail is rather that: a flag, on one side.
         most = max(e.coverage.unseen for e in partly)
-        if partial < need and (surface.openings.evident or most > SHARES[1]):
+        if partial < need and (surface.openings.cameras or most > SHARES[1]):
             found, need = partly, partial
     return Hypothesis(placed=placed, elements=found, need=need, history=history, before=before)
+
+
+def _seen_judged(
+    surface: Surface, parts: Sequence[tuple[Operations, tuple[Isometry, ...]]], misses: Sequence[Array], placed: Placed
+) -> tuple[tuple[Element, ...], float]:
+    """The elements of a group by what was seen of them, and what all of them need with the belief in the rest."""
+    sources = _moved_each(len(parts))
+    seen = [surface.seen(m, motions, sources=sources) for m, (_, motions) in zip(misses, parts, strict=True)]
+    found, need = _all_judged(surface, parts, seen, placed.center)
+    if surface.openings is None or surface.openings.cameras:  # they say what they could not see
+        return found, need
+    # A lone mirror is forgiven more for being made inexactly, not for what nobody saw of it.
+    whole = surface.tolerance * (EVEN_MIRROR / EVEN if placed.group.name == "Cs" else 1.0)
+    beliefs = [whole * _belief(e) for e in found]
+    # More than half of the operations of a group generate it (Lagrange), so that the others follow.
+    return (
+        tuple(replace(e, need=math.hypot(e.need, b)) for e, b in zip(found, beliefs, strict=True)),
+        math.hypot(need, sorted(beliefs)[len(beliefs) // 2]),
+    )
 
 
 def exact_need(floor: float) -> float:

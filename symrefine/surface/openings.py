@@ -72,12 +72,15 @@ class Openings:
             stride: of the local planes.
             margin: by how much space has to be free.
         """
+        one, other = self.linked(cloud, stride)
         if self.cameras:
             found = away.copy()
             for camera in self.cameras:
                 found[found] = ~camera.sees_through(moved[found], margin)
-            return found
-        one, other = self.linked(cloud, stride)
+            # What meets the surface next to it already reaches beyond what was seen.
+            beyond = np.zeros_like(found)
+            beyond[other[found[one]]] = True
+            return found | (beyond & ~away)
         leave = away[one]
         begins = leave & ~away[other]
         if not begins.any():
