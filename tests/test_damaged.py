@@ -155,6 +155,13 @@ def test_what_is_closed_has_no_borders(make):
     assert all(p.coverage.unseen == 0.0 for p in found.planes)
 
 
+def test_a_cut_that_one_of_many_mirrors_keeps_hides_no_other():
+    """Its border is carried onto itself by that mirror, as what a sensor leaves out is by chance."""
+    made, truth = damaged.damaged(damaged.Case(family="shape", name="starfish", kind="cut", strength=0.2, seed=21))
+    found = detect(made.points)
+    assert (found.point_group, found.at_least) == (truth.group.name, True)
+
+
 @pytest.mark.parametrize(("make", "group"), [(table, "C4v"), (lambda: BRICK, "D2h"), (bottle, "Cinfv")])
 @pytest.mark.parametrize("kind", ["hole", "cut"])
 def test_missing_surface_is_no_evidence_against(make, group, kind):
