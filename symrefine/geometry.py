@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from symrefine.errors import InputError
 
 Array = NDArray[np.floating[Any]]
+Mask = NDArray[np.bool_]
 # Beyond a fifth of the diagonal everything is symmetric.
 LARGEST_TOLERANCE = 0.2
 

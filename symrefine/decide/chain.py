@@ -286,8 +286,8 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
             rest = [h for h in rest if h not in batch]
             continue
         # What holds together holds in every part of it, though a part alone may not tell what was not seen.
-        found = replace(found, need=min([found.need, *(h.need for h in known if h.holds(found.placed))]))
-        links.append(replace(found, need=max(found.need, here.need)))
-        if found.need > limit:
+        need = min([found.need, *(h.need for h in known if h.holds(found.placed))])
+        links.append(replace(found, need=max(need, here.need)))
+        if need > limit:
             break
     return tuple(links)

@@ -7,16 +7,14 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symrefine.complete import Verdicts, verdicts
 from symrefine.detection.result import Detection, FoundAxis
-from symrefine.geometry import Array, Plane, ReadOnly, unit
+from symrefine.geometry import Array, Mask, Plane, ReadOnly, unit
 from symrefine.picture.words import order_name
 from symrefine.shape import Shape
 
 Colour = tuple[int, int, int]
-Mask = NDArray[np.bool_]
 
 # Okabe and Ito's colours, which colour-blind people tell apart too, without those that white swallows.
 PALETTE: tuple[Colour, ...] = (

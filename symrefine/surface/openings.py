@@ -9,15 +9,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from symrefine.geometry import Array
+from symrefine.geometry import Array, Mask
 from symrefine.shape import Index
 from symrefine.surface.cameras import Camera
 from symrefine.surface.neighbourhoods import FLAT, WIDEST, Neighbourhoods, connected_parts, fit_planes, kd_tree
 from symrefine.surface.skin import LocalPlanes
 
-Mask = NDArray[np.bool_]
 # Neighbours that tell a border: the middle of half a disc lies 0.75 of its width off the point, that of a whole disc 0,
 # with a standard deviation of 0.12 for so many. At the edge of a solid it is 0.4, but the neighbourhood is bent there:
 # more than so many times as thick as most.

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from symrefine.geometry import Array
+from symrefine.geometry import Array, Mask
 from symrefine.shape import Index
 from symrefine.surface.misses import SHARES
 from symrefine.surface.neighbourhoods import (
@@ -25,7 +24,6 @@ from symrefine.surface.neighbourhoods import (
     sums_of,
 )
 
-Mask = NDArray[np.bool_]
 # Points that are asked first, and neighbours that tell of the surroundings of a point.
 ASKED, AROUND = 5000, 16
 # A stray has its neighbours so many times as far away as half of the points have theirs: what 8 neighbours vary by on
@@ -223,7 +221,7 @@ def filled(points: Array, around: Surroundings, rng: np.random.Generator) -> lis
     one, other = np.repeat(np.arange(len(within)), AROUND), around.near.ravel()
     inside = within[one] & within[other]
     part = np.where(within, connected_parts(one[inside], other[inside], len(within)), -1)
-    small = [m for k in np.flatnonzero(_small(np.bincount(part + 1)[1:], len(part))) for m in (part == k,)]
+    small = [part == k for k in np.flatnonzero(_small(np.bincount(part + 1)[1:], len(part)))]
     if not small:
         return []
     tree = kd_tree(points)
