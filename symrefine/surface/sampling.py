@@ -175,16 +175,21 @@ def _alone(around: Surroundings) -> Mask:
     sparse = np.flatnonzero(reach > FAR * np.median(reach)) if np.median(reach) > 0.0 else np.empty(0, dtype=np.int64)
     found = np.zeros(len(points), dtype=bool)
     if sparse.size:
-        sums = sums_of(points[around.near[sparse].ravel()]).reshape(len(sparse), AROUND, -1).sum(axis=1)
-        mean, normals, variances = fit_planes(sums)
+        mean, normals, thick = _planes(around, sparse)
         across = np.abs(np.einsum("ni,ni->n", normals, points[sparse] - mean))
-        thick = np.sqrt(variances[:, 0] / np.maximum(variances[:, 2], 1e-300))
         loose = (thick > FLAT) | (across > FLAT * around.away[sparse, -1])
         # As random points are among themselves, or far from what is dense around: thin parts, sampled sparsely, are not
         if not _scattered(points[sparse[loose]], np.ptp(points, axis=0)):
             loose &= reach[sparse] > FAR * reach[around.near[sparse]].min(axis=1)
         found[sparse] = loose
     return found
+
+
+def _planes(around: Surroundings, some: Index | slice) -> tuple[Array, Array, Array]:
+    """Means and normals, each [K, 3], of what is around some points, and how thick [K] that is over how wide."""
+    near = around.near[some]
+    mean, normals, variances = fit_planes(sums_of(around.points[near.ravel()]).reshape(*near.shape, -1).sum(axis=1))
+    return mean, normals, np.sqrt(variances[:, 0] / np.maximum(variances[:, 2], 1e-300))
 
 
 def _scattered(points: Array, box: Array) -> bool:
@@ -267,12 +272,17 @@ def _members(points: Array, around: Surroundings, groups: list[Mask]) -> list[In
 
 
 def _is_uneven(around: Surroundings) -> bool:
-    """Whether the density falls off along some direction, as that of a scanner does; it is what shifts moments."""
+    """Whether the density falls off along some direction, as that of a scanner does; it is what shifts moments.
+
+    Told by flat neighbourhoods where there are any: how far away others are is a matter of shape on thin parts.
+    """
     area = _area(around)
     if not area.all() or np.median(around.away[:, -1]) > WIDEST:
         return False  # points are repeated, or so few that the shape decides how far away their neighbours are
-    place = np.column_stack([np.ones(len(area)), around.points - around.points.mean(axis=0)])
-    trend = place @ np.linalg.lstsq(place, np.log(area), rcond=None)[0]
+    flat = _planes(around, slice(None))[2] < FLAT
+    told = flat if flat.sum() > AROUND else np.ones_like(flat)
+    place = np.column_stack([np.ones(told.sum()), around.points[told] - around.points[told].mean(axis=0)])
+    trend = place @ np.linalg.lstsq(place, np.log(area[told]), rcond=None)[0]
     return bool(trend.std() > UNEVEN)
 
 
