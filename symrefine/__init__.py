@@ -9,14 +9,19 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from symrefine.align.story import Alignment as Alignment
-    from symrefine.align.story import align as align
-    from symrefine.complete import complete as complete
-    from symrefine.detection.result import Detection as Detection
-    from symrefine.detection.story import detect as detect
     from symrefine.errors import DegenerateShapeError as DegenerateShapeError
     from symrefine.errors import InputError as InputError
     from symrefine.errors import SymrefineError as SymrefineError
+    from symrefine.front.aligned import Alignment as Alignment
+    from symrefine.front.beyond import SubspaceDetection as SubspaceDetection
+    from symrefine.front.planar import PlanarDetection as PlanarDetection
+    from symrefine.front.space import Detection as Detection
+    from symrefine.front.verbs import align as align
+    from symrefine.front.verbs import complete as complete
+    from symrefine.front.verbs import detect as detect
+    from symrefine.front.verbs import export as export
+    from symrefine.front.verbs import report as report
+    from symrefine.front.verbs import symmetrize as symmetrize
     from symrefine.geometry import Axis as Axis
     from symrefine.geometry import Plane as Plane
     from symrefine.groups import PointGroup as PointGroup
@@ -31,14 +36,15 @@ if TYPE_CHECKING:
 # Where each public name comes from.
 _HOMES = {
     "symrefine.load": ("load", "load_depth"),
-    "symrefine.detection.story": ("detect",),
-    "symrefine.complete": ("complete",),
-    "symrefine.align.story": ("align", "Alignment"),
+    "symrefine.front.verbs": ("detect", "align", "symmetrize", "complete", "export", "report"),
+    "symrefine.front.space": ("Detection",),
+    "symrefine.front.planar": ("PlanarDetection",),
+    "symrefine.front.beyond": ("SubspaceDetection",),
+    "symrefine.front.aligned": ("Alignment",),
     "symrefine.ntuples.derive": ("derive",),
     "symrefine.shape": ("Shape",),
     "symrefine.geometry": ("Plane", "Axis"),
     "symrefine.groups": ("PointGroup", "point_group"),
-    "symrefine.detection.result": ("Detection",),
     "symrefine.errors": ("SymrefineError", "InputError", "DegenerateShapeError"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
@@ -65,7 +71,7 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)
 
 
 sys.modules[__name__].__class__ = _FrontPage

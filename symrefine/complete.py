@@ -48,11 +48,19 @@ class Verdicts:
     inferred: Array
 
 
-def complete(shape: Shape, *, outliers: Outliers = "auto", tolerance: float = TOLERANCE, seed: int = 0) -> Completion:
+def complete(
+    shape: Shape,
+    found: Detection | None = None,
+    *,
+    outliers: Outliers = "auto",
+    tolerance: float = TOLERANCE,
+    seed: int = 0,
+) -> Completion:
     """The points of a scan and their images where nobody looked, under the group that is found in it.
 
     Args:
         shape: a cloud in 3-space, with its viewpoint where that is known.
+        found: what `detect` found in it; the options that follow are those of `detect` where this is None.
         outliers: as of `detect`.
         tolerance: as of `detect`.
         seed: as of `detect`.
@@ -62,7 +70,7 @@ def complete(shape: Shape, *, outliers: Outliers = "auto", tolerance: float = TO
     """
     if shape.faces is not None or shape.dim != 3 or is_few(shape):
         raise InputError(f"{shape.source}: completion is for clouds of the surface of an object in space")
-    found = detect(shape, outliers=outliers, tolerance=tolerance, seed=seed)
+    found = detect(shape, outliers=outliers, tolerance=tolerance, seed=seed) if found is None else found
     if found.undetermined or found.point_group == "C1":
         why = found.undetermined or "no symmetry was found"
         raise InputError(f"{shape.source}: nothing to complete it by: {why}")

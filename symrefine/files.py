@@ -6,12 +6,15 @@ A file that grows row by row has one writer at a time.
 import json
 import os
 import secrets
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 from symrefine.errors import InputError
+
+# A writer fills the file it is given.
+Writer = Callable[[Path], object]
 
 
 def check_target(path: Path) -> None:
@@ -78,6 +81,14 @@ def naming(name: str) -> Iterator[None]:
         if not isinstance(reason, OSError):
             raise
         raise InputError(f"{name}: cannot be written: {reason.strerror or reason}") from reason
+
+
+def write_all(writers: Mapping[str, Writer]) -> None:
+    """Write every file under another name first; only when all are complete does each take its place."""
+    with ExitStack() as stack:
+        for name, write in writers.items():
+            stack.enter_context(naming(name))
+            write(stack.enter_context(replacing(Path(name))))
 
 
 def json_text(data: Mapping[str, Any]) -> str:

@@ -58,6 +58,11 @@ def toward_positive(direction: Array) -> float:
     return float(np.copysign(1.0, direction[int(np.argmax(size >= 0.1 * size.max()))]))
 
 
+def positive(direction: Array) -> Array:
+    """A direction with the sign of `toward_positive`: every result, record and table has its directions so."""
+    return toward_positive(direction) * direction + 0.0  # no -0.0
+
+
 def _length(vector: ArrayLike, name: str) -> float:
     """Length of a vector that is to be a direction."""
     length = float(np.linalg.norm(vector))

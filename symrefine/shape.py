@@ -1,6 +1,6 @@
 """Shape: what every source of data becomes before any mathematics sees it."""
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -15,20 +15,20 @@ Index = NDArray[np.integer[Any]]
 CAMERAS = 64
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class Shape:
-    """Weighted points in n-space, with normals or triangles where the source has them.
+    """Weighted points in n-space, with normals or triangles where the source has them: `Shape(points, faces)`.
 
     Args:
         points: [N, n] finite coordinates in the units of the input; the vertices, for a mesh.
+        faces: [F, 3] vertex indices of a triangle mesh in 3-space, or None.
         weights: [N] non-negative, not all zero; equal if absent. A mesh takes its weights from its measure.
         normals: [N, n], any length but zero, any sign; estimated where needed if absent.
-        faces: [F, 3] vertex indices of a triangle mesh in 3-space, or None.
         labels: [N] integers for a cloud, [F] for a mesh: classes (elements, colours, materials) that a symmetry must
             keep; one class if absent.
         viewpoint: [3] or [N, 3] place of the camera that saw the points of a cloud, or each of them; 64 places at most.
             Beside the outline of what it saw it saw that there is nothing: not for what the edge of a picture cuts off.
-        measure: "points" for a cloud; "surface" or "solid" for a mesh: what carries the mass.
+        measure: "points" for a cloud; "surface" (if None) or "solid" for a mesh: what carries the mass.
         source: where the data came from, for messages.
 
     Raises:
@@ -37,12 +37,13 @@ class Shape:
     """
 
     points: Array
+    faces: Index | None = None
+    _: KW_ONLY
     weights: Array | None = None
     normals: Array | None = None
-    faces: Index | None = None
     labels: Index | None = None
     viewpoint: Array | None = None
-    measure: Measure = "points"
+    measure: Measure = None  # type: ignore[assignment]  # never None once made
     source: str = "array"
 
     def __post_init__(self) -> None:
@@ -61,13 +62,7 @@ class Shape:
             if self.faces is not None:
                 raise InputError(f"{self.source}: a viewpoint is for clouds, not for meshes")
             object.__setattr__(self, "viewpoint", _viewpoint(self.viewpoint, points.shape, self.source))
-        if self.measure not in get_args(Measure):
-            raise InputError(f"{self.source}: measure is {self.measure!r}; expected one of {list(get_args(Measure))}")
-        if (self.faces is None) != (self.measure == "points"):
-            raise InputError(
-                f"{self.source}: measure is {self.measure!r}, but a cloud has measure 'points' "
-                "and a mesh has 'surface' or 'solid'"
-            )
+        object.__setattr__(self, "measure", _measure(self.measure, self.faces, self.source))
         if np.ptp(points, axis=0).max() == 0.0:
             raise DegenerateShapeError(
                 f"{self.source}: all {len(points)} points coincide; a shape needs at least two distinct points"
@@ -98,9 +93,22 @@ class Shape:
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
 
+def _measure(measure: str | None, faces: Index | None, source: str) -> str:
+    """What carries the mass, where that was not said: the surface of a mesh, the points of a cloud."""
+    if measure is None:
+        return "points" if faces is None else "surface"
+    if measure not in get_args(Measure):
+        raise InputError(f"{source}: measure is {measure!r}; expected one of {list(get_args(Measure))}")
+    if (faces is None) != (measure == "points"):
+        raise InputError(
+            f"{source}: measure is {measure!r}, but a cloud has measure 'points' and a mesh has 'surface' or 'solid'"
+        )
+    return measure
+
+
 def _numbers(values: ArrayLike, name: str, source: str) -> Array:
     try:
-        array = np.asarray(values)
+        array = _unmasked(values, name, source)
         if np.iscomplexobj(array):
             raise InputError(f"{source}: {name} are complex; expected real numbers")
         return array.astype(np.float64)
@@ -108,6 +116,12 @@ def _numbers(values: ArrayLike, name: str, source: str) -> Array:
         raise
     except (TypeError, ValueError) as error:
         raise InputError(f"{source}: {name} are not numbers in rows of one length: {error}") from None
+
+
+def _unmasked(values: ArrayLike, name: str, source: str) -> NDArray[Any]:
+    if np.ma.isMaskedArray(values):
+        raise InputError(f"{source}: {name} are a masked array; give the rows that count alone, without a mask")
+    return np.asarray(values)
 
 
 def _matrix(values: ArrayLike, name: str, source: str) -> Array:
@@ -147,7 +161,7 @@ def _viewpoint(values: ArrayLike, shape: tuple[int, ...], source: str) -> Array:
 
 
 def _labels(values: ArrayLike, count: int, what: str, source: str) -> Index:
-    array = np.asarray(values)
+    array = _unmasked(values, "labels", source)
     if not np.issubdtype(array.dtype, np.integer):
         raise InputError(f"{source}: labels are {array.dtype}; expected integers, one class for each {what}")
     if array.shape != (count,):

@@ -434,8 +434,8 @@ BAD_TEXT = [
     ("a.ply", GOOD_PLY.replace("3 0 2 1", "3 0 2"), "line 15: '3 0 2'; expected a row of element 'face': LENGTH"),
     ("a.ply", GOOD_PLY.replace("3 0 2 1", "3 0 2 x"), "line 15, column 4: 'x' is not a number"),
     ("a.ply", GOOD_PLY.replace("3 0 2 1", "3 0 2 1.5"), "face 0 (line 15) refers to vertex 1.5; expected whole"),
-    ("a.ply", GOOD_PLY.replace("3 0 2 1", "3 0 2 4"), "face 0 (line 15) refers to vertex 4; the file has 4 vert"),
-    ("a.ply", GOOD_PLY.replace("3 0 2 1", "3 0 2 -1"), "refers to vertex -1; the file has 4 vertices, numbered 0 to 3"),
+    ("a.ply", GOOD_PLY.replace("3 0 2 1", "3 0 2 4"), "face 0 (line 15) refers to vertex 4; there are 4 vert"),
+    ("a.ply", GOOD_PLY.replace("3 0 2 1", "3 0 2 -1"), "refers to vertex -1; there are 4 vertices, numbered 0 to 3"),
     ("a.ply", GOOD_PLY.replace("3 0 2 1", "2 0 2"), "face 0 (line 15) has 2 corners; expected at least 3"),
     ("a.ply", GOOD_PLY.replace("1000000.123456789", "nan"), "point 0 (line 11) is [nan, 1000000.0, 1000000.0] (1 such"),
     ("a.ply", GOOD_PLY.replace("1000000.123456789", "-inf"), "coordinates must be finite"),
@@ -450,7 +450,7 @@ BAD_TEXT = [
     ("a.obj", "v 0 0 0\nv 1 0 0\nvn 0 0 1\n", "1 normal (vn) for 2 points (v)"),
     ("a.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n", "line 3: lines but no faces"),
     ("a.obj", TETRA_TEXT, "line 1: '1000000.123456789' is no statement"),
-    ("a.obj", obj(TETRA, [[0, 1, 8]]), "face 1 (line 5) refers to vertex 9; the file has 4 vertices, numbered 1 to 4"),
+    ("a.obj", obj(TETRA, [[0, 1, 8]]), "face 1 (line 5) refers to vertex 9; there are 4 vertices, numbered 1 to 4"),
     ("a.obj", obj(TETRA, [[0, 1, -1]]), "line 5: a face refers to vertex 0; vertices count from 1, or back from -1"),
     ("a.obj", obj(TETRA, [[0, 1, -9]]), "line 5: a face refers to vertex -8"),
     ("a.obj", obj(TETRA) + b"f 1 2 x\n", "line 5: 'x' is no corner; expected v, v/vt or v/vt/vn"),
@@ -572,7 +572,7 @@ def test_binary_ply_whose_header_lies(tmp_path: Path, kind: str) -> None:
         in refusal(tmp_path, "a.ply", data.replace(b"vertex 4", b"vertex 99999999999"))[:99] + "only 8 are there"
     )
     out = ply(kind, TETRA, [[0, 1, 7]])
-    assert "face 0 refers to vertex 7; the file has 4 vertices, numbered 0 to 3" in refusal(tmp_path, "a.ply", out)
+    assert "face 0 refers to vertex 7; there are 4 vertices, numbered 0 to 3" in refusal(tmp_path, "a.ply", out)
 
 
 def test_text_ply_is_refused_wherever_it_is_cut(tmp_path: Path) -> None:

@@ -46,7 +46,7 @@ BAD = {
         {"points": POINTS[:, :2], "faces": [[0, 1, 2]], "measure": "surface"},
         "3-space.*2 coordinates",
     ),
-    "mesh without a measure": ({"faces": FACES}, "measure is 'points'.*'surface' or 'solid'"),
+    "mesh measured by its points": ({"faces": FACES, "measure": "points"}, "measure is 'points'.*'surface' or 'solid'"),
     "cloud with a measure": ({"measure": "solid"}, "measure is 'solid'.*a cloud"),
 }
 
@@ -124,3 +124,10 @@ UNREPORTED = {
 def test_these_mistakes_raise_one_line_too(changes, message):
     with pytest.raises(InputError, match=message):
         Shape(**({"points": POINTS} | changes))
+
+
+def test_a_shape_reads_as_points_and_faces():
+    mesh = Shape(POINTS, FACES)
+    assert mesh.measure == "surface"
+    assert Shape(POINTS).measure == "points"
+    np.testing.assert_array_equal(mesh.faces, FACES)

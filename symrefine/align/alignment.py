@@ -8,11 +8,27 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.align.coset import Coset
+from symrefine.decide.posterior import Link, meant
 from symrefine.geometry import Array, ReadOnly
 
 OK = "ok"
 # How a status begins that leaves open whether the objects agree.
 OPEN = "not determined"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Miss:
+    """How well a map holds.
+
+    Attributes:
+        rms: distance from the moved source to the target, RMS, as a fraction of the target's diagonal.
+        status: "ok", or why the result should not be relied upon.
+        excess: what the map misses by over what the tolerance, or the noise of the moments, allows.
+    """
+
+    rms: float
+    status: str
+    excess: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -36,7 +52,7 @@ class Alignment(ReadOnly):
     exact: bool
     timings: dict[str, float]
     _coset: Callable[[], Coset] = field(repr=False)
-    _miss: Callable[[], tuple[float, str]] = field(repr=False)
+    _miss: Callable[[], "Miss"] = field(repr=False)
 
     @property
     def determinant(self) -> int:
@@ -80,7 +96,7 @@ class Alignment(ReadOnly):
         return np.cross(free[0], free[1])[None] if free.shape == (2, 3) else np.zeros((0, self.matrix.shape[0]))
 
     @cached_property
-    def _fit(self) -> tuple[float, str]:
+    def _fit(self) -> Miss:
         return self._miss()
 
     @property
@@ -89,12 +105,22 @@ class Alignment(ReadOnly):
 
         In 3-space between denoised surfaces; elsewhere to the nearest point.
         """
-        return self._fit[0]
+        return self._fit.rms
 
     @property
     def status(self) -> str:
         """ "ok", or why the result should not be relied upon."""
-        return self._fit[1]
+        return self._fit.status
+
+    @property
+    def confidence(self) -> float:
+        """Probability that the objects are meant to agree under this map, or one of its equivalents.
+
+        Of what the map misses by, as `detect` tells it of a symmetry; 0 where the status leaves open or denies it.
+        """
+        if self.status != OK:
+            return 0.0
+        return 1.0 if self.exact else meant(Link(need=self._fit.excess), 1.0)
 
     @property
     def is_misfit(self) -> bool:

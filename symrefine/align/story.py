@@ -8,12 +8,12 @@ Elsewhere than in 3-space: moments -> n-tuples -> Procrustes -> Gauss-Newton on 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from symrefine.align.alignment import OK, OPEN, Alignment
+from symrefine.align.alignment import OK, OPEN, Alignment, Miss
 from symrefine.align.coset import Coset, coset_of_group, coset_of_list, lifted
 from symrefine.align.moment_fit import MISFIT, ROUNDING
 from symrefine.align.pair import Evidence, Side, few
 from symrefine.align.polish import Similarity
-from symrefine.align.rivals import choose, polished
+from symrefine.align.rivals import Choice, choose, polished
 from symrefine.align.span import span_fit
 from symrefine.clock import Clock
 from symrefine.detection.measure import FLAT, PARTS
@@ -149,7 +149,7 @@ def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: boo
         exact=choice.exact and (scale or _same_size(evidence.source, evidence.target)),
         timings=clock.seconds,
         _coset=coset,
-        _miss=lambda: _miss(evidence, motion, scale, choice.exact),
+        _miss=lambda: _miss(choice, motion, scale),
     )
 
 
@@ -172,20 +172,27 @@ def _in_input_units(evidence: Evidence, motion: Similarity, scale: bool) -> tupl
     return motion.matrix, b.center + b.scale * motion.shift - factor * (motion.matrix @ a.center), factor
 
 
-def _miss(evidence: Evidence, motion: Similarity, scale: bool, exact: bool) -> tuple[float, str]:
-    """rms and status in 3-space."""
+def _miss(choice: Choice, motion: Similarity, scale: bool) -> Miss:
+    """How well the map holds in 3-space."""
+    evidence = choice.evidence
     a, b = evidence.source, evidence.target
     status = OK if scale else _sizes(a, b)
     if status != OK or not evidence.has_points:
-        return _nearest(a.shape, b.shape, *_in_input_units(evidence, motion, scale)), status
+        rms = _nearest(a.shape, b.shape, *_in_input_units(evidence, motion, scale))
+        return Miss(rms=rms, status=status, excess=_unlikely(choice.misfit))
     misses = evidence.misses(motion)
     rms, excess = float(np.sqrt(np.mean(misses**2))), evidence.excess(motion)
-    if excess <= 1.0 or exact:
-        return rms, OK
-    return rms, (
-        f"the objects differ by {excess:.1f} times what the tolerance allows: 99 % of the source comes within "
-        f"{100 * float(np.quantile(misses, 0.99)):.2g} % of the diagonal"
-    )
+    if excess > 1.0 and not choice.exact:
+        status = (
+            f"the objects differ by {excess:.1f} times what the tolerance allows: 99 % of the source comes within "
+            f"{100 * float(np.quantile(misses, 0.99)):.2g} % of the diagonal"
+        )
+    return Miss(rms=rms, status=status, excess=excess)
+
+
+def _unlikely(misfit: float) -> float:
+    """What moments differ by, over what sampling explains."""
+    return float(np.sqrt(misfit / MISFIT))
 
 
 def _sizes(source: Side, target: Side) -> str:
@@ -223,13 +230,14 @@ def _align_moments(sides: tuple[Side, Side], scale: bool, reflections: bool, clo
         coset = lifted(inner, bases[0], bases[1], centers, factor, reflections=reflections)
     matrix, translation = coset.matrices[0], coset.translations[0]
 
-    def miss() -> tuple[float, str]:
+    def miss() -> Miss:
         status = OK if scale else _sizes(a, b)
         if found.misfit > MISFIT and not found.exact:
             status = f"the moments differ by {found.misfit:.0f} times what sampling explains"
         if status == OK and not np.isfinite(found.sigma_rad) and not found.exact:
             status = f"{OPEN}: the noise of the moments hides every direction; give more points"
-        return _nearest(a.shape, b.shape, matrix, translation, factor), status
+        rms = _nearest(a.shape, b.shape, matrix, translation, factor)
+        return Miss(rms=rms, status=status, excess=_unlikely(found.misfit))
 
     return Alignment(
         matrix=matrix,

@@ -36,14 +36,13 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _record(args: argparse.Namespace) -> dict[str, Any]:
-    from symrefine.align.story import align
-    from symrefine.export.records import alignment_record
+    from symrefine.front.verbs import align
     from symrefine.load import load
 
     start = time.perf_counter()
     source, target = (load(path, measure=args.measure) for path in (args.source, args.target))
     load_s = time.perf_counter() - start
     options = {"tolerance": args.tolerance, "scale": args.scale, "seed": args.seed}
-    alignment = align(source, target, allow_reflection=not args.rotations_only, **options)
+    found = align(source, target, allow_reflection=not args.rotations_only, **options)
     chosen = options | {"measure": args.measure, "rotations_only": args.rotations_only}
-    return alignment_record(alignment, source, target, options=chosen, load_s=load_s)
+    return found.to_dict(options=chosen, load_s=load_s)

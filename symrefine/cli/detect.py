@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from symrefine.cli.outputs import (
-    Writer,
     check_beside,
     check_outputs,
     json_writer,
@@ -29,6 +28,7 @@ from symrefine.cli.values import (
     positive,
 )
 from symrefine.errors import InputError
+from symrefine.files import Writer
 
 if TYPE_CHECKING:
     from symrefine.detection.result import Detection
@@ -113,32 +113,19 @@ def examine(
     start = time.perf_counter()
     shape = read_scan(path, options, threshold=threshold, invert=invert)
     load_s = time.perf_counter() - start
-    tolerance, seed, outliers = options["tolerance"], options["seed"], options.get("outliers", "auto")
-    if shape.labels is not None and shape.dim != 3:
-        raise InputError(
-            f"{path}: points have {shape.dim} coordinates; labels are for objects in space, leave them out"
-        )
-    if shape.dim == 2:
-        from symrefine.export.records import planar_record
-        from symrefine.plane import detect_planar
+    from symrefine.detection.story import LADDER
+    from symrefine.front.verbs import detect
 
-        flat = detect_planar(shape, tolerance=tolerance, seed=seed)
-        if Path(path).suffix.lower() in IMAGES:
-            options = options | {"threshold": threshold, "invert": invert}
-        return shape, flat, planar_record(flat, shape, options=options, load_s=load_s)
-    if shape.dim > 3:
-        from symrefine.export.records import subspace_record
-        from symrefine.ndim import detect_nd
-
-        start = time.perf_counter()
-        beyond = detect_nd(shape, tolerance=tolerance)
-        timings = {"load": load_s, "detect": time.perf_counter() - start}
-        return shape, beyond, subspace_record(beyond, shape, options=options, timings=timings)
-    from symrefine.detection.story import LADDER, detect
-    from symrefine.export.records import detection_record
-
-    detection = detect(shape, outliers=outliers, tolerance=tolerance, ladder=LADDER, seed=seed)
-    return shape, detection, detection_record(detection, shape, options=options, load_s=load_s)
+    if shape.dim == 2 and Path(path).suffix.lower() in IMAGES:
+        options = options | {"threshold": threshold, "invert": invert}
+    found = detect(
+        shape,
+        outliers=options.get("outliers", "auto"),
+        tolerance=options["tolerance"],
+        ladder=LADDER if shape.dim == 3 else (),
+        seed=options["seed"],
+    )
+    return shape, found, found.to_dict(options=options, load_s=load_s)
 
 
 def read_scan(path: str, options: dict[str, Any], **picture: Any) -> "Shape":

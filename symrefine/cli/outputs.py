@@ -3,20 +3,18 @@
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from symrefine.errors import InputError
-from symrefine.files import check_target, json_text, naming, replacing
+from symrefine.files import Writer, check_target, json_text
+from symrefine.files import write_all as write_all
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 STDOUT = "-"
-
-# A writer fills the file it is given.
-Writer = Callable[[Path], object]
 
 
 def check_outputs(outputs: dict[str, str | None], inputs: list[Path]) -> None:
@@ -49,14 +47,6 @@ def check_beside(option: str, name: str | None, details: dict[str, object]) -> N
     given = [detail for detail, value in details.items() if value is not None]
     if name is None and given:
         raise InputError(f"{given[0]}: says how to write {option} FILE, which is not given; add it or leave this out")
-
-
-def write_all(writers: dict[str, Writer]) -> None:
-    """Write every file under another name first; only when all are complete does each take its place."""
-    with ExitStack() as stack:
-        for name, write in writers.items():
-            stack.enter_context(naming(name))
-            write(stack.enter_context(replacing(Path(name))))
 
 
 def text_writer(text: str) -> Writer:

@@ -15,7 +15,7 @@ from symrefine.detection.measure import Outliers
 from symrefine.detection.result import Candidate, Detection, FoundAxis, FoundPlane, NearMiss, Step
 from symrefine.errors import InputError
 from symrefine.fit.refine import Iterate
-from symrefine.geometry import Array, Axis, Plane, cross_matrix
+from symrefine.geometry import Array, Axis, Plane, cross_matrix, positive
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 
@@ -139,7 +139,7 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
         ),
         axes=tuple(
             FoundAxis(
-                axis=Axis(point=origin + scale * e.center, direction=e.operations.direction),
+                axis=Axis(point=origin + scale * e.center, direction=positive(e.operations.direction)),
                 order=e.operations.order,
                 improper=e.operations.kind == "improper",
                 residual=e.deviation,
@@ -167,7 +167,7 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
         candidates=tuple(
             Candidate(
                 point_group=start.group.name,
-                direction=start.group.frame[2],
+                direction=positive(start.group.frame[2]),
                 point=origin + scale * start.center,
                 excess=need / tolerance,
             )
@@ -209,7 +209,7 @@ def _turned_down(pool: Pool, links: Sequence[Hypothesis], chosen: Hypothesis) ->
 def _near_miss(element: Element, origin: Array, scale: float, tolerance: float) -> NearMiss:
     return NearMiss(
         kind=element.operations.kind,
-        direction=element.operations.direction,
+        direction=positive(element.operations.direction),
         point=origin + scale * element.center,
         order=element.operations.order,
         residual=element.deviation,
@@ -237,5 +237,5 @@ def _uncertainty(history: tuple[Iterate, ...], element: Element) -> tuple[float,
 
 def _plane(element: Element, origin: Array, scale: float) -> Plane:
     point = origin + scale * element.center
-    normal = element.operations.direction
+    normal = positive(element.operations.direction)
     return Plane(normal=normal, offset=float(normal @ point))

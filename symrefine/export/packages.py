@@ -49,12 +49,21 @@ def canonical_package(out: Path, detection: Detection, shape: Shape, *, transfor
     Raises:
         InputError: no symmetry, so nothing to put on an axis; or a format that does not hold the shape.
     """
+    pose = canonical(detection, shape)
+    model, notes = _model(out, shape, pose, 1.0)
+    return Package(files={out: model, transform: transform_bytes(transform, pose, shape.source)}, notes=tuple(notes))
+
+
+def canonical(detection: Detection, shape: Shape) -> Canonical:
+    """The canonical pose of a shape with the symmetry that was found in it.
+
+    Raises:
+        InputError: no symmetry, so nothing to put on an axis.
+    """
     group, center = decided(detection, shape)
     if group.name == "C1":
         raise InputError(f"{shape.source}: is C1: there is no axis and no mirror to put on the axes")
-    pose = canonical_pose(group, center, shape)
-    model, notes = _model(out, shape, pose, 1.0)
-    return Package(files={out: model, transform: transform_bytes(transform, pose, shape.source)}, notes=tuple(notes))
+    return canonical_pose(group, center, shape)
 
 
 def consumer_package(

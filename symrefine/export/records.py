@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symrefine.geometry import Array, Plane, toward_positive
+from symrefine.geometry import Array, Plane, positive, toward_positive
 from symrefine.shape import Shape
 from symrefine.surface.misses import Deviation
 
@@ -128,7 +128,7 @@ def planar_record(
 
 
 def subspace_record(
-    detection: "SubspaceDetection", shape: Shape, *, options: Mapping[str, Any], timings: Mapping[str, float]
+    detection: "SubspaceDetection", shape: Shape, *, options: Mapping[str, Any], load_s: float | None = None
 ) -> Record:
     """What `symrefine detect --json` writes for points of 4 to 8 coordinates.
 
@@ -154,7 +154,7 @@ def subspace_record(
         "incomplete": d.incomplete or None,
         "reflection_group_order": d.reflection_group_order,
         "ntuples": {"rank": d.fixed.rank} | _sizes(d.fixed),
-        "timings": _seconds(timings),
+        "timings": _seconds(d.timings, load_s),
     }
 
 
@@ -204,6 +204,7 @@ def alignment_record(
         "options": dict(options),
         "status": a.status,
         "misfit": bool(a.is_misfit),
+        "confidence": number(a.confidence),
         "determinant": a.determinant,
         "matrix": _matrix(a.matrix),
         "translation": numbers(a.translation, size),
@@ -263,7 +264,7 @@ def _placed(plane: Plane, scale: float) -> Record:
 
 
 def _direction(direction: Array) -> list[float | str | None]:
-    return numbers(toward_positive(direction) * direction, 1.0)
+    return numbers(positive(direction), 1.0)
 
 
 def _held(found: Any) -> Record:

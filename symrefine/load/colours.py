@@ -7,8 +7,6 @@ Chains of neighbours do not grow into one class, and a few stray pixels make non
 """
 
 import numpy as np
-from scipy.sparse import coo_array, eye_array
-from scipy.spatial import cKDTree
 
 from symrefine.geometry import Array
 from symrefine.load.content import Values
@@ -31,6 +29,8 @@ def colour_classes(colours: Values, weights: Array) -> Index:
             they are floating-point numbers up to 1.
         weights: [N] how much of the object each colour covers, not negative.
     """
+    from scipy.spatial import cKDTree
+
     scaled = _eight_bit(colours)
     # Some weight for all: what covers nothing needs a class too, but makes none.
     share = weights / max(weights.sum(), np.finfo(float).tiny) + 1e-12
@@ -43,6 +43,9 @@ def colour_classes(colours: Values, weights: Array) -> Index:
 
 def _centres(colours: Array, mass: Array) -> Array:
     """Centres [K, 3] of the classes."""
+    from scipy.sparse import coo_array, eye_array
+    from scipy.spatial import cKDTree
+
     tree = cKDTree(colours)
     one, other = tree.query_pairs(NEAR / 2, output_type="ndarray").T
     near = coo_array((np.ones(len(one)), (one, other)), shape=(len(mass), len(mass))).tocsr()

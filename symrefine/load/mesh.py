@@ -53,7 +53,7 @@ def _check_range(content: Content, faces: Polygons) -> None:
         row = int(np.searchsorted(faces.starts, bad[0], side="right")) - 1
         first = content.first_index
         raise InputError(
-            f"{content.name('face', row)} refers to vertex {faces.corners[bad[0]] + first}; the file has "
+            f"{content.name('face', row)} refers to vertex {faces.corners[bad[0]] + first}; there are "
             f"{len(content.points)} vertices, numbered {first} to {len(content.points) - 1 + first}"
         )
 

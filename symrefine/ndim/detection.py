@@ -1,14 +1,15 @@
 """Hyperplanes of symmetry of points in any dimension: points that stand for themselves, or samples; their group."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from symrefine.clock import Clock
 from symrefine.decide.posterior import NEAR
 from symrefine.errors import InputError
-from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance
+from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance, positive
 from symrefine.moments.moments import shape_moments
 from symrefine.ndim import sampled as samples
 from symrefine.ndim.matched import Points
@@ -55,6 +56,7 @@ class SubspaceDetection(ReadOnly):
         incomplete: why there may be hyperplanes that are not listed; empty when there are none.
         reflection_group_order: of the group that the reflections listed generate, 1 if there are none; None if they
             generate more reflections than hold, or nothing is decided.
+        timings: seconds by stage.
     """
 
     fixed: FixedSubspace
@@ -65,6 +67,7 @@ class SubspaceDetection(ReadOnly):
     undetermined: str
     incomplete: str
     reflection_group_order: int | None
+    timings: dict[str, float] = field(default_factory=dict)
 
 
 def detect_nd(
@@ -95,8 +98,10 @@ def detect_nd(
         what = "a mesh" if shape.faces is not None else f"{shape.dim} coordinates"
         raise InputError(f"{shape.source}: {what}; detect_nd takes points of 2 to {LARGEST_DIM} coordinates")
     sampled = len(shape.points) > FEW if sampled is None else sampled
-    moments = shape_moments(shape, 5, parts=PARTS if sampled else 0)
-    fixed = fixed_subspace(ntuples(moments, PAPER_ORDERS), floor=FLOOR * tolerance / TOLERANCE)
+    clock = Clock()
+    with clock("moments"):
+        moments = shape_moments(shape, 5, parts=PARTS if sampled else 0)
+        fixed = fixed_subspace(ntuples(moments, PAPER_ORDERS), floor=FLOOR * tolerance / TOLERANCE)
     masses = np.ones(len(shape.points)) if shape.weights is None else shape.weights
     kept = masses > 0
     points, masses = (shape.points[kept] - moments.center) / moments.scale, masses[kept]
@@ -104,16 +109,18 @@ def detect_nd(
     cloud = Points(points=points, masses=masses, diameter=diameter)
     low = samples.block(moments, samples.LOW)
     known = [fixed.directions[-1], *np.linalg.eigh(moments.covariance)[1].T]
-    if sampled:
-        rng = np.random.default_rng(seed)
-        # Masses that differ make up for a density that does.
-        neighbours = samples.Neighbours(points, diameter, rng) if np.ptp(masses) == 0.0 else None
-        search = among_samples(shape, low, known, tolerance, neighbours, rng)
-    else:
-        search = among_points(cloud, known, tolerance)
+    with clock("search"):
+        if sampled:
+            rng = np.random.default_rng(seed)
+            # Masses that differ make up for a density that does.
+            neighbours = samples.Neighbours(points, diameter, rng) if np.ptp(masses) == 0.0 else None
+            search = among_samples(shape, low, known, tolerance, neighbours, rng)
+        else:
+            search = among_points(cloud, known, tolerance)
 
     def hyperplane(normal: Array) -> Hyperplane:
         asymmetry, noise = low.against(normal)
+        normal = positive(normal)
         plane = Plane(normal=normal, offset=float(normal @ moments.center))
         return Hyperplane(
             plane=plane, asymmetry=asymmetry, noise=noise, miss=math.nan if sampled else cloud.miss(normal)
@@ -131,4 +138,5 @@ def detect_nd(
         undetermined=search.undetermined,
         incomplete="; ".join(search.incomplete),
         reflection_group_order=search.order,
+        timings=clock.seconds,
     )

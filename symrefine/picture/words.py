@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable
 
 from symrefine.detection.result import Detection
-from symrefine.geometry import Array, toward_positive
+from symrefine.geometry import Array, positive
 from symrefine.groups import PointGroup
 
 _NAMED = {
@@ -144,8 +144,7 @@ def order_name(order: float, improper: bool = False) -> str:
 
 def direction(vector: Array) -> str:
     """A unit vector in brackets, turned so that its first component of some size is positive."""
-    turned = toward_positive(vector) * vector
-    return "(" + ", ".join(f"{round(float(v), 4) + 0.0:.4f}" for v in turned) + ")"
+    return "(" + ", ".join(f"{round(float(v), 4) + 0.0:.4f}" for v in positive(vector)) + ")"
 
 
 def coordinates(values: Iterable[float], scale: float) -> str:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from symrefine.clock import Clock
 from symrefine.decide.posterior import BEYOND, NEAR, PICTURE, Alternative, Decision, Link, alternatives, decide
 from symrefine.errors import InputError
-from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance
+from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance, toward_positive
 from symrefine.groups import PointGroup2D
 from symrefine.moments.moments import Moments, shape_moments
 from symrefine.ntuples.contract import NTuples, ntuples
@@ -180,7 +180,8 @@ def _report(
 
     def line(element: Hypothesis) -> Plane:
         found = element.placed.line
-        return Plane(normal=found.normal, offset=scale * found.offset + float(found.normal @ origin))
+        sign = toward_positive(found.normal)
+        return Plane(normal=sign * found.normal, offset=sign * (scale * found.offset + float(found.normal @ origin)))
 
     turns = next((e for e in chosen.elements if not e.placed.is_line), None)
     return PlanarDetection(

@@ -10,6 +10,7 @@ import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ import numpy as np
 import rerun as rr
 
 from symrefine.detection.result import Detection
-from symrefine.errors import InputError
+from symrefine.errors import InputError, SymrefineError
 from symrefine.files import whole
 from symrefine.fit.refine import Iterate
 from symrefine.geometry import Array, Plane
@@ -65,12 +66,7 @@ def record(detection: Detection, shape: Shape, path: Path | str) -> None:
     """
     scene = make_scene(detection, shape)
     with whole(Path(path)) as draft, _errors_of_the_system():
-        # The viewer keeps one layout for each application, so each object is one; rerun allows few characters there.
-        application = "symrefine-" + re.sub(r"[^A-Za-z0-9]+", "-", Path(shape.source).stem)[:60].strip("-")
-        identity = _identity(detection, shape)
-        stream = rr.RecordingStream(application, recording_id=identity, send_properties=False)
-        stream.set_log_time_enabled(False)
-        stream.set_log_tick_enabled(False)
+        stream = _stream(detection, shape)
         stream.save(draft, default_blueprint=blueprint(detection, scene, display_scale(scene)))
         try:
             _log(stream, detection, shape, scene)
@@ -78,6 +74,29 @@ def record(detection: Detection, shape: Shape, path: Path | str) -> None:
             stream.disconnect()
         if not draft.exists():
             raise InputError(f"{path}: rerun wrote nothing; is the environment variable RERUN set to off?")
+
+
+def show_inline(detection: Detection, shape: Shape) -> None:
+    """Show the recording in the notebook that runs this.
+
+    Raises:
+        SymrefineError: the notebook's half of rerun is not installed.
+    """
+    if find_spec("rerun_notebook") is None:
+        raise SymrefineError("a notebook shows recordings by another package: pip install 'rerun-sdk[notebook]'")
+    scene, stream = make_scene(detection, shape), _stream(detection, shape)
+    _log(stream, detection, shape, scene)
+    stream.notebook_show(blueprint=blueprint(detection, scene, display_scale(scene)))
+
+
+def _stream(detection: Detection, shape: Shape) -> Any:
+    """A recording that is named by its content, with no times of its own."""
+    # The viewer keeps one layout for each application, so each object is one; rerun allows few characters there.
+    application = "symrefine-" + re.sub(r"[^A-Za-z0-9]+", "-", Path(shape.source).stem)[:60].strip("-")
+    stream = rr.RecordingStream(application, recording_id=_identity(detection, shape), send_properties=False)
+    stream.set_log_time_enabled(False)
+    stream.set_log_tick_enabled(False)
+    return stream
 
 
 @contextmanager

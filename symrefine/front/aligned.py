@@ -1,0 +1,27 @@
+"""The map that was found between two objects."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from symrefine.align.alignment import Alignment as BareAlignment
+from symrefine.front import lines
+from symrefine.front.answers import Answer, Options
+from symrefine.shape import Shape
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Alignment(Answer, BareAlignment):
+    __doc__ = BareAlignment.__doc__
+
+    source: Shape
+    target: Shape
+    options: Options
+
+    def to_dict(self, *, options: Options | None = None, load_s: float | None = None) -> dict[str, Any]:
+        """The report of `symrefine align --json`."""
+        from symrefine.export.records import alignment_record
+
+        return alignment_record(self, self.source, self.target, options=options or self.options, load_s=load_s)
+
+    def __repr__(self) -> str:
+        return "\n".join(lines.alignment_summary(self, self.source, self.target))

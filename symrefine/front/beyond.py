@@ -1,0 +1,30 @@
+"""What was found in points of four and more coordinates."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from symrefine.front.answers import Found, Operations, Options
+from symrefine.geometry import householder
+from symrefine.ndim import SubspaceDetection as BareSubspaceDetection
+from symrefine.shape import Shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class SubspaceDetection(Found, BareSubspaceDetection):
+    __doc__ = BareSubspaceDetection.__doc__
+
+    shape: Shape
+    options: Options
+
+    def to_dict(self, *, options: Options | None = None, load_s: float | None = None) -> dict[str, Any]:
+        """The report of `symrefine detect --json` for points of 4 to 8 coordinates."""
+        from symrefine.export.records import subspace_record
+
+        return subspace_record(self, self.shape, options=options or self.options, load_s=load_s)
+
+    def operations(self) -> Operations:
+        """The identity and the reflections that are listed [N, n+1, n+1]; they generate the rest."""
+        mirrors = [householder(h.plane.normal) for h in self.hyperplanes]
+        return Operations.about(np.array([np.eye(len(self.center)), *mirrors]), self.center)

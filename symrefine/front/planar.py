@@ -1,0 +1,33 @@
+"""What was found in a picture, or in points in the plane."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from symrefine.errors import InputError
+from symrefine.front.answers import Found, Operations, Options
+from symrefine.plane import PlanarDetection as BarePlanarDetection
+from symrefine.shape import Shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class PlanarDetection(Found, BarePlanarDetection):
+    __doc__ = BarePlanarDetection.__doc__
+
+    shape: Shape
+    options: Options
+
+    def to_dict(self, *, options: Options | None = None, load_s: float | None = None) -> dict[str, Any]:
+        """The report of `symrefine detect --json` for a picture or points in the plane."""
+        from symrefine.export.records import planar_record
+
+        return planar_record(self, self.shape, options=options or self.options, load_s=load_s)
+
+    def operations(self) -> Operations:
+        """Operations of the group [N, 3, 3] in the units of the input.
+
+        Raises:
+            InputError: nothing is decided, or the group is continuous.
+        """
+        if self.undetermined:
+            raise InputError(f"{self.shape.source}: no operations: {self.undetermined}")
+        return Operations.about(self.group.operations(), self.center)

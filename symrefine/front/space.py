@@ -1,0 +1,65 @@
+"""What was found in an object in space."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from symrefine.detection.result import Detection as BareDetection
+from symrefine.front.answers import Found, Operations, Options
+from symrefine.geometry import Array
+from symrefine.shape import Shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Detection(Found, BareDetection):
+    __doc__ = BareDetection.__doc__
+
+    shape: Shape
+    options: Options
+
+    def to_dict(self, *, options: Options | None = None, load_s: float | None = None) -> dict[str, Any]:
+        """The report of `symrefine detect --json`."""
+        from symrefine.export.records import detection_record
+
+        return detection_record(self, self.shape, options=options or self.options, load_s=load_s)
+
+    def operations(self, *, improper: bool = True, steps: int | None = None) -> Operations:
+        """Operations of the group [N, 4, 4] in the units and the frame of the input, determinants with them.
+
+        Args:
+            improper: whether mirrors and the like belong to them.
+            steps: turns that stand for a continuous axis, 72 if None; a sphere is given as an icosahedron.
+
+        Raises:
+            InputError: nothing is decided.
+        """
+        from symrefine.export.bop import decided
+        from symrefine.export.operations import STEPS, motions
+
+        group, center = decided(self, self.shape)
+        return motions(group, center, improper=improper, steps=steps or STEPS).view(Operations)
+
+    def canonical_transform(self) -> Array:
+        """[4, 4] from the input to its canonical pose: the centre at 0, the main axis along z.
+
+        Raises:
+            InputError: nothing is decided, or there is no axis and no mirror.
+        """
+        from symrefine.export.packages import canonical
+
+        return canonical(self, self.shape).matrix(1.0)
+
+    def show(self) -> Any:
+        """Open the recording in the viewer of rerun, or inline in a notebook.
+
+        Raises:
+            SymrefineError: there is no display; `save("x.rrd")` and `symrefine view x.rrd --web` do without one.
+        """
+        from symrefine.viewer import show
+
+        return show(self, self.shape)
+
+    def _write_rrd(self, path: Path) -> None:
+        from symrefine.viewer import record
+
+        record(self, self.shape, path)

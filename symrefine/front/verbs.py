@@ -1,0 +1,279 @@
+"""What can be asked of any object: `detect`, `align`, `symmetrize`, `complete`, `export`, `report`."""
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
+
+from numpy.typing import ArrayLike
+
+from symrefine.errors import InputError
+from symrefine.files import write_all
+from symrefine.front.answers import Found
+from symrefine.load.objects import shape_of
+from symrefine.shape import Shape
+from symrefine.surface.misses import TOLERANCE
+
+# Each verb imports what it needs when it is used: who detects waits for no alignment.
+if TYPE_CHECKING:
+    from symrefine.complete import Completion
+    from symrefine.detection.measure import Outliers
+    from symrefine.export.packages import Package
+    from symrefine.front.aligned import Alignment
+    from symrefine.front.beyond import SubspaceDetection
+    from symrefine.front.planar import PlanarDetection
+    from symrefine.front.space import Detection
+    from symrefine.symmetrize import Symmetrized
+
+    Detected: TypeAlias = Detection | PlanarDetection | SubspaceDetection
+
+Format = Literal["bop", "npz", "canonical", "foundationpose", "megapose", "dope", "isaac"]
+
+
+def detect(
+    given: Any,
+    *,
+    weights: ArrayLike | None = None,
+    normals: ArrayLike | None = None,
+    labels: ArrayLike | None = None,
+    viewpoint: ArrayLike | None = None,
+    outliers: "Outliers" = "auto",
+    tolerance: float = TOLERANCE,
+    ladder: Sequence[float] = (),
+    seed: int = 0,
+) -> "Detected":
+    """The symmetry of an object: point group, mirrors and turns, how sure it is, and what it misses each of them by.
+
+    Args:
+        given: a path, points [N, n], `(vertices, faces)`, a `Shape`, or a mesh, a cloud or a molecule of trimesh,
+            Open3D, pyvista, ASE, pymatgen or torch (see `symrefine.load.objects.shape_of`).
+        weights: [N] masses of the points. Of up to 250 points those of different mass are different things, which no
+            symmetry exchanges; of more, masses are a sampling density.
+        normals: [N, n] normals, any sign; estimated where absent.
+        labels: [N] whole numbers, [F] for a mesh: classes (elements, colours, materials) that every symmetry must keep.
+        viewpoint: [3] or [N, 3] place of the camera that saw the points, or each of them.
+        outliers: "auto": points of a cloud that belong to no surface are set apart; "none": all points count.
+        tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal.
+        ladder: other tolerances to tell the group at.
+        seed: of the random choices (samples of a mesh, subsets of a cloud).
+
+    Returns:
+        A `Detection` of an object in 3-space, a `PlanarDetection` of a picture or of points [N, 2], a
+        `SubspaceDetection` of points of four to eight coordinates.
+
+    Raises:
+        InputError: what is no such object, or cannot be used; tolerances outside (0, 0.2].
+        DegenerateShapeError: the points do not spread.
+    """
+    shape = shape_of(given, weights=weights, normals=normals, labels=labels, viewpoint=viewpoint)
+    options = {"tolerance": tolerance, "seed": seed}
+    if shape.dim == 3:
+        from symrefine.detection import story
+        from symrefine.front.space import Detection
+
+        found = story.detect(shape, outliers=outliers, ladder=ladder, **options)  # type: ignore[arg-type]
+        return Detection.of(found, shape=shape, options=options | {"outliers": outliers})
+    for name, given in (("labels are", shape.labels), ("a ladder is", ladder or None)):
+        if given is not None:
+            raise InputError(f"{shape.source}: points have {shape.dim} coordinates; {name} for objects in space")
+    if shape.dim == 2:
+        from symrefine.front.planar import PlanarDetection
+        from symrefine.plane import detect_planar
+
+        return PlanarDetection.of(detect_planar(shape, tolerance=tolerance, seed=seed), shape=shape, options=options)
+    from symrefine.front.beyond import SubspaceDetection
+    from symrefine.ndim import detect_nd
+
+    return SubspaceDetection.of(detect_nd(shape, tolerance=tolerance, seed=seed), shape=shape, options=options)
+
+
+def align(
+    source: Any,
+    target: Any,
+    *,
+    scale: bool = False,
+    polish: bool = True,
+    allow_reflection: bool = True,
+    tolerance: float = TOLERANCE,
+    seed: int = 0,
+) -> "Alignment":
+    """The orthogonal map and the translation that take one object onto another; samplings and formats may differ.
+
+    Args:
+        source: whatever `detect` takes.
+        target: whatever `detect` takes.
+        scale: whether the objects may differ in size; then `target ~ scale * matrix @ source + translation`.
+        polish: refine on the points (3-space only); without it the moments have the last word, in half of the time.
+        allow_reflection: whether determinant -1 is an answer.
+        tolerance: largest miss that still counts as agreement, as in `detect`.
+        seed: of the random choices (samples of meshes, subsets of clouds).
+
+    Raises:
+        InputError: what is no such object, or cannot be used; different dimensions, or options out of range.
+        DegenerateShapeError: the points do not spread.
+    """
+    from symrefine.align import story
+    from symrefine.front.aligned import Alignment
+
+    moved, met = shape_of(source, name="source"), shape_of(target, name="target")
+    options = {"tolerance": tolerance, "scale": scale, "seed": seed}
+    found = story.align(moved, met, polish=polish, allow_reflection=allow_reflection, **options)  # type: ignore[arg-type]
+    told = options | {"measure": None, "rotations_only": not allow_reflection}
+    return Alignment.of(found, source=moved, target=met, options=told)
+
+
+def symmetrize(
+    given: Any,
+    found: "Detection | None" = None,
+    *,
+    group: str | None = None,
+    tolerance: float = TOLERANCE,
+    seed: int = 0,
+) -> "Symmetrized":
+    """The nearest exactly symmetric mesh or cloud.
+
+    Args:
+        given: whatever `detect` takes, in 3-space.
+        found: what `detect` found in it; detected if None.
+        group: the subgroup of it that is to be made exact, such as "Cs"; the whole group if None.
+        tolerance: by what fraction of the diagonal the shape may miss the symmetry.
+        seed: of the random samples of a surface.
+
+    Raises:
+        InputError: nothing is decided, no symmetry, or no such subgroup.
+        DegenerateShapeError: a few points, of which some have no counterpart.
+    """
+    from symrefine.symmetrize import placed_subgroup, symmetrize
+
+    shape = shape_of(given)
+    found = _in_space(shape, detect(shape, tolerance=tolerance, seed=seed)) if found is None else found
+    if found.undetermined:
+        raise InputError(f"{shape.source}: no symmetry to make exact: {found.undetermined}")
+    if found.point_group == "C1":
+        raise InputError(f"{shape.source}: is C1, nothing to make symmetric{_nearest_miss(found)}")
+    chosen = found.group if group is None else placed_subgroup(found.group, group)
+    return symmetrize(shape, chosen, found.center, tolerance=tolerance, seed=seed)
+
+
+def complete(
+    given: Any,
+    found: "Detection | None" = None,
+    *,
+    viewpoint: ArrayLike | None = None,
+    outliers: "Outliers" = "auto",
+    tolerance: float = TOLERANCE,
+    seed: int = 0,
+) -> "Completion":
+    """The points of a scan and their images where nobody looked, under the group that is found in it.
+
+    Args:
+        given: a cloud in 3-space, in any form that `detect` takes.
+        found: what `detect` found in it; the options that follow are those of `detect` where this is None.
+        viewpoint: as of `detect`.
+        outliers: as of `detect`.
+        tolerance: as of `detect`.
+        seed: as of `detect`.
+
+    Raises:
+        InputError: a mesh or atoms, an object without a symmetry, or none that can be decided.
+    """
+    from symrefine.complete import complete
+
+    shape = shape_of(given, viewpoint=viewpoint)
+    return complete(shape, found, outliers=outliers, tolerance=tolerance, seed=seed)
+
+
+def export(
+    given: Any,
+    to: Format,
+    out: str | Path,
+    *,
+    found: "Detection | None" = None,
+    number: int = 1,
+    scale: float = 1.0,
+    improper: bool = False,
+    steps: int | None = None,
+    transform: str | Path | None = None,
+) -> "Package":
+    """Write the symmetries as another program reads them: all files or none.
+
+    Args:
+        given: whatever `detect` takes, in 3-space.
+        to: "bop": an entry in `models_info.json`; "npz": matrices [N, 4, 4]; "canonical": the model with its axis on z;
+            or a folder for "foundationpose", "megapose", "dope", "isaac".
+        out: the file, or the folder.
+        found: what `detect` found in it; detected if None.
+        number: of the object in `models_info.json`.
+        scale: millimetres in one unit of the object.
+        improper: npz: whether mirrors and the like belong to the matrices.
+        steps: npz: turns that stand for a continuous axis; 72 if None.
+        transform: canonical: where the transform goes, .json or .npz; `OUT_transform.json` if None.
+
+    Returns:
+        What was written, and notes on what the format cannot express.
+
+    Raises:
+        InputError: another format, nothing decided, or files that cannot be written.
+    """
+    from symrefine.export import packages
+    from symrefine.export.consumers import CONSUMERS
+    from symrefine.export.operations import STEPS
+
+    if to not in get_args(Format):
+        raise InputError(f"to is {to!r}; expected one of {list(get_args(Format))}")
+    shape, out = shape_of(given), Path(out)
+    found = _in_space(shape, detect(shape)) if found is None else found
+    if to == "bop":
+        package = packages.bop_package(out, found, shape, number=number, scale=scale)
+    elif to == "npz":
+        package = packages.npz_package(out, found, shape, improper=improper, steps=steps or STEPS)
+    elif to == "canonical":
+        place = out.with_name(f"{out.stem}_transform.json") if transform is None else Path(transform)
+        package = packages.canonical_package(out, found, shape, transform=place)
+    else:
+        package = packages.consumer_package(to, out, found, shape, number=number, scale=scale)
+    with ExitStack() as undo:
+        if to in CONSUMERS and not out.exists():
+            out.mkdir()
+            undo.callback(out.rmdir)
+        write_all({str(path): partial(_written, data) for path, data in package.files.items()})
+        undo.pop_all()
+    return package
+
+
+def report(given: Any, path: str | Path) -> "Detected":
+    """Write the page (.html), picture (.png), recording (.rrd) or record (.json) of an object, and return the answer.
+
+    Args:
+        given: an answer of `detect`, or whatever it takes.
+        path: the file to write.
+
+    Raises:
+        InputError: what `detect` and `Detection.save` refuse.
+    """
+    found: Any = given if isinstance(given, Found) else detect(given)
+    found.save(path)
+    return found
+
+
+def _written(data: bytes, path: Path) -> None:
+    path.write_bytes(data)
+
+
+def _in_space(shape: Shape, found: "Detected") -> "Detection":
+    from symrefine.front.space import Detection
+
+    if isinstance(found, Detection):
+        return found
+    raise InputError(f"{shape.source}: points have {shape.dim} coordinates; this is for objects in space")
+
+
+def _nearest_miss(found: "Detection") -> str:
+    if not found.near_misses:
+        return ""
+    miss = found.near_misses[0]
+    return (
+        f"; the nearest, a {miss.kind}, misses by {miss.residual.p95:.1%} of the diagonal at the 95th percentile: "
+        "choose a larger tolerance if that counts as symmetric"
+    )

@@ -1,0 +1,299 @@
+"""Objects in, answers out: whatever people hold gives one answer, which prints, becomes JSON and saves itself."""
+
+import json
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import symrefine
+from symrefine.errors import InputError
+
+jsonschema = pytest.importorskip("jsonschema")
+CORNERS = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 2.0) for z in (0.0, 3.0)])
+SIDES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+TRIANGLES = np.array([[a, b, c] for s in SIDES for a, b, c in (s[:3], [s[0], *s[2:]])])
+RNG = np.random.default_rng(0)
+
+
+def on_box(count: int = 3000) -> np.ndarray:
+    """Points on the faces of a box of sides 1, 2, 3."""
+    side = RNG.choice(3, count, p=np.array([6.0, 3.0, 2.0]) / 11.0)
+    points = RNG.random((count, 3))
+    points[np.arange(count), side] = RNG.integers(0, 2, count)
+    return points * [1.0, 2.0, 3.0]
+
+
+POINTS = on_box()
+
+
+def schema(name: str) -> dict:
+    return json.loads(files("symrefine").joinpath("schema", f"{name}.schema.json").read_text(encoding="utf-8"))
+
+
+def of_trimesh():
+    trimesh = pytest.importorskip("trimesh")
+    mesh = trimesh.Trimesh(CORNERS, TRIANGLES, process=False)
+    return [mesh, trimesh.PointCloud(POINTS), trimesh.Scene([mesh])]
+
+
+def of_open3d():
+    pytest.importorskip("symrefine.load.open3d")
+    o3d = pytest.importorskip("open3d")
+    mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(CORNERS), o3d.utility.Vector3iVector(TRIANGLES))
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(POINTS))
+    return [mesh, cloud, o3d.t.geometry.TriangleMesh.from_legacy(mesh), o3d.t.geometry.PointCloud.from_legacy(cloud)]
+
+
+def of_pyvista():
+    pyvista = pytest.importorskip("pyvista")
+    return [pyvista.PolyData.from_regular_faces(CORNERS, SIDES), pyvista.PolyData(POINTS)]
+
+
+def of_torch():
+    torch = pytest.importorskip("torch")
+    return [torch.tensor(POINTS, requires_grad=True), (torch.tensor(CORNERS), torch.tensor(TRIANGLES))]
+
+
+def plain():
+    return [
+        POINTS,
+        POINTS.tolist(),
+        (CORNERS, TRIANGLES),
+        (CORNERS.tolist(), SIDES),
+        symrefine.Shape(CORNERS, TRIANGLES),
+    ]
+
+
+@pytest.mark.parametrize("held", [plain, of_trimesh, of_open3d, of_pyvista, of_torch])
+def test_whatever_people_hold_is_the_same_box(held):
+    for given in held():
+        found = symrefine.detect(given)
+        assert (found.point_group, len(found.planes)) == ("D2h", 3)
+        np.testing.assert_allclose(found.center, [0.5, 1.0, 1.5], atol=0.02)
+
+
+def molecule(case: str):
+    places = np.array([[0.0, 0.0, 0.12], [0.0, 0.76, -0.47], [0.0, -0.76, -0.47]])
+    if case == "ase":
+        return pytest.importorskip("ase").Atoms("OHH", positions=places)
+    return pytest.importorskip("pymatgen.core").Molecule(["O", "H", "H"], places)
+
+
+@pytest.mark.parametrize("case", ["ase", "pymatgen"])
+def test_elements_of_molecules_are_labels(case):
+    found = symrefine.detect(molecule(case))
+    assert found.point_group == "C2v"
+    assert sorted(found.shape.labels.tolist()) == [1, 1, 8]
+
+
+def test_a_crystal_is_no_molecule():
+    ase = pytest.importorskip("ase")
+    with pytest.raises(InputError, match="periodic"):
+        symrefine.detect(ase.Atoms("NaCl", positions=[[0, 0, 0], [2, 0, 0]], cell=[4, 4, 4], pbc=True))
+
+
+def test_a_path_is_read_like_the_object_in_it(tmp_path):
+    path = tmp_path / "box.npy"
+    np.save(path, POINTS)
+    by_path, by_array = symrefine.detect(path), symrefine.detect(POINTS)
+    assert {**by_path.to_dict(), "source": 0, "timings": 0} == {**by_array.to_dict(), "source": 0, "timings": 0}
+
+
+WRONG = {
+    "an object": (object(), "array: is of type object; expected a path"),
+    "nothing": (None, "is of type NoneType"),
+    "a masked array": (np.ma.masked_array(POINTS), "masked array"),
+    "a mesh of masked points": ((np.ma.masked_array(CORNERS), TRIANGLES), "masked array"),
+    "faces out of range": ((CORNERS, TRIANGLES + 1), "refers to vertex 8; there are 8 vertices"),
+    "no faces": ((CORNERS, np.zeros((0, 3), int)), r"faces have shape \(0, 3\)"),
+    "faces of numbers": ((CORNERS, TRIANGLES * 1.0), "of float64; expected whole numbers"),
+    "a file that is not there": ("nowhere.ply", "nowhere.ply: no such file"),
+    "points that are not finite": ((CORNERS * np.nan, TRIANGLES), "point 0 is"),
+}
+
+
+@pytest.mark.parametrize(("given", "message"), WRONG.values(), ids=WRONG)
+def test_what_is_no_object_is_refused_in_one_line(given, message):
+    with pytest.raises(InputError, match=message) as caught:
+        symrefine.detect(given)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_an_object_brings_is_not_given_twice():
+    with pytest.raises(InputError, match="normals: belong to the Shape"):
+        symrefine.detect(symrefine.Shape(POINTS), normals=POINTS + 1.0)
+    with pytest.raises(InputError, match="weights are for clouds"):
+        symrefine.detect((CORNERS, TRIANGLES), weights=np.ones(8))
+    with pytest.raises(InputError, match="brings its own labels"):
+        symrefine.detect(molecule("ase"), labels=[1, 2, 3])
+
+
+def test_labels_of_faces_break_what_they_tell_apart():
+    one_side = np.repeat([1, 0, 0, 0, 0, 0], 2)
+    assert symrefine.detect((CORNERS, TRIANGLES), labels=one_side).point_group == "C2v"
+
+
+def answers():
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    square = RNG.random((2000, 2))
+    return {
+        "detection": symrefine.detect(POINTS, ladder=(0.01, 0.04)),
+        "detection of a bottle": symrefine.detect(revolved(), labels=None),
+        "detection of nothing": symrefine.detect(RNG.random((40, 3))),
+        "detection of classes": symrefine.detect(molecule("ase")),
+        "detection of what is undetermined": symrefine.detect(np.outer(np.arange(40.0), [1.0, 2.0, 3.0])),
+        "detection2d": symrefine.detect(square),
+        "detection2d of nothing": symrefine.detect(RNG.random((40, 2))),
+        "detection_nd": symrefine.detect(np.eye(5)),
+        "detection_nd of samples": symrefine.detect(RNG.standard_normal((2000, 4))),
+        "alignment": symrefine.align(POINTS, on_box() @ turn.T),
+        "alignment in the plane": symrefine.align(square, square @ [[0.0, 1.0], [1.0, 0.0]]),
+    }
+
+
+def revolved() -> np.ndarray:
+    angle, height = RNG.random(3000) * 2.0 * np.pi, RNG.random(3000) * 3.0
+    return np.stack([(1.0 + 0.3 * height) * np.cos(angle), (1.0 + 0.3 * height) * np.sin(angle), height], axis=1)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return answers()
+
+
+def test_every_record_obeys_its_schema(found):
+    for case, answer in found.items():
+        record = json.loads(answer.to_json())
+        assert record | {"timings": {}} == json.loads(json.dumps(answer.to_dict() | {"timings": {}}))
+        jsonschema.Draft202012Validator(schema(case.split()[0])).validate(record)
+
+
+def test_a_schema_refuses_what_is_no_such_record(found):
+    record = found["detection"].to_dict()
+    rule = jsonschema.Draft202012Validator(schema("detection"))
+    for name in record:
+        assert not rule.is_valid({key: value for key, value in record.items() if key != name})
+    assert not rule.is_valid(record | {"another": 1})
+    assert not rule.is_valid(record | {"confidence": 1.5})
+    assert not rule.is_valid(record | {"schema": "symrefine.detection/2"})
+
+
+def test_schemas_are_schemas():
+    for name in ("detection", "detection2d", "detection_nd", "alignment"):
+        jsonschema.Draft202012Validator.check_schema(schema(name))
+
+
+def test_an_answer_prints_on_six_lines(found):
+    for case, answer in found.items():
+        lines = repr(answer).splitlines()
+        assert len(lines) == (5 if case == "alignment in the plane" else 6), case
+        assert all(len(line) <= 160 for line in lines[1:])
+
+
+def test_operations_map_the_object_onto_itself(found):
+    box = found["detection"]
+    operations = box.operations()
+    assert operations.shape == (8, 4, 4)
+    assert sorted(operations.determinants) == [-1.0] * 4 + [1.0] * 4
+    assert len(box.operations(improper=False)) == 4
+    corners = np.column_stack([CORNERS, np.ones(8)])
+    for motion in np.asarray(operations):
+        moved = (corners @ motion.T)[:, :3]
+        assert np.abs(moved[:, None] - CORNERS).sum(axis=2).min(axis=1).max() < 0.1
+    assert found["detection of a bottle"].operations(steps=12).shape == (24, 4, 4)
+    assert found["detection_nd"].operations().shape == (12, 6, 6)
+    with pytest.raises(InputError, match="no symmetries to export"):
+        found["detection of what is undetermined"].operations()
+
+
+def test_operations_in_the_plane_keep_a_square():
+    square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
+    operations = symrefine.detect(square).operations()
+    assert operations.shape == (8, 3, 3)
+    moved = np.column_stack([square, np.ones(4)]) @ np.asarray(operations).transpose(0, 2, 1)
+    for image in moved[:, :, :2]:
+        assert sorted(map(tuple, np.rint(image).tolist())) == sorted(map(tuple, square.tolist()))
+
+
+def test_the_canonical_transform_puts_centre_and_axis_in_place(found):
+    matrix = found["detection of a bottle"].canonical_transform()
+    axis = found["detection of a bottle"].axes[0].axis
+    np.testing.assert_allclose(np.abs(matrix[:3, :3] @ axis.direction), [0.0, 0.0, 1.0], atol=1e-9)
+    np.testing.assert_allclose((matrix[:3, :3] @ axis.point + matrix[:3, 3])[:2], 0.0, atol=1e-9)
+    assert np.linalg.det(matrix[:3, :3]) == pytest.approx(1.0)
+
+
+def test_directions_have_the_sign_that_records_have(found):
+    for case in ("detection", "detection of a bottle"):
+        answer, record = found[case], found[case].to_dict()
+        for plane, told in zip(answer.planes, record["planes"], strict=True):
+            np.testing.assert_allclose([*plane.plane.normal, plane.plane.offset], [*told["normal"], told["offset"]])
+        for axis, told in zip(answer.axes, record["axes"], strict=True):
+            np.testing.assert_allclose(axis.axis.direction, told["direction"], atol=1e-11)
+
+
+def test_an_answer_saves_itself_by_its_suffix(found, tmp_path):
+    beginnings = {".json": b"{", ".png": b"\x89PNG", ".html": b"<!doctype html>", ".rrd": b"RRF"}
+    for suffix, beginning in beginnings.items():
+        found["detection"].save(tmp_path / f"box{suffix}")
+        assert (tmp_path / f"box{suffix}").read_bytes()[: len(beginning)].lower() == beginning.lower()
+    with pytest.raises(InputError, match=r"ends in \.json, \.html, \.png, \.rrd"):
+        found["detection"].save(tmp_path / "box.txt")
+    with pytest.raises(InputError, match=r"cannot be written as \.rrd"):
+        found["detection_nd"].save(tmp_path / "box.rrd")
+    assert sorted(p.suffix for p in tmp_path.iterdir()) == sorted(beginnings)
+
+
+def test_a_figure_and_a_card(found):
+    figure = found["detection"].plot()
+    assert len(figure.axes) == 1
+    card = found["detection"]._repr_html_()
+    assert card.count("<tr>") == 1 + 3 + 3
+    assert "data:image/png;base64," in card
+
+
+def test_verbs_take_what_detect_takes_and_what_it_found(tmp_path):
+    box = symrefine.detect((CORNERS, TRIANGLES))
+    made = symrefine.symmetrize((CORNERS, TRIANGLES), box)
+    np.testing.assert_allclose(made.shape.points, CORNERS, atol=1e-9)
+    package = symrefine.export((CORNERS, TRIANGLES), "bop", tmp_path / "models_info.json", found=box)
+    assert [*package.files] == [tmp_path / "models_info.json"]
+    assert len(json.loads((tmp_path / "models_info.json").read_text())["1"]["symmetries_discrete"]) == 3
+    assert symrefine.report(box, tmp_path / "box.json") is box
+    assert json.loads((tmp_path / "box.json").read_text())["point_group"] == "D2h"
+    with pytest.raises(InputError, match="is C1, nothing to make symmetric"):
+        symrefine.symmetrize(RNG.random((40, 3)))
+    with pytest.raises(InputError, match="to is 'stl'"):
+        symrefine.export(POINTS, "stl", tmp_path / "x.stl")
+    with pytest.raises(InputError, match="2 coordinates; this is for objects in space"):
+        symrefine.export(RNG.random((40, 2)), "bop", tmp_path / "y.json")
+    assert not (tmp_path / "y.json").exists()
+
+
+def test_completion_takes_a_cloud_and_what_was_found_in_it():
+    scan = POINTS[POINTS[:, 0] < 0.8]
+    found = symrefine.detect(scan)
+    assert len(symrefine.complete(scan, found).points) == len(symrefine.complete(scan).points)
+
+
+def test_an_alignment_says_how_sure_it_is(found):
+    answer = found["alignment"]
+    assert answer.confidence > 0.9
+    assert answer.to_dict()["confidence"] == pytest.approx(answer.confidence)
+    unlike = symrefine.align(POINTS, revolved())
+    assert unlike.confidence < 0.1
+    assert unlike.status != "ok"
+
+
+def test_the_front_page_shows_promises_only():
+    assert dir(symrefine) == sorted(symrefine.__all__)
+    assert not [name for name in dir(symrefine) if name.startswith("_") and name != "__version__"]
+    assert all(getattr(symrefine, name) is not None for name in dir(symrefine))
+
+
+def test_schemas_stand_beside_the_code():
+    assert {p.name.split(".")[0] for p in Path(str(files("symrefine"))).glob("schema/*.json")} == {
+        "detection", "detection2d", "detection_nd", "alignment"
+    }  # fmt: skip
