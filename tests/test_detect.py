@@ -15,6 +15,7 @@ from experiments.objects.shapes import SHAPES, box, join, mirror_normals, mug, r
 from experiments.studies import groups
 from experiments.studies.measure import score_planes
 from symrefine import Detection, Shape, detect
+from symrefine.detection import story
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import line_angle_rad, random_orthogonal
 from symrefine.groups import point_group
@@ -583,7 +584,7 @@ def test_tolerances_out_of_range(tolerance):
 @pytest.mark.parametrize("dim", [2, 4])
 def test_only_three_dimensions(dim):
     with pytest.raises(InputError, match=f"{dim} coordinates"):
-        detect(np.random.default_rng(25).standard_normal((500, dim)))
+        story.detect(np.random.default_rng(25).standard_normal((500, dim)))
 
 
 @pytest.mark.parametrize(

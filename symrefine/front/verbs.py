@@ -32,7 +32,7 @@ Format = Literal["bop", "npz", "canonical", "foundationpose", "megapose", "dope"
 
 
 def detect(
-    given: Any,
+    shape: Any,
     *,
     weights: ArrayLike | None = None,
     normals: ArrayLike | None = None,
@@ -46,7 +46,7 @@ def detect(
     """The symmetry of an object: point group, mirrors and turns, how sure it is, and what it misses each of them by.
 
     Args:
-        given: a path, points [N, n], `(vertices, faces)`, a `Shape`, or a mesh, a cloud or a molecule of trimesh,
+        shape: a path, points [N, n], `(vertices, faces)`, a `Shape`, or a mesh, a cloud or a molecule of trimesh,
             Open3D, pyvista, ASE, pymatgen or torch (see `symrefine.load.objects.shape_of`).
         weights: [N] masses of the points. Of up to 250 points those of different mass are different things, which no
             symmetry exchanges; of more, masses are a sampling density.
@@ -66,7 +66,7 @@ def detect(
         InputError: what is no such object, or cannot be used; tolerances outside (0, 0.2].
         DegenerateShapeError: the points do not spread.
     """
-    shape = shape_of(given, weights=weights, normals=normals, labels=labels, viewpoint=viewpoint)
+    shape = shape_of(shape, weights=weights, normals=normals, labels=labels, viewpoint=viewpoint)
     options = {"tolerance": tolerance, "seed": seed}
     if shape.dim == 3:
         from symrefine.detection import story
@@ -74,9 +74,11 @@ def detect(
 
         found = story.detect(shape, outliers=outliers, ladder=ladder, **options)  # type: ignore[arg-type]
         return Detection.of(found, shape=shape, options=options | {"outliers": outliers})
-    for name, given in (("labels are", shape.labels), ("a ladder is", ladder or None)):
+    for name, given in (("labels are", shape.labels), ("steps of a ladder are", ladder or None)):
         if given is not None:
-            raise InputError(f"{shape.source}: points have {shape.dim} coordinates; {name} for objects in space")
+            raise InputError(
+                f"{shape.source}: points have {shape.dim} coordinates; {name} for objects in space, leave them out"
+            )
     if shape.dim == 2:
         from symrefine.front.planar import PlanarDetection
         from symrefine.plane import detect_planar
@@ -124,7 +126,7 @@ def align(
 
 
 def symmetrize(
-    given: Any,
+    shape: Any,
     found: "Detection | None" = None,
     *,
     group: str | None = None,
@@ -134,7 +136,7 @@ def symmetrize(
     """The nearest exactly symmetric mesh or cloud.
 
     Args:
-        given: whatever `detect` takes, in 3-space.
+        shape: whatever `detect` takes, in 3-space.
         found: what `detect` found in it; detected if None.
         group: the subgroup of it that is to be made exact, such as "Cs"; the whole group if None.
         tolerance: by what fraction of the diagonal the shape may miss the symmetry.
@@ -146,7 +148,7 @@ def symmetrize(
     """
     from symrefine.symmetrize import placed_subgroup, symmetrize
 
-    shape = shape_of(given)
+    shape = shape_of(shape)
     found = _in_space(shape, detect(shape, tolerance=tolerance, seed=seed)) if found is None else found
     if found.undetermined:
         raise InputError(f"{shape.source}: no symmetry to make exact: {found.undetermined}")
@@ -157,7 +159,7 @@ def symmetrize(
 
 
 def complete(
-    given: Any,
+    shape: Any,
     found: "Detection | None" = None,
     *,
     viewpoint: ArrayLike | None = None,
@@ -168,7 +170,7 @@ def complete(
     """The points of a scan and their images where nobody looked, under the group that is found in it.
 
     Args:
-        given: a cloud in 3-space, in any form that `detect` takes.
+        shape: a cloud in 3-space, in any form that `detect` takes.
         found: what `detect` found in it; the options that follow are those of `detect` where this is None.
         viewpoint: as of `detect`.
         outliers: as of `detect`.
@@ -180,12 +182,12 @@ def complete(
     """
     from symrefine.complete import complete
 
-    shape = shape_of(given, viewpoint=viewpoint)
+    shape = shape_of(shape, viewpoint=viewpoint)
     return complete(shape, found, outliers=outliers, tolerance=tolerance, seed=seed)
 
 
 def export(
-    given: Any,
+    shape: Any,
     to: Format,
     out: str | Path,
     *,
@@ -199,7 +201,7 @@ def export(
     """Write the symmetries as another program reads them: all files or none.
 
     Args:
-        given: whatever `detect` takes, in 3-space.
+        shape: whatever `detect` takes, in 3-space.
         to: "bop": an entry in `models_info.json`; "npz": matrices [N, 4, 4]; "canonical": the model with its axis on z;
             or a folder for "foundationpose", "megapose", "dope", "isaac".
         out: the file, or the folder.
@@ -222,7 +224,7 @@ def export(
 
     if to not in get_args(Format):
         raise InputError(f"to is {to!r}; expected one of {list(get_args(Format))}")
-    shape, out = shape_of(given), Path(out)
+    shape, out = shape_of(shape), Path(out)
     found = _in_space(shape, detect(shape)) if found is None else found
     if to == "bop":
         package = packages.bop_package(out, found, shape, number=number, scale=scale)

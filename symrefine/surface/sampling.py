@@ -274,16 +274,20 @@ def _members(points: Array, around: Surroundings, groups: list[Mask]) -> list[In
 def _is_uneven(around: Surroundings) -> bool:
     """Whether the density falls off along some direction, as that of a scanner does; it is what shifts moments.
 
-    Told by flat neighbourhoods where there are any: how far away others are is a matter of shape on thin parts.
+    Flat neighbourhoods must show it as well: on thin parts it is a matter of shape how far away others are.
     """
     area = _area(around)
     if not area.all() or np.median(around.away[:, -1]) > WIDEST:
         return False  # points are repeated, or so few that the shape decides how far away their neighbours are
     flat = _planes(around, slice(None))[2] < FLAT
-    told = flat if flat.sum() > AROUND else np.ones_like(flat)
-    place = np.column_stack([np.ones(told.sum()), around.points[told] - around.points[told].mean(axis=0)])
-    trend = place @ np.linalg.lstsq(place, np.log(area[told]), rcond=None)[0]
-    return bool(trend.std() > UNEVEN)
+    told = [np.ones_like(flat), flat] if flat.sum() > AROUND else [np.ones_like(flat)]
+    return all(_trend(around.points[some], np.log(area[some])) > UNEVEN for some in told)
+
+
+def _trend(points: Array, values: Array) -> float:
+    """Standard deviation of the linear function of points [N, 3] that comes closest to values [N]."""
+    place = np.column_stack([np.ones(len(values)), points - points.mean(axis=0)])
+    return float((place @ np.linalg.lstsq(place, values, rcond=None)[0]).std())
 
 
 def _evened(points: Array, rng: np.random.Generator) -> tuple[Index, Array]:
