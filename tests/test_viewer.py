@@ -17,7 +17,7 @@ from symrefine.errors import InputError, SymrefineError
 from symrefine.geometry import rotation, unit
 from symrefine.picture.scene import make_scene
 from symrefine.shape import Shape
-from symrefine.viewer import open_recording, opening, record
+from symrefine.viewer import open_recording, opening, record, serve_recording
 
 Case = tuple[Detection, Shape, Path]
 
@@ -82,7 +82,7 @@ def test_opens_with_a_layout_of_its_own(tilted: Case) -> None:
 
     reader = ck.RrdReader(tilted[2])
     assert len(reader.recordings()) == len(reader.blueprints()) == 1
-    assert [c.name for c in reader.store().schema().index_columns()] == ["iteration"]
+    assert [c.name for c in reader.store().schema().index_columns()] == ["iteration", "story"]
 
 
 def test_every_iteration_has_its_planes_and_pairs(tilted: Case) -> None:
@@ -93,6 +93,33 @@ def test_every_iteration_has_its_planes_and_pairs(tilted: Case) -> None:
     pairs = rows(path, "/object/refinement/pairs")
     assert [row["iteration"] for row in pairs] == iterations[1:]
     assert all(0 < len(column(row, "strips")) <= 300 for row in pairs)
+
+
+def test_the_story_ends_with_what_was_found(tilted: Case) -> None:
+    detection, _, path = tilted
+    last = len(detection.history) + 3
+    steps = {"ntuples": 1, "candidates": 2, "refinement/planes/1": 3, "planes/1": last, "axes/1": last}
+    assert {name: rows(path, f"/object/{name}")[0]["story"] for name in steps} == steps
+    assert [row["story"] for row in rows(path, "/object/refinement")] == [last]
+
+
+def test_misses_cool_down(tilted: Case) -> None:
+    detection, _, path = tilted
+    shown = sorted(rows(path, "/object/refinement/misses"), key=lambda row: row["story"])
+    assert len(shown) == len(detection.history)
+    heat = [np.mean([colour >> 24 for colour in column(row, "colors")]) for row in shown]
+    assert heat[-1] <= heat[0]
+
+
+def test_a_recording_is_served_until_it_is_interrupted(tilted: Case) -> None:
+    def interrupt(address: str) -> None:
+        assert address.startswith("http://127.0.0.1:")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        serve_recording(tilted[2], interrupt)
+    with pytest.raises(InputError, match="no such file"):
+        serve_recording(tilted[2].parent / "none.rrd", interrupt)
 
 
 def test_pairs_join_points_that_agree(tilted: Case) -> None:

@@ -10,11 +10,15 @@ DESCRIPTION = "Open a recording that `symrefine detect --recording FILE.rrd` wro
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("path", metavar="FILE.rrd", help="recording")
+    parser.add_argument("--web", action="store_true", help="serve it to browsers until Ctrl-C; needs no display")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Open the viewer."""
-    from symrefine.viewer import open_recording
+    """Open the viewer, or serve it."""
+    from symrefine.viewer import open_recording, serve_recording
 
-    open_recording(Path(args.path))
+    if args.web:
+        serve_recording(Path(args.path), lambda address: print(address, flush=True))
+    else:
+        open_recording(Path(args.path))
     return 0

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from symrefine.detection.result import Detection
 from symrefine.shape import Shape
-from symrefine.viewer.opening import open_recording
+from symrefine.viewer.opening import open_recording, serve_recording
 from symrefine.viewer.recording import record, show_inline
 
-__all__ = ["open_recording", "record", "show"]
+__all__ = ["open_recording", "record", "serve_recording", "show"]
 
 
 def show(detection: Detection, shape: Shape) -> None:

@@ -9,6 +9,8 @@ from symrefine.detection.result import Detection
 from symrefine.picture.camera import look_at
 from symrefine.picture.scene import Colour, Scene
 
+# The timeline that is scrubbed.
+STORY = "story"
 # Series of the refinement: entity under /series, title and colour.
 SERIES: dict[str, tuple[str, Colour]] = {
     "turn_deg": ("turn of the frame [deg]", (255, 150, 60)),
@@ -24,16 +26,27 @@ BACKGROUND = (22, 25, 32)
 def blueprint(detection: Detection, scene: Scene, scale: float) -> Any:
     """The layout; `scale` is that of the transform above all positions."""
     refined = len(detection.history) > 1
-    views = [_view("Result", scene, scale, ["- /object/refinement/**"])]
+    views = [_view("Story", scene, scale, ["- /object/refinement/points", "- /object/refinement/pairs/**"])]
     if refined:
-        without = ("cloud", "inferred", "contradicted", "outliers", "mesh", "planes/**", "ntuples", "near_misses/**")
+        without = (
+            "cloud",
+            "inferred",
+            "contradicted",
+            "outliers",
+            "mesh",
+            "planes/**",
+            "ntuples",
+            "near_misses/**",
+            "candidates",
+            "refinement/misses",
+        )
         views.append(_view("Refinement", scene, scale, [f"- /object/{entity}" for entity in without]))
     report = rrb.TextDocumentView(origin="/report", name="Report")
     log = rrb.TextLogView(origin="/log", name="Log")
     right = rrb.Vertical(report, _series(), log, row_shares=[4, 4, 2]) if refined else rrb.Vertical(report, log)
     return rrb.Blueprint(
         rrb.Horizontal(rrb.Tabs(*views, active_tab=0), right, column_shares=[3, 2]),
-        rrb.TimePanel(timeline="iteration", state="collapsed", play_state="paused"),
+        rrb.TimePanel(timeline=STORY, fps=1.0, state="collapsed", play_state="following"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
         auto_views=False,
@@ -41,9 +54,9 @@ def blueprint(detection: Detection, scene: Scene, scale: float) -> Any:
 
 
 def _view(name: str, scene: Scene, scale: float, without: list[str]) -> Any:
-    """A 3-D view from where the scene shows best; what else was tried, cameras, and planes that crowd it are off."""
+    """A 3-D view from where the scene shows best; near misses, cameras, and planes that crowd it are off."""
     crowd = ("object/planes", "object/refinement/planes") if scene.crowded else ()
-    hidden = ("object/near_misses", "object/candidates", "object/cameras", *crowd)
+    hidden = ("object/near_misses", "object/cameras", *crowd)
     camera = look_at(scene, aspect=1.1, fov_rad=FOV_RAD, fill=FILL)
     return rrb.Spatial3DView(
         origin="/",

@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 from symrefine.errors import InputError, SymrefineError
@@ -35,9 +36,36 @@ def open_recording(path: Path | str) -> None:
         said.seek(0)
         reason = _reason(said.read().decode(errors="replace"))
     if status != 0:
-        raise SymrefineError(
-            f"the viewer did not start: {reason}; `rerun --serve-web --bind 127.0.0.1 {path}` shows it in a browser"
-        )
+        raise SymrefineError(f"the viewer did not start: {reason}; `symrefine view {path} --web` shows it in a browser")
+
+
+def serve_recording(path: Path | str, tell: Callable[[str], None]) -> None:
+    """Serve a recording to browsers of this machine until it is interrupted; needs no display.
+
+    Args:
+        path: the recording.
+        tell: called with the address once it is there.
+
+    Raises:
+        InputError: no such file, or not a recording.
+        SymrefineError: the server does not start.
+    """
+    check_recording(Path(path))
+    ports = ["--port", "auto", "--web-viewer-port", "0"]
+    command = [*_rerun(), "--serve-web", "--bind", "127.0.0.1", *ports, str(path)]
+    said: list[str] = []
+    with subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
+    ) as server:
+        assert server.stdout is not None
+        try:
+            for line in server.stdout:
+                said.append(re.sub(r"\x1b\[[0-9;]*m", "", line))
+                if address := re.search(r"connect at (http://\S+)", said[-1]):
+                    tell(address[1])
+        finally:
+            server.terminate()
+    raise SymrefineError(f"the server ended: {_reason(''.join(said))}")
 
 
 def check_recording(path: Path) -> None:
