@@ -4,12 +4,15 @@ import json
 from importlib.resources import files
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib import pyplot as plt
 
 import symrefine
 from symrefine.errors import InputError
 
+mpl.use("Agg")
 jsonschema = pytest.importorskip("jsonschema")
 CORNERS = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 2.0) for z in (0.0, 3.0)])
 SIDES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
@@ -247,8 +250,10 @@ def test_an_answer_saves_itself_by_its_suffix(found, tmp_path):
 
 
 def test_a_figure_and_a_card(found):
-    figure = found["detection"].plot()
-    assert len(figure.axes) == 1
+    axes = found["detection"].plot()
+    assert len(axes.images) == 1
+    assert found["detection"].plot(axes) is axes
+    plt.close(axes.figure)
     card = found["detection"]._repr_html_()
     assert card.count("<tr>") == 1 + 3 + 3
     assert "data:image/png;base64," in card

@@ -15,7 +15,7 @@ from symrefine.geometry import Array
 from symrefine.shape import Shape
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
 Options = Mapping[str, Any]
 # Width and height of a picture, in pixels.
@@ -103,18 +103,18 @@ class Found(Answer):
         """Operations of the group as homogeneous matrices in the units and the frame of the input."""
         raise NotImplementedError
 
-    def plot(self) -> "Figure":
-        """The picture of `save("x.png")` as a figure of matplotlib."""
+    def plot(self, axes: "Axes | None" = None) -> "Axes":
+        """The picture of `save("x.png")` on axes of matplotlib, on those of a new figure if None."""
         from io import BytesIO
 
-        from matplotlib.figure import Figure
+        from matplotlib import pyplot as plt
         from matplotlib.image import imread
 
-        figure = Figure(figsize=(8.0, 6.0), dpi=150)
-        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        if axes is None:
+            axes = plt.figure(figsize=(8.0, 6.0), layout="constrained").add_subplot()
         axes.imshow(imread(BytesIO(self._picture())))
         axes.set_axis_off()
-        return figure
+        return axes
 
     def _repr_html_(self) -> str:
         return lines.card(self.to_dict(), base64.b64encode(self._picture()).decode("ascii"))
