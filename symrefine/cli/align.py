@@ -5,7 +5,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from symrefine.cli.outputs import check_outputs, json_writer, tell, waiting, write_all
+from symrefine.cli.outputs import check_outputs, json_writer, tell, write_all
+from symrefine.cli.signs import waiting
 from symrefine.cli.values import add_detection_options
 
 HELP = "find the map that takes one object onto another, reflections included"

@@ -3,7 +3,8 @@
 import argparse
 from pathlib import Path
 
-from symrefine.cli.outputs import console, note, progress, say
+from symrefine.cli.outputs import is_quiet, note, print_lines, say
+from symrefine.cli.signs import progress
 from symrefine.cli.values import count
 from symrefine.files import naming
 
@@ -50,11 +51,11 @@ def run(args: argparse.Namespace) -> int:
         outcome = run_study(
             plan, folder, workers=args.workers, limit=args.limit, replace=args.replace, progress=progress
         )
-    if outcome.tables:
+    if outcome.tables and not is_quiet():
         say(outcome.tables + "\n")
     for row in [row for row in outcome.rows if row["error"] is not None][:5]:
         note(f"a run failed: {row['error']}")
     parts = [f"{len(outcome.rows)} runs", f"{outcome.resumed} done before" if outcome.resumed else ""]
     parts += [f"{outcome.failed} failed" if outcome.failed else "", f"written to {folder}"]
-    console().print(", ".join(part for part in parts if part))
+    print_lines([", ".join(part for part in parts if part)])
     return int(outcome.failed > 0)

@@ -28,6 +28,13 @@ def add_detection_options(parser: argparse.ArgumentParser, counts_as: str = "sym
     )
 
 
+def add_path(parser: argparse.ArgumentParser, what: str, *, several: bool = False) -> None:
+    """The file or files to read, and what stdin holds where `-` stands for it."""
+    many = {"nargs": "+"} if several else {}
+    parser.add_argument("path", metavar="PATH", help=f"{what}; - is stdin", **many)  # type: ignore[arg-type]
+    parser.add_argument("--format", metavar="SUFFIX", help="what stdin holds where PATH is -: ply, xyz, csv, ...")
+
+
 def add_scan_options(parser: argparse.ArgumentParser) -> None:
     """The options that say how points were taken."""
     parser.add_argument(

@@ -29,6 +29,9 @@ from symrefine.symmetrize import exact_place
 
 Entry = dict[str, Any]
 
+# Diameter in units of a file below which millimetres are doubted: objects to be grasped are larger, and in metres few
+# are as large.
+IN_DOUBT = 5.0
 # Points whose distances are formed at once.
 _BLOCK = 512
 _SNAP = 1e-3
@@ -92,6 +95,18 @@ def bop_limits(detection: Detection) -> str:
     if detection.group.proper_subgroup().name != "K":
         return ""
     return "BOP cannot express a sphere: three continuous axes through its centre stand for all the others"
+
+
+def metres_doubt(source: str, size: float, option: str) -> str:
+    """That a file taken to be in millimetres may be in metres, as a sentence; empty where nothing speaks for it.
+
+    Args:
+        size: diameter in units of the file.
+        option: of the command line that takes the millimetres in one unit of the file.
+    """
+    if size >= IN_DOUBT:
+        return ""
+    return f"{source}: a diameter of {size:.3g} mm is little; metres? then give {option} 1000"
 
 
 def bop_text(path: Path, entries: Mapping[int, Entry]) -> str:
