@@ -1,13 +1,13 @@
 """`symrefine align`: the map that takes one object onto another."""
 
 import argparse
-import time
 from pathlib import Path
 from typing import Any
 
 from symrefine.cli.outputs import check_outputs, json_writer, tell, write_all
 from symrefine.cli.signs import waiting
 from symrefine.cli.values import add_detection_options
+from symrefine.clock import Clock
 
 HELP = "find the map that takes one object onto another, reflections included"
 DESCRIPTION = (
@@ -41,10 +41,10 @@ def _record(args: argparse.Namespace) -> dict[str, Any]:
     from symrefine.export.records import alignment_record
     from symrefine.load import load
 
-    start = time.perf_counter()
-    source, target = (load(path, measure=args.measure) for path in (args.source, args.target))
-    load_s = time.perf_counter() - start
+    clock = Clock()
+    with clock("load"):
+        source, target = (load(path, measure=args.measure) for path in (args.source, args.target))
     options = {"tolerance": args.tolerance, "scale": args.scale, "seed": args.seed}
     alignment = align(source, target, allow_reflection=not args.rotations_only, **options)
     chosen = options | {"measure": args.measure, "rotations_only": args.rotations_only}
-    return alignment_record(alignment, source, target, options=chosen, load_s=load_s)
+    return alignment_record(alignment, source, target, options=chosen, load_s=clock.seconds["load"])

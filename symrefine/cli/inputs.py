@@ -10,6 +10,7 @@ from glob import glob, has_magic
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from symrefine.clock import Clock
 from symrefine.errors import InputError, SymrefineError, meant, one_line
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ def readable(name: str, suffix: str | None) -> Iterator[str]:
 
 def loaded(name: str, suffix: str | None, read: Callable[[str], "Shape"]) -> "Shape":
     """The shape in what a name stands for, as `readable` says, read by a function of a path."""
-    with readable(name, suffix) as file:
+    with readable(name, suffix) as file, Clock()("load"):
         shape = read(file)
     return shape if file == name else replace(shape, source=NAME)
 

@@ -121,6 +121,11 @@ def say(text: str) -> None:
     sys.stdout.write(text)
 
 
+def say_lines(lines: Iterable[str]) -> None:
+    """Write lines to stdout that were asked for, however quiet it is to be."""
+    say("".join(f"{printable(line)}\n" for line in lines))
+
+
 def note(text: str) -> None:
     """Tell something on stderr, where it is in nobody's way."""
     if not is_quiet():
