@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from shutil import which
 
 import numpy as np
 import pytest
@@ -274,6 +275,43 @@ def test_a_grey_picture_without_symmetry_is_told_of_otsu(run: Run, folder: Path)
     assert told not in run("detect", "f.png", "--threshold", "otsu")[2]
 
 
+# --- completion -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_shells_accept_their_completion(run: Run, folder: Path, shell: str) -> None:
+    status, script, err = run("completion", shell)
+    assert (status, err) == (0, "")
+    assert "symrefine" in script
+    for known in ("symmetrize", "tolerance", "foundationpose"):
+        assert known in script
+    if which(shell) is None:
+        pytest.skip(f"{shell} is not installed")
+    (folder / "script").write_text(script)
+    done = subprocess.run([shell, "-n", "script"], capture_output=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+@pytest.mark.skipif(which("bash") is None, reason="no bash")
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("sym", "symmetrize"),
+        ("detect --tol", "--tolerance"),
+        ("export box.xyz --to found", "foundationpose"),
+        ("detect scal", "scalene.xyz"),
+        ("completion z", "zsh"),
+    ],
+)
+def test_bash_completes(run: Run, folder: Path, typed: str, offered: str) -> None:
+    (folder / "script").write_text(run("completion", "bash")[1])
+    words = typed.split()
+    ask = f"source ./script; COMP_WORDS=(symrefine {typed}); COMP_CWORD={len(words)}; _shtab_symrefine symrefine "
+    ask += f"'{words[-1]}' '{(['symrefine', *words])[-2]}'; echo \"${{COMPREPLY[@]}}\""
+    done = subprocess.run(["bash", "-c", ask], capture_output=True, text=True, timeout=60, check=False)
+    assert offered in done.stdout.split()
+
+
 # --- readers that leave -----------------------------------------------------------------------------------------------
 
 
@@ -294,6 +332,7 @@ def test_a_grey_picture_without_symmetry_is_told_of_otsu(run: Run, folder: Path)
         "export box.xyz --to npz --out a.npz",
         "symmetrize box.xyz -o a.ply",
         "complete ball.npy -o a.ply",
+        "completion bash",
     ],
 )
 def test_a_reader_that_leaves_is_no_error(line: str) -> None:

@@ -2,13 +2,13 @@
 
 import argparse
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NoReturn
 
-from symrefine.cli import align, batch, complete, derive, detect, export, run, symmetrize, view
+from symrefine.cli import align, batch, complete, completion, derive, detect, export, run, symmetrize, view
 from symrefine.errors import InputError, meant
 
-_COMMANDS = (detect, align, derive, export, symmetrize, complete, batch, run, view)
+_COMMANDS = (detect, align, derive, export, symmetrize, complete, batch, run, view, completion)
 _DESCRIPTION = "Symmetry of 3-D shapes: mirror planes, rotation axes and the point group of a mesh or a point cloud."
 _EPILOG = (
     "`symrefine COMMAND --help` explains a command. Exit status: 0 done, 1 some files of a batch or runs failed, 2 bad "
@@ -21,7 +21,20 @@ _CHOICE = re.compile(r"invalid choice: '([^']*)' \(choose from (.*)\)")
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that raises one clear line where argparse would print usage and exit."""
+    """A parser that raises one clear line where argparse would print usage and exit.
+
+    Attributes:
+        commands: the parser of each command, by its name.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.commands: Mapping[str, Parser] = {}
+
+    @property
+    def arguments(self) -> Sequence[argparse.Action]:
+        """Every option and every other argument."""
+        return self._actions
 
     def error(self, message: str) -> NoReturn:
         """Raise the message with what may have been meant and the place to look."""
@@ -51,13 +64,14 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     Raises:
         InputError: unknown commands, options or values.
     """
-    args, rest = _parser().parse_known_args(argv)
+    args, rest = grammar().parse_known_args(argv)
     if rest:
         args.parser.unknown(rest[0])
     return args
 
 
-def _parser() -> Parser:
+def grammar() -> Parser:
+    """The parser of the whole command line."""
     parser = Parser(prog="symrefine", description=_DESCRIPTION, epilog=_EPILOG, allow_abbrev=False)
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -67,6 +81,7 @@ def _parser() -> Parser:
         command.add_arguments(sub)
         _add_loudness(sub)
         sub.set_defaults(run=command.run, parser=sub)
+    parser.commands = commands.choices
     return parser
 
 
