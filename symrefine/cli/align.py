@@ -39,12 +39,16 @@ def run(args: argparse.Namespace) -> int:
 def _record(args: argparse.Namespace) -> dict[str, Any]:
     from symrefine.align.story import align
     from symrefine.export.records import alignment_record
+    from symrefine.lengths import relative_tolerance
     from symrefine.load import load
 
     clock = Clock()
     with clock("load"):
         source, target = (load(path, measure=args.measure) for path in (args.source, args.target))
-    options = {"tolerance": args.tolerance, "scale": args.scale, "seed": args.seed}
-    alignment = align(source, target, allow_reflection=not args.rotations_only, **options)
-    chosen = options | {"measure": args.measure, "rotations_only": args.rotations_only}
-    return alignment_record(alignment, source, target, options=chosen, load_s=clock.seconds["load"])
+    tolerance = relative_tolerance(args.tolerance, target, units=args.units)
+    options = {"scale": args.scale, "seed": args.seed}
+    alignment = align(source, target, allow_reflection=not args.rotations_only, tolerance=tolerance, **options)
+    chosen = {"tolerance": args.tolerance, **options, "measure": args.measure, "rotations_only": args.rotations_only}
+    chosen |= {} if args.units is None else {"units": args.units}
+    record = alignment_record(alignment, source, target, options=chosen, load_s=clock.seconds["load"])
+    return record | {"tolerance": tolerance}

@@ -37,6 +37,7 @@ def run(args: argparse.Namespace) -> int:
     """Detect, complete, write, print how much was seen and inferred."""
     from symrefine.complete import complete
     from symrefine.export.models import marked_bytes
+    from symrefine.lengths import relative_tolerance
 
     check_outputs({"--out": args.out, "--json": args.json}, [Path(args.path)])
     suffix = Path(args.out).suffix.lower()
@@ -44,7 +45,8 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--out {args.out}: cannot mark what is inferred in {suffix or 'that'}; write .ply or .npz")
     with waiting("completing"):
         shape = loaded(args.path, args.format, lambda file: read_scan(file, detection_options(args)))
-        made = complete(shape, outliers=args.outliers, tolerance=args.tolerance, seed=args.seed)
+        tolerance = relative_tolerance(args.tolerance, shape, units=args.units, outliers=args.outliers)
+        made = complete(shape, outliers=args.outliers, tolerance=tolerance, seed=args.seed)
         record = _record(args, shape, made)
         data = marked_bytes(suffix, made.points, made.inferred)
         writers = {args.out: bytes_writer(data)} | json_writer(args.json, record)

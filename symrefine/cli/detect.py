@@ -201,13 +201,15 @@ def examine(
     The detection is a `PlanarDetection`, a `Detection` or a `SubspaceDetection`, as the points have two, three or more
     coordinates.
     """
+    from symrefine.lengths import relative_tolerance
     from symrefine.load import IMAGES
 
     clock = Clock()
     with clock("load"):
         shape = read_scan(path, options, threshold=threshold, invert=invert)
     load_s = clock.seconds["load"]
-    tolerance, seed, outliers = options["tolerance"], options["seed"], options.get("outliers", "auto")
+    seed, outliers = options["seed"], options.get("outliers", "auto")
+    tolerance = relative_tolerance(options["tolerance"], shape, units=options.get("units"), outliers=outliers)
     if shape.labels is not None and shape.dim != 3:
         raise InputError(
             f"{path}: points have {shape.dim} coordinates; labels are for objects in space, leave them out"

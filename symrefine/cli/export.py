@@ -88,10 +88,12 @@ def detected(args: argparse.Namespace) -> tuple["Shape", "Detection"]:
         InputError: a picture, or points with two coordinates.
     """
     from symrefine.detection.story import detect
+    from symrefine.lengths import relative_tolerance
     from symrefine.load import load
 
     shape = loaded(args.path, args.format, partial(load, measure=args.measure))
-    return shape, detect(shape, tolerance=args.tolerance, seed=args.seed)
+    tolerance = relative_tolerance(args.tolerance, shape, units=args.units)
+    return shape, detect(shape, tolerance=tolerance, seed=args.seed)
 
 
 def _check(args: argparse.Namespace) -> None:

@@ -68,7 +68,7 @@ def _symmetrize(args: argparse.Namespace, shape: "Shape", detection: "Detection"
     if detection.point_group == "C1":
         raise InputError(f"{args.path}: is C1, nothing to make symmetric{_nearest_miss(detection)}")
     group = detection.group if args.group is None else placed_subgroup(detection.group, args.group)
-    return symmetrize(shape, group, detection.center, tolerance=args.tolerance, seed=args.seed)
+    return symmetrize(shape, group, detection.center, tolerance=detection.tolerance, seed=args.seed)
 
 
 def _nearest_miss(detection: "Detection") -> str:

@@ -102,7 +102,13 @@ def headline(record: Record) -> str:
         return f"undetermined: {record['undetermined']}"
     means = _planar_meaning(record) if "lines" in record else meaning(point_group(name))
     name = f"at least {name}" if record.get("at_least") else name
-    return f"{name}, {means}; tolerance {100 * record['tolerance']:g} %, confidence {record['confidence']:.2f}"
+    return f"{name}, {means}; tolerance {_tolerance(record)}, confidence {record['confidence']:.2f}"
+
+
+def _tolerance(record: Record) -> str:
+    """The tolerance as a fraction of the diagonal, and as the length that was asked for, if it was one."""
+    asked, relative = record["options"]["tolerance"], 100 * record["tolerance"]
+    return f"{asked}, {relative:.3g} %" if isinstance(asked, str) else f"{relative:g} %"
 
 
 def _planar_meaning(record: Record) -> str:
@@ -226,7 +232,7 @@ def misfit(record: Record) -> str:
     maps = "rotation" if options["rotations_only"] else "orthogonal map"
     maps += " with any scale" if options["scale"] else ""
     # Elsewhere than in space the sampling noise of the moments decides, not the tolerance.
-    within = f" within {100 * options['tolerance']:g} % of the diagonal" if "tolerance" in reason else ""
+    within = f" within {100 * record['tolerance']:.4g} % of the diagonal" if "tolerance" in reason else ""
     return f"{record['source']} onto {record['target']}: no {maps} takes the one onto the other{within}: {reason}"
 
 

@@ -4,6 +4,9 @@ import argparse
 import math
 from typing import Any, Literal
 
+from symrefine.errors import InputError
+from symrefine.units import METRES, read_length
+
 # The same as `verify.TOLERANCE` and the range that `detect` takes, which are too heavy to import for `--help`.
 TOLERANCE, LARGEST_TOLERANCE = 0.02, 0.2
 
@@ -15,8 +18,14 @@ def add_detection_options(parser: argparse.ArgumentParser, counts_as: str = "sym
         type=tolerance,
         default=TOLERANCE,
         metavar="REL",
-        help=f"largest miss that counts as {counts_as}, as a fraction of the bounding-box diagonal "
-        "(default: %(default)s)",
+        help=f"largest miss that counts as {counts_as}, as a fraction of the bounding-box diagonal, or as a length: "
+        "0.5mm, 0.1A, 0.5u in units of the file (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--units",
+        choices=tuple(METRES),
+        help="what a length of 1 in the file is, for a tolerance in such units (default: what the format says, "
+        "angstrom for molecules, metres for glTF)",
     )
     parser.add_argument(
         "--measure",
@@ -73,8 +82,8 @@ def add_depth_options(parser: argparse.ArgumentParser) -> None:
 
 
 def detection_options(args: argparse.Namespace) -> dict[str, Any]:
-    """What was chosen of the options of a detection, for its record; names of fields only where one is given."""
-    named = {name: given for name in ("labels", "weights") if (given := getattr(args, name, None)) is not None}
+    """What was chosen of the options of a detection, for its record; units and names of fields only where given."""
+    named = {name: given for name in ("units", "labels", "weights") if (given := getattr(args, name, None)) is not None}
     how = ("outliers", "viewpoint", "intrinsics", "depth_scale", "mask")
     scan = {name: given for name in how if (given := getattr(args, name, None)) is not None}
     return {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed} | scan | named
@@ -98,12 +107,19 @@ def add_class_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def tolerance(text: str) -> float:
-    """A fraction of the diagonal."""
+def tolerance(text: str) -> float | str:
+    """A fraction of the diagonal, or a length with its unit as it was written."""
     value = _float(text)
+    if math.isnan(value) and text[-1:].isalpha() and text[:1].isdigit():
+        try:
+            read_length(text)
+        except InputError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+        return text
     if not 0.0 < value <= LARGEST_TOLERANCE:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not a fraction of the bounding-box diagonal in (0, {LARGEST_TOLERANCE}], such as 0.02"
+            f"{text!r} is not a fraction of the bounding-box diagonal in (0, {LARGEST_TOLERANCE}], such as 0.02, nor a "
+            "length with its unit, such as 0.5mm"
         )
     return value
 
