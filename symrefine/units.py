@@ -17,6 +17,8 @@ OF_FILE = "u"
 FIXED: Mapping[str, str] = {
     ".cif": "A", ".glb": "m", ".gltf": "m", ".mol": "A", ".pdb": "A", ".sdf": "A",
 }  # fmt: skip
+# Things that people scan, model and grasp measure 5 mm to 5 m: as numbers, millimetres and metres do not overlap.
+EVERYDAY_M = (5e-3, 5.0)
 _LENGTH = re.compile(r"([-+0-9.eE]*[0-9.])\s*([^\W\d_]+)")
 _SPELT = {"µm": "um", "μm": "um", "Å": "A", "å": "A"}
 
@@ -53,3 +55,9 @@ def unit_of_format(source: str, *, labelled: bool) -> str | None:
     path = Path(source)
     suffix = (path.with_suffix("") if path.suffix.lower() == ".gz" else path).suffix.lower()
     return "A" if suffix == ".xyz" and labelled else FIXED.get(suffix)
+
+
+def unit_of_size(size: float) -> str | None:
+    """The one of millimetres and metres in which a size is that of an everyday thing; None if it is in neither."""
+    low, high = EVERYDAY_M
+    return next((unit for unit in ("mm", "m") if low <= size * METRES[unit] < high), None)

@@ -333,11 +333,15 @@ def test_bash_completes(run: Run, folder: Path, typed: str, offered: str) -> Non
         "symmetrize box.xyz -o a.ply",
         "complete ball.npy -o a.ply",
         "completion bash",
+        "info box.xyz",
+        "run --list",
     ],
 )
 def test_a_reader_that_leaves_is_no_error(line: str) -> None:
     points = np.random.default_rng(0).standard_normal((3000, 3))
     np.save("ball.npy", points / np.linalg.norm(points, axis=1)[:, None])
+    Path("configs").mkdir()
+    Path("configs/a.yaml").write_text("experiment: a\n")
     read, write = os.pipe()
     os.close(read)
     command = [sys.executable, "-m", "symrefine", *line.split()]

@@ -53,6 +53,11 @@ def add_scan_options(parser: argparse.ArgumentParser) -> None:
         help="auto: points of a cloud that belong to no surface, single or in clumps, are set apart and told; none: "
         "all points count (default: %(default)s)",
     )
+    add_viewpoint(parser)
+
+
+def add_viewpoint(parser: argparse.ArgumentParser) -> None:
+    """The option that says where points were seen from."""
     parser.add_argument(
         "--viewpoint",
         type=place,
@@ -82,11 +87,14 @@ def add_depth_options(parser: argparse.ArgumentParser) -> None:
 
 
 def detection_options(args: argparse.Namespace) -> dict[str, Any]:
-    """What was chosen of the options of a detection, for its record; units and names of fields only where given."""
-    named = {name: given for name in ("units", "labels", "weights") if (given := getattr(args, name, None)) is not None}
-    how = ("outliers", "viewpoint", "intrinsics", "depth_scale", "mask")
-    scan = {name: given for name in how if (given := getattr(args, name, None)) is not None}
-    return {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed} | scan | named
+    """What was chosen of the options of a detection, for its record."""
+    return {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed} | reading_options(args)
+
+
+def reading_options(args: argparse.Namespace) -> dict[str, Any]:
+    """What was chosen of the options that say how points were taken and what of the file counts, where given."""
+    how = ("outliers", "viewpoint", "intrinsics", "depth_scale", "mask", "units", "labels", "weights")
+    return {name: given for name in how if (given := getattr(args, name, None)) is not None}
 
 
 def add_class_options(parser: argparse.ArgumentParser) -> None:

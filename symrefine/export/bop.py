@@ -26,12 +26,10 @@ from symrefine.geometry import Array, Isometry, frame_with_z, rotation, toward_p
 from symrefine.groups import PointGroup
 from symrefine.shape import Shape
 from symrefine.symmetrize import exact_place
+from symrefine.units import EVERYDAY_M, METRES
 
 Entry = dict[str, Any]
 
-# Diameter in units of a file below which millimetres are doubted: objects to be grasped are larger, and in metres few
-# are as large.
-IN_DOUBT = 5.0
 # Points whose distances are formed at once.
 _BLOCK = 512
 _SNAP = 1e-3
@@ -104,7 +102,7 @@ def metres_doubt(source: str, size: float, option: str) -> str:
         size: diameter in units of the file.
         option: of the command line that takes the millimetres in one unit of the file.
     """
-    if size >= IN_DOUBT:
+    if size * METRES["mm"] >= EVERYDAY_M[0]:
         return ""
     return f"{source}: a diameter of {size:.3g} mm is little; metres? then give {option} 1000"
 
