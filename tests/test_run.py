@@ -59,6 +59,8 @@ def test_run_prints_its_tables_and_tells_failures(config: Path, capsys: pytest.C
     assert "1 of 8 runs failed" in out
     assert out.splitlines()[-1] == "8 runs, 1 failed, written to out/thirds"
     assert err == "symrefine: note: a run failed: three is refused\n"
+    assert invoke(["run", str(config), "--quiet"]) == 1
+    assert capsys.readouterr() == ("", "symrefine: a run failed: three is refused\n")
     assert invoke(["run", str(config), "--limit", "2", "--out", "few"]) == 0
     assert invoke(["run", str(config), "--set", "sweep.seed=[0, 1]", "--out", "few"]) == 2
     assert "few: holds rows of another config" in capsys.readouterr().err

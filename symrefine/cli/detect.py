@@ -186,11 +186,9 @@ def _notes(args: argparse.Namespace, shape: "Shape", detection: Any, record: dic
 
         doubt = "" if args.bop_scale else metres_doubt(shape.source, diameter(shape.points), "--bop-scale")
         yield from filter(None, (bop_limits(detection), doubt))
-    from symrefine.load import IMAGES
-
-    is_grey = shape.dim == 2 and Path(args.path[0]).suffix.lower() in IMAGES and args.threshold is None
+    is_grey = "threshold" in record["options"] and args.threshold is None
     if is_grey and (record["undetermined"] or record["point_group"] == "C1"):
-        yield f"{args.path[0]}: if object and background are of different grey, try --threshold otsu"
+        yield f"{shape.source}: if object and background are of different grey, try --threshold otsu"
 
 
 def examine(
@@ -276,7 +274,7 @@ def _writers(args: argparse.Namespace, shape: "Shape", detection: "Detection") -
     for option, name in {"--bop": args.bop, "--recording": args.recording, "--report": args.report}.items():
         if name is not None and shape.dim != 3:
             where = "lies in the plane" if shape.dim == 2 else f"has {shape.dim} coordinates"
-            raise InputError(f"{option} {name}: is for objects in space; {args.path} {where}, use --json")
+            raise InputError(f"{option} {name}: is for objects in space; {shape.source} {where}, use --json")
     if args.bop is not None:
         from symrefine.export.bop import bop_entry, bop_text
 

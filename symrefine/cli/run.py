@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from symrefine.cli.outputs import is_quiet, note, print_lines, say, say_lines
+from symrefine.cli.outputs import complain, is_quiet, note, print_lines, say, say_lines
 from symrefine.cli.signs import progress
 from symrefine.cli.values import count
 from symrefine.errors import InputError
@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     if outcome.tables and not is_quiet():
         say(outcome.tables + "\n")
     for row in [row for row in outcome.rows if row["error"] is not None][:5]:
-        note(f"a run failed: {row['error']}")
+        (complain if is_quiet() else note)(f"a run failed: {row['error']}")
     parts = [f"{len(outcome.rows)} runs", f"{outcome.resumed} done before" if outcome.resumed else ""]
     parts += [f"{outcome.failed} failed" if outcome.failed else "", f"written to {folder}"]
     print_lines([", ".join(part for part in parts if part)])
