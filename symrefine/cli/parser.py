@@ -65,6 +65,8 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
         InputError: unknown commands, options or values.
     """
     args, rest = grammar().parse_known_args(argv)
+    if isinstance(getattr(args, "path", None), list) and not any(word.startswith("-") for word in rest):
+        args.path, rest = args.path + rest, []  # argparse takes only files that stand together
     if rest:
         args.parser.unknown(rest[0])
     return args
