@@ -120,7 +120,12 @@ def test_every_command_that_takes_a_tolerance_takes_a_length(run: Run) -> None:
     asked = ("--tolerance", "0.1mm", "--units", "cm")
     found = json.loads(run("align", "box.csv", "box.csv", *asked, "--json", "-")[1])
     assert found["options"]["tolerance"] == "0.1mm"
-    assert found["tolerance"] == pytest.approx(0.01 / (2 * np.sqrt(14)), rel=0.03)
+    assert found["options"]["relative_tolerance"] == pytest.approx(0.01 / (2 * np.sqrt(14)), rel=0.03)
+    other = BOX[[0, 1, 2, 4]] * [1, 1, 2]
+    Path("deep").mkdir()
+    np.savetxt("deep/other.csv", other, delimiter=",")
+    told = run("align", "box.csv", "deep/other.csv", "--tolerance", "0.01u", "--rotations-only")[1]
+    assert f"within {1 / object_diagonal(Shape(points=other)):.4g} % of the diagonal" in told
     assert run("export", "box.csv", "--to", "npz", "--out", "a.npz", *asked)[0] == 0
     assert run("symmetrize", "box.csv", "-o", "a.ply", *asked)[0] == 0
     status, out, _ = run("batch", ".", "--tolerance", "0.1mm")

@@ -49,6 +49,6 @@ def _record(args: argparse.Namespace) -> dict[str, Any]:
     options = {"scale": args.scale, "seed": args.seed}
     alignment = align(source, target, allow_reflection=not args.rotations_only, tolerance=tolerance, **options)
     chosen = {"tolerance": args.tolerance, **options, "measure": args.measure, "rotations_only": args.rotations_only}
-    chosen |= {} if args.units is None else {"units": args.units}
-    record = alignment_record(alignment, source, target, options=chosen, load_s=clock.seconds["load"])
-    return record | {"tolerance": tolerance}
+    chosen |= {"units": args.units} if args.units else {}
+    chosen |= {"relative_tolerance": tolerance} if isinstance(args.tolerance, str) else {}
+    return alignment_record(alignment, source, target, options=chosen, load_s=clock.seconds["load"])

@@ -232,7 +232,8 @@ def misfit(record: Record) -> str:
     maps = "rotation" if options["rotations_only"] else "orthogonal map"
     maps += " with any scale" if options["scale"] else ""
     # Elsewhere than in space the sampling noise of the moments decides, not the tolerance.
-    within = f" within {100 * record['tolerance']:.4g} % of the diagonal" if "tolerance" in reason else ""
+    tolerance = options.get("relative_tolerance", options["tolerance"])
+    within = f" within {100 * tolerance:.4g} % of the diagonal" if "tolerance" in reason else ""
     return f"{record['source']} onto {record['target']}: no {maps} takes the one onto the other{within}: {reason}"
 
 
