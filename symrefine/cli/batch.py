@@ -175,15 +175,17 @@ def _write_bop(name: str, rows: dict[str, Row], *, told: bool) -> int:
     for file, row in sorted(rows.items()):
         found = row.get("bop", {"note": row["error"]})
         if found.get("note"):
-            note(found["note"])
+            lost = "entry" not in found and row["error"] is None
+            (complain if lost and is_quiet() else note)(found["note"])
         if "entry" in found:
             entries[int(_BOP_NAME.fullmatch(Path(file).stem)[1])] = found["entry"]  # type: ignore[index]
         else:
             left_out += 1
     write_all({name: text_writer(bop_text(Path(name), dict(sorted(entries.items()))))})
-    sizes = [(row["bop"]["entry"]["diameter"], file) for file, row in rows.items() if "entry" in row.get("bop", {})]
-    if sizes and not told and (doubt := metres_doubt(min(sizes)[1], min(sizes)[0], "--bop-scale")):
-        note(doubt)
+    if entries and not told:
+        size, number = min((entry["diameter"], number) for number, entry in entries.items())
+        if doubt := metres_doubt(f"object {number}", size, "--bop-scale"):
+            note(doubt)
     print_lines([f"wrote {name}: {len(entries)} of {len(rows)} objects"])
     return left_out
 

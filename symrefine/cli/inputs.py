@@ -46,13 +46,13 @@ def readable(name: str, suffix: str | None) -> Iterator[str]:
         suffix: the format of stdin, as a file would have it, with or without its dot.
 
     Raises:
-        InputError: stdin without a format, a format without stdin, or one that is not known; a suffix that is not
-            known and close to one that is; whatever is wrong with what came on stdin is told under that name.
+        InputError: stdin without a format, a format without stdin, or one that is not known; a directory; a suffix
+            that is close to a known one; whatever is wrong with what came on stdin, under that name.
     """
     if name != STDIN:
         if suffix is not None:
             raise InputError(f"--format {suffix}: is for PATH -, which reads stdin; {name} has its suffix")
-        _check_suffix(Path(name))
+        _check_named(Path(name))
         yield name
         return
     with tempfile.TemporaryDirectory(prefix="symrefine-") as folder:
@@ -87,14 +87,16 @@ def _known_suffix(name: str | None) -> str:
     if name is None:
         raise InputError(f"-: reads stdin, which has no suffix; say what it holds: --format {_bare(known)}")
     suffix = f".{name.lower().removeprefix('.')}"
-    if suffix not in known:
+    if suffix.removesuffix(".gz") not in known:
         close = meant(suffix[1:], (k[1:] for k in known))
         raise InputError(f"--format {name}: is not known; expected one of {_bare(known)}{close}")
     return suffix
 
 
-def _check_suffix(path: Path) -> None:
-    """Refuse a suffix that is a slip of the pen; whatever else is wrong the readers tell."""
+def _check_named(path: Path) -> None:
+    """Refuse slips of the pen with what may have been meant; whatever else is wrong the readers tell."""
+    if path.is_dir():
+        raise InputError(f"{path}: is a directory; expected a file (`symrefine batch {path}` takes all that are in it)")
     known, suffix = _suffixes(), path.suffix.lower()
     if suffix not in known and path.is_file() and (close := meant(suffix, known)):
         raise InputError(f"{path}: unknown suffix {path.suffix!r}; known are {' '.join(known)}{close}")
