@@ -186,7 +186,7 @@ def _notes(args: argparse.Namespace, shape: "Shape", detection: Any, record: dic
 
         doubt = "" if args.bop_scale else metres_doubt(shape.source, diameter(shape.points), "--bop-scale")
         yield from filter(None, (bop_limits(detection), doubt))
-    is_grey = "threshold" in record["options"] and args.threshold is None
+    is_grey = shape.dim == 2 and "threshold" in record["options"] and args.threshold is None
     if is_grey and (record["undetermined"] or record["point_group"] == "C1"):
         yield f"{shape.source}: if object and background are of different grey, try --threshold otsu"
 
