@@ -1,8 +1,13 @@
-"""Wall-clock seconds by stage."""
+"""Wall-clock seconds by stage; whoever wants to know is told of each stage while it passes."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
+
+# Called with the name of a stage when it begins, and once more, with its seconds, when it has ended.
+Watcher = Callable[[str, float | None], None]
+_watcher: ContextVar[Watcher | None] = ContextVar("watcher", default=None)
 
 
 class Clock:
@@ -14,6 +19,23 @@ class Clock:
     @contextmanager
     def __call__(self, stage: str) -> Iterator[None]:
         """Time one stage."""
+        told = _watcher.get() or _nobody
+        told(stage, None)
         start = time.perf_counter()
         yield
         self.seconds[stage] = time.perf_counter() - start
+        told(stage, self.seconds[stage])
+
+
+@contextmanager
+def watched(by: Watcher) -> Iterator[None]:
+    """Tell `by` of every stage that any clock of this thread times meanwhile."""
+    token = _watcher.set(by)
+    try:
+        yield
+    finally:
+        _watcher.reset(token)
+
+
+def _nobody(_stage: str, _seconds: float | None) -> None:
+    """The watcher where there is none."""

@@ -1,6 +1,6 @@
 """What can go wrong, as types: the shell turns each into one line and exit status 2."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 
@@ -27,3 +27,21 @@ def about(what: str) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(f"{what}: {error}") from None
+
+
+def meant(word: str, known: Iterable[str]) -> str:
+    """`; did you mean X?`, to end a message with, where one of the known words is close to an unknown one."""
+    from difflib import get_close_matches
+
+    close = get_close_matches(word, [*known], 1)
+    return f"; did you mean {close[0]}?" if close else ""
+
+
+def printable(text: str) -> str:
+    """A text in which characters that would steer a terminal, and those that it cannot show, are spelled out."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def one_line(text: object) -> str:
+    """A text on one line, printable."""
+    return printable(" ".join(str(text).split()))

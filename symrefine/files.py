@@ -6,7 +6,7 @@ A file that grows row by row has one writer at a time.
 import json
 import os
 import secrets
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -99,6 +99,15 @@ def json_text(data: Mapping[str, Any]) -> str:
     """
     entries = [f"  {json.dumps(key)}: {_entry(value)}" for key, value in data.items()]
     return "{\n" + ",\n".join(entries) + "\n}\n"
+
+
+def json_array_text(records: Iterable[Mapping[str, Any]]) -> str:
+    """Strict JSON in ASCII of several records, each as `json_text` writes it.
+
+    Raises:
+        ValueError: NaN or infinity, which JSON does not know.
+    """
+    return "[\n" + ",\n".join(json_text(record).rstrip("\n") for record in records) + "\n]\n"
 
 
 def _entry(value: Any) -> str:

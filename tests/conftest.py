@@ -2,6 +2,14 @@
 
 from __future__ import annotations
 
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def no_signs_of_life(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a slow machine commands tell every ten seconds that they are alive; here stderr tells what went wrong."""
+    monkeypatch.setattr("symrefine.cli.signs.EVERY", 3600.0)
+
 
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
     """Bytes name no test: archives carry the second they were made in, and two workers would disagree."""

@@ -59,6 +59,8 @@ def test_run_prints_its_tables_and_tells_failures(config: Path, capsys: pytest.C
     assert "1 of 8 runs failed" in out
     assert out.splitlines()[-1] == "8 runs, 1 failed, written to out/thirds"
     assert err == "symrefine: note: a run failed: three is refused\n"
+    assert invoke(["run", str(config), "--quiet"]) == 1
+    assert capsys.readouterr() == ("", "symrefine: a run failed: three is refused\n")
     assert invoke(["run", str(config), "--limit", "2", "--out", "few"]) == 0
     assert invoke(["run", str(config), "--set", "sweep.seed=[0, 1]", "--out", "few"]) == 2
     assert "few: holds rows of another config" in capsys.readouterr().err
@@ -67,9 +69,28 @@ def test_run_prints_its_tables_and_tells_failures(config: Path, capsys: pytest.C
     assert "2 runs, 2 done before, written to few" in capsys.readouterr().out
 
 
+def test_what_there_is_to_run_is_listed(config: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert invoke(["run", "--list"]) == 2
+    assert "configs: no configs there" in capsys.readouterr().err
+    (config.parent / "configs").mkdir()
+    (config.parent / "configs" / "b.yaml").write_text(CONFIG)
+    (config.parent / "configs" / "a.yaml").write_text(f"title: By three\n{CONFIG}")
+    (config.parent / "configs" / "other.yaml").write_text("seeds: 3\n")
+    assert invoke(["run", "--list"]) == 0
+    assert capsys.readouterr().out == "configs/a.yaml  By three\nconfigs/b.yaml  wait_and_divide\n"
+    before = sorted(config.parent.iterdir())
+    assert invoke(["run", str(config), "--list", "--limit", "2", "--set", "sweep.wait=[0.5, 1]"]) == 2
+    assert "is in `sweep` too" in capsys.readouterr().err
+    assert invoke(["run", str(config), "--list", "--limit", "2"]) == 0
+    assert capsys.readouterr().out == "1  seed=0\n2  seed=1\n"
+    assert [path for path in sorted(config.parent.iterdir()) if path.name != "__pycache__"] == before
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        ([], "CONFIG.yaml is missing; `symrefine run --list` names"),
+        (["thirds.yaml", "--set", "tabels=1"], "did you mean tables?"),
         (["none.yaml"], "none.yaml: no such config file"),
         (["thirds.yaml", "--set", "sweep.sede=1"], "--set sweep.sede=1: sweep.sede: wait_and_divide has no field"),
         (["thirds.yaml", "--set", "fixed.wait=no"], "--set fixed.wait=no: fixed.wait: expected float, got 'no'"),

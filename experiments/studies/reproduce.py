@@ -102,7 +102,7 @@ def missing_models() -> str:
 
 def run_part(path: Path, out: Path, *, full: bool, workers: int) -> Part:
     """Run one study; rows of another version of the code are done again."""
-    from symrefine.cli.outputs import progress
+    from symrefine.cli.signs import progress
     from symrefine.study.plan import make_plan
     from symrefine.study.runner import run_study
 

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Sequence
 from typing import NoReturn
 
-from symrefine.errors import SymrefineError
+from symrefine.errors import SymrefineError, one_line
 
 BAD_INPUT, BUG, INTERRUPTED, BROKEN_PIPE = 2, 70, 130, 141
 
@@ -45,18 +45,23 @@ def invoke(argv: Sequence[str]) -> int:
 
 
 def _command(argv: Sequence[str]) -> int:
+    from symrefine.cli.outputs import loudness
     from symrefine.cli.parser import parse
 
     try:
         args = parse(argv)
     except SystemExit as done:  # argparse after --help and --version
         return int(done.code or 0)
-    status: int = args.run(args)
-    return status
+    token = loudness.set("quiet" if args.quiet else "verbose" if args.verbose else "normal")
+    try:
+        status: int = args.run(args)
+        return status
+    finally:
+        loudness.reset(token)
 
 
 def _refuse(message: str, status: int) -> int:
-    print("symrefine:", " ".join(message.split()), file=sys.stderr)
+    print("symrefine:", one_line(message), file=sys.stderr)
     return status
 
 

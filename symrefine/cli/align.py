@@ -1,12 +1,13 @@
 """`symrefine align`: the map that takes one object onto another."""
 
 import argparse
-import time
 from pathlib import Path
 from typing import Any
 
-from symrefine.cli.outputs import check_outputs, json_writer, tell, waiting, write_all
+from symrefine.cli.outputs import check_outputs, json_writer, tell, write_all
+from symrefine.cli.signs import waiting
 from symrefine.cli.values import add_detection_options
+from symrefine.clock import Clock
 
 HELP = "find the map that takes one object onto another, reflections included"
 DESCRIPTION = (
@@ -37,12 +38,16 @@ def run(args: argparse.Namespace) -> int:
 
 def _record(args: argparse.Namespace) -> dict[str, Any]:
     from symrefine.front.verbs import align
+    from symrefine.lengths import relative_tolerance
     from symrefine.load import load
 
-    start = time.perf_counter()
-    source, target = (load(path, measure=args.measure) for path in (args.source, args.target))
-    load_s = time.perf_counter() - start
-    options = {"tolerance": args.tolerance, "scale": args.scale, "seed": args.seed}
-    found = align(source, target, allow_reflection=not args.rotations_only, **options)
-    chosen = options | {"measure": args.measure, "rotations_only": args.rotations_only}
-    return found.to_dict(options=chosen, load_s=load_s)
+    clock = Clock()
+    with clock("load"):
+        source, target = (load(path, measure=args.measure) for path in (args.source, args.target))
+    tolerance = relative_tolerance(args.tolerance, target, units=args.units)
+    options = {"scale": args.scale, "seed": args.seed}
+    found = align(source, target, allow_reflection=not args.rotations_only, tolerance=tolerance, **options)
+    chosen = {"tolerance": args.tolerance, **options, "measure": args.measure, "rotations_only": args.rotations_only}
+    chosen |= {"units": args.units} if args.units else {}
+    chosen |= {"relative_tolerance": tolerance} if isinstance(args.tolerance, str) else {}
+    return found.to_dict(options=chosen, load_s=clock.seconds["load"])

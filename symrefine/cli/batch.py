@@ -7,7 +7,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from symrefine import journal
-from symrefine.cli.outputs import check_beside, check_outputs, console, note, progress, text_writer, write_all
+from symrefine.cli.inputs import failure
+from symrefine.cli.outputs import (
+    check_beside,
+    check_outputs,
+    complain,
+    is_quiet,
+    note,
+    print_lines,
+    text_writer,
+    write_all,
+)
+from symrefine.cli.signs import progress
 from symrefine.cli.values import (
     add_class_options,
     add_detection_options,
@@ -16,7 +27,7 @@ from symrefine.cli.values import (
     detection_options,
     positive,
 )
-from symrefine.errors import InputError, SymrefineError
+from symrefine.errors import InputError
 from symrefine.files import naming
 
 if TYPE_CHECKING:
@@ -26,11 +37,10 @@ if TYPE_CHECKING:
 
 HELP = "detect the symmetries of every file in a directory"
 DESCRIPTION = (
-    "Detect the symmetries of every mesh and cloud in DIR and print a line for each. With --out, also append a JSON "
-    "row for each file as soon as it is done; run again, files whose content and options have a row are not done "
-    "again. A file that cannot be used gives a row with its error, the others go on, and the exit status is 1. With "
-    "--bop, DIR is a folder of models as BOP names them, obj_000001.ply for object 1, and one models_info.json holds "
-    "all of them."
+    "Detect the symmetries of every mesh and cloud in DIR and print a line for each as soon as it is done. With --out, "
+    "also append a JSON row for each; run again, files whose content and options have a row are not done again. A file "
+    "that cannot be used gives a row with its error, the others go on, and the exit status is 1. With --bop, DIR is a "
+    "folder of models as BOP names them, obj_000001.ply for object 1, and one models_info.json holds all of them."
 )
 
 Row = dict[str, Any]
@@ -64,29 +74,39 @@ def run(args: argparse.Namespace) -> int:
     check_beside("--bop", args.bop, {"--bop-scale": args.bop_scale})
     scale = _check_bop(args, files)
     options = detection_options(args)
+    from symrefine.cli.tables import ROW_HEAD, row_line
     from symrefine.study.work import in_processes
 
     with opened(Path(args.out)) if args.out else nullcontext() as out:
         if out and out.torn:
             note(f"{args.out}: the last row is incomplete; it is removed and done again")
-        latest = {row["file"]: row for row in out.rows if row["file"] in files} if out else {}
-        rows = {name: row for name, row in latest.items() if _holds(row, args.dir, options, scale)}
+        latest = {row["file"]: row for row in out.rows} if out else {}
+        done = {name: latest[name] for name in files if name in latest}
+        rows = {name: row for name, row in done.items() if _holds(row, args.dir, options, scale)}
         jobs = [(args.dir, name, options, scale) for name in files if name not in rows]
+        print_lines([ROW_HEAD, *(row_line(name, row) for name, row in rows.items())])
         with progress("detecting", len(files), len(rows)) as advance:
             for row in in_processes(examine_file, jobs, args.workers):
                 if out:
                     with naming(args.out):
                         out.append(row)
                 rows[row["file"]] = row
+                _show(row)
                 advance()
-    from symrefine.cli.tables import batch_table
-
-    screen, kept, failed = console(), len(files) - len(jobs), sum(row["error"] is not None for row in rows.values())
-    screen.print(batch_table([rows[name] for name in files]))
+    kept, failed = len(files) - len(jobs), sum(row["error"] is not None for row in rows.values())
     parts = [f"{len(files)} files", f"{kept} done before" if kept else "", f"{failed} failed" if failed else ""]
-    screen.print(", ".join(part for part in parts if part))
-    left_out = _write_bop(args.bop, rows) if args.bop else 0
+    print_lines([", ".join(part for part in parts if part)])
+    left_out = _write_bop(args.bop, rows, told=args.bop_scale is not None) if args.bop else 0
     return int(left_out > 0 or failed > 0)
+
+
+def _show(row: Row) -> None:
+    """A line for a file that was done, and an error even where nothing else is told."""
+    from symrefine.cli.tables import row_line
+
+    if is_quiet() and row["error"] is not None:
+        complain(row["error"])
+    print_lines([row_line(row["file"], row)])
 
 
 def _check_bop(args: argparse.Namespace, files: list[str]) -> float | None:
@@ -143,21 +163,30 @@ def _head(path: Path, name: str, options: dict[str, Any]) -> Row:
     return row
 
 
-def _write_bop(name: str, rows: dict[str, Row]) -> int:
-    """Write the entries of all rows that have one; tells of the others, and how many they are."""
-    from symrefine.export.bop import bop_text
+def _write_bop(name: str, rows: dict[str, Row], *, told: bool) -> int:
+    """Write the entries of all rows that have one; tells of the others, and how many they are.
+
+    Args:
+        told: whether the millimetres in one unit were given, so that there is nothing to doubt.
+    """
+    from symrefine.export.bop import bop_text, metres_doubt
 
     entries, left_out = {}, 0
     for file, row in sorted(rows.items()):
         found = row.get("bop", {"note": row["error"]})
         if found.get("note"):
-            note(found["note"])
+            lost = "entry" not in found and row["error"] is None
+            (complain if lost and is_quiet() else note)(found["note"])
         if "entry" in found:
             entries[int(_BOP_NAME.fullmatch(Path(file).stem)[1])] = found["entry"]  # type: ignore[index]
         else:
             left_out += 1
     write_all({name: text_writer(bop_text(Path(name), dict(sorted(entries.items()))))})
-    console().print(f"wrote {name}: {len(entries)} of {len(rows)} objects", soft_wrap=True)
+    if entries and not told:
+        size, number = min((entry["diameter"], number) for number, entry in entries.items())
+        if doubt := metres_doubt(f"object {number}", size, "--bop-scale"):
+            note(doubt)
+    print_lines([f"wrote {name}: {len(entries)} of {len(rows)} objects"])
     return left_out
 
 
@@ -187,12 +216,8 @@ def examine_file(job: Job) -> Row:
     try:
         shape, detection, record = examine(str(path), options)
         return row | record | ({} if scale is None else {"bop": _bop(detection, shape, scale)})
-    except (SymrefineError, OSError) as error:
-        return row | {"error": " ".join(str(error).split())}
-    except MemoryError:
-        return row | {"error": f"{path}: out of memory"}
     except Exception as error:  # noqa: BLE001 - one file must not end the others
-        return row | {"error": f"{path}: internal error: {type(error).__name__}: {error}"}
+        return row | {"error": failure(str(path), error)}
 
 
 def _bop(found: "Detection | PlanarDetection", shape: "Shape", scale: float) -> Row:

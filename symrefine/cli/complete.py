@@ -5,8 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from symrefine.cli.detect import read_scan
-from symrefine.cli.outputs import bytes_writer, check_outputs, json_writer, note, tell, waiting, write_all
-from symrefine.cli.values import add_depth_options, add_detection_options, add_scan_options, detection_options
+from symrefine.cli.inputs import loaded
+from symrefine.cli.outputs import bytes_writer, check_outputs, json_writer, note, tell, write_all
+from symrefine.cli.signs import waiting
+from symrefine.cli.values import add_depth_options, add_detection_options, add_path, add_scan_options, detection_options
 from symrefine.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ DESCRIPTION = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", metavar="PATH", help="point cloud")
+    add_path(parser, "point cloud")
     parser.add_argument("-o", "--out", required=True, metavar="OUT", help="file to write: .ply or .npz")
     parser.add_argument("--json", metavar="FILE|-", help="write the figures as JSON; - is stdout, with no table")
     add_scan_options(parser)
@@ -35,14 +37,16 @@ def run(args: argparse.Namespace) -> int:
     """Detect, complete, write, print how much was seen and inferred."""
     from symrefine.complete import complete
     from symrefine.export.models import marked_bytes
+    from symrefine.lengths import relative_tolerance
 
     check_outputs({"--out": args.out, "--json": args.json}, [Path(args.path)])
     suffix = Path(args.out).suffix.lower()
     if suffix not in (".ply", ".npz"):
         raise InputError(f"--out {args.out}: cannot mark what is inferred in {suffix or 'that'}; write .ply or .npz")
     with waiting("completing"):
-        shape = read_scan(args.path, detection_options(args))
-        made = complete(shape, outliers=args.outliers, tolerance=args.tolerance, seed=args.seed)
+        shape = loaded(args.path, args.format, lambda file: read_scan(file, detection_options(args)))
+        tolerance = relative_tolerance(args.tolerance, shape, units=args.units, outliers=args.outliers)
+        made = complete(shape, outliers=args.outliers, tolerance=tolerance, seed=args.seed)
         record = _record(args, shape, made)
         data = marked_bytes(suffix, made.points, made.inferred)
         writers = {args.out: bytes_writer(data)} | json_writer(args.json, record)

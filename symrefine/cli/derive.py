@@ -3,7 +3,8 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from symrefine.cli.outputs import STDOUT, check_outputs, say, text_writer, waiting, write_all
+from symrefine.cli.outputs import STDOUT, check_outputs, say, text_writer, write_all
+from symrefine.cli.signs import waiting
 from symrefine.cli.values import natural, orders
 from symrefine.errors import InputError
 

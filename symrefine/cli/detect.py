@@ -1,55 +1,72 @@
 """`symrefine detect`: one file in, its symmetries out."""
 
 import argparse
-import time
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from symrefine.cli.inputs import NAME, STDIN, expanded, failure, readable
 from symrefine.cli.outputs import (
+    STDOUT,
     check_beside,
     check_outputs,
+    complain,
+    is_quiet,
+    is_verbose,
     json_writer,
     note,
+    print_lines,
+    say,
     tell,
     text_writer,
-    waiting,
     write_all,
 )
+from symrefine.cli.signs import progress, waiting
 from symrefine.cli.values import (
     add_class_options,
     add_depth_options,
     add_detection_options,
+    add_path,
     add_scan_options,
     detection_options,
     grey,
     natural,
     positive,
 )
+from symrefine.clock import Clock
 from symrefine.errors import InputError
-from symrefine.files import Writer
+from symrefine.files import Writer, json_array_text
 
 if TYPE_CHECKING:
     from symrefine.detection.result import Detection
     from symrefine.shape import Shape
 
-# Exit status of `--strict` where nothing is decided.
-UNDETERMINED = 3
+# Exit status of `--strict` where nothing is decided, and where one of several files could not be used.
+UNDETERMINED, REFUSED = 3, 2
+# Options whose files are of one object.
+_OF_ONE = ("bop", "recording", "report", "picture")
 HELP = "find the planes, axes and point group of a mesh, cloud or picture"
 DESCRIPTION = (
     "Find the mirror planes, rotation axes and point group of the mesh or point cloud in PATH (.ply .stl .obj .off "
     ".glb .gltf .pcd .xyz .csv .txt .npy .npz), or the mirror lines and turns of a picture (.png .jpg .jpeg .bmp) or "
     "of points with two coordinates (.csv .txt .npy .npz), or the hyperplanes of symmetry of points with 4 to 8 "
     "coordinates. With --intrinsics PATH is a depth image. Prints a table; lengths are in the units of the file, "
-    "misses in percent of the bounding-box diagonal."
+    "misses in percent of the bounding-box diagonal. Several files, or a pattern in quotes, give a line each; one that "
+    "cannot be used is told on its line, the others go on, and the exit status is 2."
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", metavar="PATH", help="mesh, point cloud or picture")
-    parser.add_argument("--json", metavar="FILE|-", help="write the whole report as JSON; - is stdout, with no table")
+    add_path(parser, "meshes, point clouds or pictures, or patterns of them", several=True)
+    parser.add_argument(
+        "--json",
+        metavar="FILE|-",
+        help="write the whole report as JSON, of several files an array; - is stdout, with no table",
+    )
+    parser.add_argument("--picture", metavar="FILE.png", help="write a picture of the shape and what was found")
     parser.add_argument("--bop", metavar="FILE", help="put the symmetries into this models_info.json of BOP")
     parser.add_argument("--bop-id", type=natural, metavar="N", help="number of the object there (default: 1)")
     parser.add_argument(
@@ -79,25 +96,98 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Detect, write the files that were asked for, print."""
-    outputs = {"--json": args.json, "--bop": args.bop, "--recording": args.recording, "--report": args.report}
-    check_outputs(outputs, [Path(args.path)])
+    paths = expanded(args.path)
+    outputs = {f"--{name}": getattr(args, name) for name in ("json", *_OF_ONE)}
+    check_outputs(outputs, [Path(path) for path in paths if path != STDIN])
     check_beside("--bop", args.bop, {"--bop-id": args.bop_id, "--bop-scale": args.bop_scale})
+    if len(paths) > 1:
+        return _several(args, paths)
+    if args.picture is not None and Path(args.picture).suffix.lower() != ".png":
+        raise InputError(f"--picture {args.picture}: expected a name that ends in .png")
     if args.bop is not None:
         from symrefine.export.bop import read_models_info
 
         read_models_info(Path(args.bop))
     with waiting("detecting"):
-        options = detection_options(args)
-        shape, detection, record = examine(args.path, options, threshold=args.threshold, invert=args.invert)
+        shape, detection, record = _examined(args, paths[0])
         writers = json_writer(args.json, record) | _writers(args, shape, detection)
         write_all(writers)
-    if args.bop is not None:
-        from symrefine.export.bop import bop_limits
-
-        if limits := bop_limits(detection):
-            note(limits)
+    for text in _notes(args, shape, detection, record):
+        note(text)
     tell(args.json, record, None, writers)
     return UNDETERMINED if args.strict and record["undetermined"] else 0
+
+
+def _examined(args: argparse.Namespace, path: str) -> tuple["Shape", Any, dict[str, Any]]:
+    """What `examine` says of a file, or of stdin."""
+    options, picture = detection_options(args), {"threshold": args.threshold, "invert": args.invert}
+    with readable(path, args.format) as file:
+        shape, detection, record = examine(file, options, **picture)
+    if file != path:
+        shape, record = replace(shape, source=NAME), record | {"source": NAME}
+    if is_verbose():
+        seconds = sum(record["timings"].values())
+        complain(f"{len(shape.points):,} points in {seconds:.2f} s, {len(shape.points) / seconds:,.0f} points/s")
+    return shape, detection, record
+
+
+def _several(args: argparse.Namespace, paths: Sequence[str]) -> int:
+    """A line for each of several files as soon as it is done; one that cannot be used does not end the others."""
+    _check_several(args, paths)
+    from symrefine.cli.tables import ROW_HEAD, row_line
+
+    in_lines = args.json != STDOUT and not is_quiet()
+    records: list[dict[str, Any]] = []
+    with progress("detecting", len(paths), 0) as advance:
+        if in_lines:
+            print_lines([ROW_HEAD])
+        for path in paths:
+            record = _record_or_error(args, path)
+            records.append(record)
+            if in_lines:
+                print_lines([row_line(path, {"error": None} | record)])
+            elif "error" in record:
+                complain(record["error"])
+            advance()
+    text = json_array_text(records)
+    if args.json == STDOUT:
+        say(text)
+    elif args.json is not None:
+        write_all({args.json: text_writer(text)})
+        print_lines([f"wrote {args.json}"])
+    if any("error" in record for record in records):
+        return REFUSED
+    return UNDETERMINED if args.strict and any(record["undetermined"] for record in records) else 0
+
+
+def _check_several(args: argparse.Namespace, paths: Sequence[str]) -> None:
+    """Refuse what is for one file."""
+    if STDIN in paths:
+        raise InputError("-: stdin is one file; name no others beside it")
+    for name in _OF_ONE:
+        if (given := getattr(args, name)) is not None:
+            right = "`symrefine batch DIR --bop FILE` takes a directory" if name == "bop" else "call `detect` for each"
+            raise InputError(f"--{name} {given}: is for one file, and PATH names {len(paths)}; {right}")
+
+
+def _record_or_error(args: argparse.Namespace, path: str) -> dict[str, Any]:
+    """The record of one of several files, or what was wrong with it."""
+    try:
+        return _examined(args, path)[2]
+    except Exception as error:  # noqa: BLE001 - one file must not end the others
+        return {"source": path, "error": failure(path, error)}
+
+
+def _notes(args: argparse.Namespace, shape: "Shape", detection: Any, record: dict[str, Any]) -> Iterator[str]:
+    """What else there is to say, on stderr."""
+    if args.bop is not None:
+        from symrefine.export.bop import bop_limits, diameter, metres_doubt
+
+        doubt = "" if args.bop_scale else metres_doubt(shape.source, diameter(shape.points), "--bop-scale")
+        yield from filter(None, (bop_limits(detection), doubt))
+    is_grey = shape.dim == 2 and "threshold" in record["options"] and args.threshold is None
+    if is_grey and (record["undetermined"] or record["point_group"] == "C1"):
+        yield f"{shape.source}: if object and background are of different grey, try --threshold otsu"
 
 
 def examine(
@@ -108,24 +198,24 @@ def examine(
     The detection is a `PlanarDetection`, a `Detection` or a `SubspaceDetection`, as the points have two, three or more
     coordinates.
     """
-    from symrefine.load import IMAGES
-
-    start = time.perf_counter()
-    shape = read_scan(path, options, threshold=threshold, invert=invert)
-    load_s = time.perf_counter() - start
     from symrefine.detection.story import LADDER
     from symrefine.front.verbs import detect
+    from symrefine.lengths import relative_tolerance
+    from symrefine.load import IMAGES
 
+    clock, outliers = Clock(), options.get("outliers", "auto")
+    with clock("load"):
+        shape = read_scan(path, options, threshold=threshold, invert=invert)
     if shape.dim == 2 and Path(path).suffix.lower() in IMAGES:
         options = options | {"threshold": threshold, "invert": invert}
     found = detect(
         shape,
-        outliers=options.get("outliers", "auto"),
-        tolerance=options["tolerance"],
+        outliers=outliers,
+        tolerance=relative_tolerance(options["tolerance"], shape, units=options.get("units"), outliers=outliers),
         ladder=LADDER if shape.dim == 3 else (),
         seed=options["seed"],
     )
-    return shape, found, found.to_dict(options=options, load_s=load_s)
+    return shape, found, found.to_dict(options=options, load_s=clock.seconds["load"])
 
 
 def read_scan(path: str, options: dict[str, Any], **picture: Any) -> "Shape":
@@ -159,16 +249,16 @@ def _option(name: str) -> str:
 
 
 def _writers(args: argparse.Namespace, shape: "Shape", detection: "Detection") -> dict[str, Writer]:
-    """Writers of what is for objects in space only.
+    """Writers of the files that are of one object.
 
     Raises:
-        InputError: it is asked for, and the points have two coordinates, or four and more.
+        InputError: one is for objects in space only, and the points have two coordinates, or four and more.
     """
     writers: dict[str, Writer] = {}
     for option, name in {"--bop": args.bop, "--recording": args.recording, "--report": args.report}.items():
         if name is not None and shape.dim != 3:
             where = "lies in the plane" if shape.dim == 2 else f"has {shape.dim} coordinates"
-            raise InputError(f"{option} {name}: is for objects in space; {args.path} {where}, use --json")
+            raise InputError(f"{option} {name}: is for objects in space; {shape.source} {where}, use --json")
     if args.bop is not None:
         from symrefine.export.bop import bop_entry, bop_text
 
@@ -179,6 +269,10 @@ def _writers(args: argparse.Namespace, shape: "Shape", detection: "Detection") -
         from symrefine.viewer import record as write_recording
 
         writers[args.recording] = partial(write_recording, detection, shape)
+    if args.picture is not None:
+        from symrefine.report import draw
+
+        writers[args.picture] = partial(draw, detection, shape)
     if args.report is not None:
         from symrefine.report import write_html
 

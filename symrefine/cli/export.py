@@ -2,11 +2,14 @@
 
 import argparse
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from symrefine.cli.outputs import bytes_writer, check_outputs, note, tell, waiting, write_all
-from symrefine.cli.values import add_detection_options, count, natural, positive
+from symrefine.cli.inputs import loaded
+from symrefine.cli.outputs import bytes_writer, check_outputs, note, tell, write_all
+from symrefine.cli.signs import waiting
+from symrefine.cli.values import add_detection_options, add_path, count, natural, positive
 from symrefine.errors import InputError
 from symrefine.files import check_target
 
@@ -38,7 +41,7 @@ _FOLDERS = ("foundationpose", "megapose", "dope", "isaac")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", metavar="PATH", help="mesh or point cloud")
+    add_path(parser, "mesh or point cloud")
     parser.add_argument("--to", required=True, choices=tuple(_OPTIONS), help="what to write")
     parser.add_argument("--out", required=True, metavar="OUT", help="file, or folder for " + ", ".join(_FOLDERS))
     parser.add_argument("--id", type=natural, metavar="N", help="number of the object in models_info.json (default: 1)")
@@ -70,6 +73,11 @@ def run(args: argparse.Namespace) -> int:
     tell(None, {}, [f"{args.path}: {detection.point_group}"], map(str, package.files))
     for text in package.notes:
         note(text)
+    if "scale" in _OPTIONS[args.to] and args.scale is None:
+        from symrefine.export.bop import diameter, metres_doubt
+
+        if doubt := metres_doubt(args.path, diameter(shape.points), "--scale"):
+            note(doubt)
     return 0
 
 
@@ -80,10 +88,12 @@ def detected(args: argparse.Namespace) -> tuple["Shape", "Detection"]:
         InputError: a picture, or points with two coordinates.
     """
     from symrefine.detection.story import detect
+    from symrefine.lengths import relative_tolerance
     from symrefine.load import load
 
-    shape = load(args.path, measure=args.measure)
-    return shape, detect(shape, tolerance=args.tolerance, seed=args.seed)
+    shape = loaded(args.path, args.format, partial(load, measure=args.measure))
+    tolerance = relative_tolerance(args.tolerance, shape, units=args.units)
+    return shape, detect(shape, tolerance=tolerance, seed=args.seed)
 
 
 def _check(args: argparse.Namespace) -> None:

@@ -1,13 +1,13 @@
-"""Where results go: files checked before the work and written all or none, stdout, tables, a sign of life."""
+"""Where results go: files checked before the work and written all or none, stdout, tables, notes; how loud it is."""
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
+from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from symrefine.errors import InputError
+from symrefine.errors import InputError, one_line, printable
 from symrefine.files import Writer, check_target, json_text
 from symrefine.files import write_all as write_all
 
@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 STDOUT = "-"
+# How much is told: "quiet" are errors alone and what stdout was asked to hold, "verbose" tells stages too.
+Loudness = Literal["quiet", "normal", "verbose"]
+loudness: ContextVar[Loudness] = ContextVar("loudness", default="normal")
 
 
 def check_outputs(outputs: dict[str, str | None], inputs: list[Path]) -> None:
@@ -64,6 +67,16 @@ def json_writer(name: str | None, record: Mapping[str, Any]) -> dict[str, Writer
     return {} if name in (None, STDOUT) else {str(name): text_writer(json_text(record))}
 
 
+def is_quiet() -> bool:
+    """Whether nothing but errors is to be told."""
+    return loudness.get() == "quiet"
+
+
+def is_verbose() -> bool:
+    """Whether stages and their seconds are to be told."""
+    return loudness.get() == "verbose"
+
+
 def tell(json_to: str | None, record: dict[str, Any], lines: Iterable[Any] | None, written: Iterable[str]) -> None:
     """Print a record: as JSON if stdout is asked for, else as lines and tables, and the names of the files written.
 
@@ -72,12 +85,23 @@ def tell(json_to: str | None, record: dict[str, Any], lines: Iterable[Any] | Non
     """
     if json_to == STDOUT:
         say(json_text(record))
-        return
-    from symrefine.cli.tables import record_lines
+    elif not is_quiet():
+        from symrefine.cli.tables import record_lines
 
+        told = record_lines(record) if lines is None else lines
+        print_lines((*told, *(f"wrote {name}" for name in written)))
+
+
+def print_lines(lines: Iterable[Any]) -> None:
+    """Print lines, whole, and tables on stdout at once, unless nothing but errors is to be told."""
+    if is_quiet():
+        return
     out = console()
-    for line in (*(record_lines(record) if lines is None else lines), *(f"wrote {name}" for name in written)):
-        out.print(line, soft_wrap=isinstance(line, str))
+    for line in lines:
+        if isinstance(line, str):
+            out.print(printable(line), soft_wrap=True)
+        else:
+            out.print(line)
     sys.stdout.flush()
 
 
@@ -86,18 +110,35 @@ def say(text: str) -> None:
     sys.stdout.write(text)
 
 
+def say_lines(lines: Iterable[str]) -> None:
+    """Write lines to stdout that were asked for, however quiet it is to be."""
+    say("".join(f"{printable(line)}\n" for line in lines))
+
+
 def note(text: str) -> None:
     """Tell something on stderr, where it is in nobody's way."""
-    print("symrefine: note:", text, file=sys.stderr)
+    if not is_quiet():
+        print("symrefine: note:", one_line(text), file=sys.stderr)
+
+
+def complain(text: str) -> None:
+    """Tell on stderr what went wrong, however quiet it is to be."""
+    print("symrefine:", one_line(text), file=sys.stderr)
 
 
 def console(*, stderr: bool = False) -> "Console":
     """A console that colours nothing for files, pipes and NO_COLOR, and takes every text literally."""
     from rich.console import Console
 
+    class Honest(Console):
+        """A console that tells of a reader who left, where rich would end the process with status 1."""
+
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError
+
     stream = sys.stderr if stderr else sys.stdout
     plain = "NO_COLOR" in os.environ
-    return Console(
+    return Honest(
         file=stream,
         color_system=None if plain else "auto",
         width=None if stream.isatty() else 160,
@@ -105,26 +146,3 @@ def console(*, stderr: bool = False) -> "Console":
         markup=False,
         emoji=False,
     )
-
-
-@contextmanager
-def waiting(text: str) -> Iterator[None]:
-    """A sign of life on stderr while something takes long, if somebody looks on."""
-    if not sys.stderr.isatty():
-        yield
-        return
-    with console(stderr=True).status(text):
-        yield
-
-
-@contextmanager
-def progress(text: str, total: int, done: int) -> Iterator[Callable[[], None]]:
-    """A bar on stderr, if somebody looks on; the function it gives is called after each step."""
-    if not sys.stderr.isatty():
-        yield lambda: None
-        return
-    from rich.progress import Progress
-
-    with Progress(console=console(stderr=True)) as bar:
-        task = bar.add_task(text, total=total, completed=done)
-        yield lambda: bar.advance(task)

@@ -1,26 +1,51 @@
 """The grammar of the command line, and what its values must look like."""
 
 import argparse
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NoReturn
 
-from symrefine.cli import align, batch, complete, derive, detect, export, run, symmetrize, view
-from symrefine.errors import InputError
+from symrefine.cli import align, batch, complete, completion, derive, detect, export, info, run, symmetrize, view
+from symrefine.errors import InputError, meant
 
-_COMMANDS = (detect, align, derive, export, symmetrize, complete, batch, run, view)
+_COMMANDS = (detect, info, align, derive, export, symmetrize, complete, batch, run, view, completion)
 _DESCRIPTION = "Symmetry of 3-D shapes: mirror planes, rotation axes and the point group of a mesh or a point cloud."
 _EPILOG = (
     "`symrefine COMMAND --help` explains a command. Exit status: 0 done, 1 some files of a batch or runs failed, 2 bad "
-    "input or options, 130 interrupted."
+    "input or options, 3 undetermined (`detect --strict`), 130 interrupted, 141 nobody read on."
 )
 
 
+# How argparse refuses a value that is none of its choices, among them the commands.
+_CHOICE = re.compile(r"invalid choice: '([^']*)' \(choose from (.*)\)")
+
+
 class Parser(argparse.ArgumentParser):
-    """A parser that raises one clear line where argparse would print usage and exit."""
+    """A parser that raises one clear line where argparse would print usage and exit.
+
+    Attributes:
+        commands: the parser of each command, by its name.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.commands: Mapping[str, Parser] = {}
+
+    @property
+    def arguments(self) -> Sequence[argparse.Action]:
+        """Every option and every other argument."""
+        return self._actions
 
     def error(self, message: str) -> NoReturn:
-        """Raise the message with the place to look."""
+        """Raise the message with what may have been meant and the place to look."""
+        if choice := _CHOICE.search(message):
+            message += meant(choice[1], re.findall(r"[^\s,']+", choice[2]))
         raise InputError(f"{message.removeprefix('argument ')}; see `{self.prog} --help`")
+
+    def unknown(self, argument: str) -> NoReturn:
+        """Refuse an argument that has no place."""
+        known: Iterable[str] = self._option_string_actions if argument.startswith("-") else ()
+        self.error(f"unknown argument: {argument}{meant(argument.partition('=')[0], known)}")
 
 
 class _Version(argparse.Action):
@@ -39,13 +64,16 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     Raises:
         InputError: unknown commands, options or values.
     """
-    args, rest = _parser().parse_known_args(argv)
+    args, rest = grammar().parse_known_args(argv)
+    if isinstance(getattr(args, "path", None), list) and not any(word.startswith("-") for word in rest):
+        args.path, rest = args.path + rest, []  # argparse takes only files that stand together
     if rest:
-        args.parser.error(f"unknown argument: {rest[0]}")
+        args.parser.unknown(rest[0])
     return args
 
 
-def _parser() -> Parser:
+def grammar() -> Parser:
+    """The parser of the whole command line."""
     parser = Parser(prog="symrefine", description=_DESCRIPTION, epilog=_EPILOG, allow_abbrev=False)
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -53,5 +81,14 @@ def _parser() -> Parser:
         name = command.__name__.rpartition(".")[2]
         sub = commands.add_parser(name, help=command.HELP, description=command.DESCRIPTION, allow_abbrev=False)
         command.add_arguments(sub)
+        _add_loudness(sub)
         sub.set_defaults(run=command.run, parser=sub)
+    parser.commands = commands.choices
     return parser
+
+
+def _add_loudness(parser: Parser) -> None:
+    """How much is told besides the result, which every command lets choose."""
+    loud = parser.add_mutually_exclusive_group()
+    loud.add_argument("-v", "--verbose", action="store_true", help="tell stages with their seconds, on stderr")
+    loud.add_argument("-q", "--quiet", action="store_true", help="tell nothing but errors; files, and `-`, as ever")

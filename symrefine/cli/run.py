@@ -1,10 +1,14 @@
 """`symrefine run`: an experiment over the sweep of a YAML config; a run that was killed goes on where it ended."""
 
 import argparse
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
-from symrefine.cli.outputs import console, note, progress, say
+from symrefine.cli.outputs import complain, is_quiet, note, print_lines, say, say_lines
+from symrefine.cli.signs import progress
 from symrefine.cli.values import count
+from symrefine.errors import InputError
 from symrefine.files import naming
 
 HELP = "run the experiment of a YAML config and write its rows, tables and figures"
@@ -17,7 +21,10 @@ DESCRIPTION = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("config", metavar="CONFIG.yaml", help="experiment, sweep, tables, figures")
+    parser.add_argument("config", metavar="CONFIG.yaml", nargs="?", help="experiment, sweep, tables, figures")
+    parser.add_argument(
+        "--list", action="store_true", help="print the configs in ./configs, or the runs of CONFIG.yaml, and do nothing"
+    )
     parser.add_argument(
         "--set",
         action="append",
@@ -38,23 +45,55 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the study, print its tables, tell whether all went well."""
+    if args.config is None and not args.list:
+        args.parser.error("CONFIG.yaml is missing; `symrefine run --list` names those in ./configs")
     from symrefine.study.work import one_thread_each
 
     one_thread_each()  # before anything heavy is imported
     from symrefine.study.plan import make_plan
     from symrefine.study.runner import run_study
 
+    if args.config is None:
+        say_lines(_configs(Path("configs")))
+        return 0
     plan = make_plan(Path(args.config), args.set, quick=args.quick)
+    if args.list:
+        say_lines(_runs(plan.cases[: args.limit]))
+        return 0
     folder = Path(args.out or plan.study.out)
     with naming(str(folder)):
         outcome = run_study(
             plan, folder, workers=args.workers, limit=args.limit, replace=args.replace, progress=progress
         )
-    if outcome.tables:
+    if outcome.tables and not is_quiet():
         say(outcome.tables + "\n")
     for row in [row for row in outcome.rows if row["error"] is not None][:5]:
-        note(f"a run failed: {row['error']}")
+        (complain if is_quiet() else note)(f"a run failed: {row['error']}")
     parts = [f"{len(outcome.rows)} runs", f"{outcome.resumed} done before" if outcome.resumed else ""]
     parts += [f"{outcome.failed} failed" if outcome.failed else "", f"written to {folder}"]
-    console().print(", ".join(part for part in parts if part))
+    print_lines([", ".join(part for part in parts if part)])
     return int(outcome.failed > 0)
+
+
+def _configs(folder: Path) -> Iterator[str]:
+    """A line for each config of a directory: its path and title."""
+    from symrefine.study.document import read_document
+    from symrefine.study.plan import configs
+
+    found = configs(folder)
+    if not found:
+        raise InputError(f"{folder}: no configs there; name one: symrefine run CONFIG.yaml --list")
+    width = max(len(str(path)) for path in found)
+    for path in found:
+        root = read_document(path)
+        title = root.at("title" if "title" in root.value else "experiment")
+        yield f"{path!s:<{width}}  {title.plain()}"
+
+
+def _runs(cases: Sequence[Any]) -> Iterator[str]:
+    """A line for each run of a sweep, numbered from 1 as `--limit` counts them: the fields in which they differ."""
+    from symrefine.study.plan import varying
+
+    names = varying(cases)
+    for number, case in enumerate(cases, start=1):
+        yield " ".join([f"{number:>{len(str(len(cases)))}} ", *(f"{name}={getattr(case, name)}" for name in names)])

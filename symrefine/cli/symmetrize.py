@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from symrefine.cli.export import detected
-from symrefine.cli.outputs import bytes_writer, check_outputs, json_writer, note, tell, waiting, write_all
-from symrefine.cli.values import add_detection_options, detection_options
+from symrefine.cli.outputs import bytes_writer, check_outputs, json_writer, note, tell, write_all
+from symrefine.cli.signs import waiting
+from symrefine.cli.values import add_detection_options, add_path, detection_options
 from symrefine.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ _METHODS = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", metavar="PATH", help="mesh or point cloud")
+    add_path(parser, "mesh or point cloud")
     parser.add_argument(
         "-o", "--out", required=True, metavar="OUT", help="file to write: .ply .obj .off .xyz .npy .npz"
     )
@@ -67,7 +68,7 @@ def _symmetrize(args: argparse.Namespace, shape: "Shape", detection: "Detection"
     if detection.point_group == "C1":
         raise InputError(f"{args.path}: is C1, nothing to make symmetric{_nearest_miss(detection)}")
     group = detection.group if args.group is None else placed_subgroup(detection.group, args.group)
-    return symmetrize(shape, group, detection.center, tolerance=args.tolerance, seed=args.seed)
+    return symmetrize(shape, group, detection.center, tolerance=detection.tolerance, seed=args.seed)
 
 
 def _nearest_miss(detection: "Detection") -> str:

@@ -1,4 +1,4 @@
-"""What a person reads: the JSON record of a detection, or the rows of a batch, as tables."""
+"""What a person reads: the JSON record of a detection, as tables, or as one line among those of many files."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -7,18 +7,22 @@ from typing import Any
 
 from rich.table import Table
 
+from symrefine.errors import one_line
 from symrefine.groups import point_group
 from symrefine.picture.words import TUPLES, evened, kind_name, meaning, taken_out
 
 Record = dict[str, Any]
 
 _RESIDUALS = ("mean", "p95", "max")
-_WORDS = ("kind", "group")
+_WORDS = ("kind",)
 _DOUBLETS = {
     "none": "span the plane: no exact mirror line and no turn",
     "line": "lie on one line: a mirror line at most",
     "centre": "all vanish: turns, with or without mirror lines",
 }
+# One of many files; names last, so that none is ever cut or folded, and no row waits for the longest.
+_ROW = "{:<13}  {:>6}  {:>4}  {:>6}  {:>10}  {:>7}  {}"
+ROW_HEAD = _ROW.format("group", "planes", "axes", "p95 %", "confidence", "seconds", "file")
 _REFINED = "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows"
 
 
@@ -98,7 +102,13 @@ def headline(record: Record) -> str:
         return f"undetermined: {record['undetermined']}"
     means = _planar_meaning(record) if "lines" in record else meaning(point_group(name))
     name = f"at least {name}" if record.get("at_least") else name
-    return f"{name}, {means}; tolerance {100 * record['tolerance']:g} %, confidence {record['confidence']:.2f}"
+    return f"{name}, {means}; tolerance {_tolerance(record)}, confidence {record['confidence']:.2f}"
+
+
+def _tolerance(record: Record) -> str:
+    """The tolerance as a fraction of the diagonal, and as the length that was asked for, if it was one."""
+    asked, relative = record["options"]["tolerance"], 100 * record["tolerance"]
+    return f"{asked}, {relative:.3g} %" if isinstance(asked, str) else f"{relative:g} %"
 
 
 def _planar_meaning(record: Record) -> str:
@@ -222,7 +232,8 @@ def misfit(record: Record) -> str:
     maps = "rotation" if options["rotations_only"] else "orthogonal map"
     maps += " with any scale" if options["scale"] else ""
     # Elsewhere than in space the sampling noise of the moments decides, not the tolerance.
-    within = f" within {100 * options['tolerance']:g} % of the diagonal" if "tolerance" in reason else ""
+    tolerance = options.get("relative_tolerance", options["tolerance"])
+    within = f" within {100 * tolerance:.4g} % of the diagonal" if "tolerance" in reason else ""
     return f"{record['source']} onto {record['target']}: no {maps} takes the one onto the other{within}: {reason}"
 
 
@@ -234,31 +245,28 @@ def _known(record: Record) -> str:
     return "rotation unknown" if isinstance(sigma, str) else f"rotation known to {math.degrees(sigma):.2g} degrees"
 
 
-def batch_table(rows: Sequence[Record]) -> Table:
-    """A line for each file of a batch."""
-    table = _table("file", "group", "planes", "axes", "worst p95", "confidence", "seconds")
-    for row in rows:
-        if row["error"] is not None:
-            table.add_row(row["file"], f"failed: {row['error']}")
-            continue
-        if "hyperplanes" in row:
-            told = "undetermined" if row["undetermined"] else f"{row['dimension']}-D"
-            table.add_row(row["file"], told, str(len(row["hyperplanes"])), "", "", "", _seconds(row))
-            continue
+def row_line(name: str, row: Record) -> str:
+    """What was found in one of many files, or what was wrong with it; the name stands last and whole."""
+    if row["error"] is not None:
+        told, name = one_line(row["error"]), one_line(name)
+        return f"failed: {told}" if name in told else f"failed: {name}: {told}"
+    if "hyperplanes" in row:
+        told, mirrors, turns = f"{row['dimension']}-D", row["hyperplanes"], None
+    else:
         # Planes and axes of a detection in space, lines and turns of one in the plane.
         mirrors = row["lines"] if "lines" in row else row["planes"]
         turns = ([row["rotation"]] if row["rotation"] else []) if "lines" in row else row["axes"]
-        elements = mirrors + turns + _inversions(row)
-        table.add_row(
-            row["file"],
-            "undetermined" if row["undetermined"] else row["point_group"],
-            str(len(mirrors)),
-            str(len(turns)),
-            _percent(max(e["residual"]["p95"] for e in elements)) if elements else "",
-            f"{min(e['confidence'] for e in elements):.2f}" if elements else "",
-            _seconds(row),
-        )
-    return table
+        told = f"at least {row['point_group']}" if row.get("at_least") else row["point_group"]
+    elements = [] if turns is None else mirrors + turns + _inversions(row)
+    return _ROW.format(
+        "undetermined" if row["undetermined"] else told,
+        len(mirrors),
+        "" if turns is None else len(turns),
+        _percent(max(e["residual"]["p95"] for e in elements)) if elements else "",
+        f"{min(e['confidence'] for e in elements):.2f}" if elements else "",
+        _seconds(row),
+        one_line(name),
+    )
 
 
 def _inversions(record: Record) -> list[Record]:
@@ -308,7 +316,7 @@ def _table(first: str, *others: str) -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
     table.add_column(first, overflow="fold")
     for name in others:
-        title = f"{name} %" if name in (*_RESIDUALS, "worst p95") else name
+        title = f"{name} %" if name in _RESIDUALS else name
         table.add_column(title, overflow="fold", justify="left" if name in _WORDS else "right")
     return table
 

@@ -4,6 +4,9 @@ import argparse
 import math
 from typing import Any, Literal
 
+from symrefine.errors import InputError
+from symrefine.units import METRES, read_length
+
 # The same as `verify.TOLERANCE` and the range that `detect` takes, which are too heavy to import for `--help`.
 TOLERANCE, LARGEST_TOLERANCE = 0.02, 0.2
 
@@ -15,8 +18,14 @@ def add_detection_options(parser: argparse.ArgumentParser, counts_as: str = "sym
         type=tolerance,
         default=TOLERANCE,
         metavar="REL",
-        help=f"largest miss that counts as {counts_as}, as a fraction of the bounding-box diagonal "
-        "(default: %(default)s)",
+        help=f"largest miss that counts as {counts_as}, as a fraction of the bounding-box diagonal, or as a length: "
+        "0.5mm, 0.1A, 0.5u in units of the file (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--units",
+        choices=tuple(METRES),
+        help="what a length of 1 in the file is, for a tolerance in such units (default: what the format says, "
+        "angstrom for molecules, metres for glTF)",
     )
     parser.add_argument(
         "--measure",
@@ -28,6 +37,13 @@ def add_detection_options(parser: argparse.ArgumentParser, counts_as: str = "sym
     )
 
 
+def add_path(parser: argparse.ArgumentParser, what: str, *, several: bool = False) -> None:
+    """The file or files to read, and what stdin holds where `-` stands for it."""
+    many = {"nargs": "+"} if several else {}
+    parser.add_argument("path", metavar="PATH", help=f"{what}; - is stdin", **many)  # type: ignore[arg-type]
+    parser.add_argument("--format", metavar="SUFFIX", help="what stdin holds where PATH is -: ply, xyz, csv, ...")
+
+
 def add_scan_options(parser: argparse.ArgumentParser) -> None:
     """The options that say how points were taken."""
     parser.add_argument(
@@ -37,6 +53,11 @@ def add_scan_options(parser: argparse.ArgumentParser) -> None:
         help="auto: points of a cloud that belong to no surface, single or in clumps, are set apart and told; none: "
         "all points count (default: %(default)s)",
     )
+    add_viewpoint(parser)
+
+
+def add_viewpoint(parser: argparse.ArgumentParser) -> None:
+    """The option that says where points were seen from."""
     parser.add_argument(
         "--viewpoint",
         type=place,
@@ -66,11 +87,14 @@ def add_depth_options(parser: argparse.ArgumentParser) -> None:
 
 
 def detection_options(args: argparse.Namespace) -> dict[str, Any]:
-    """What was chosen of the options of a detection, for its record; names of fields only where one is given."""
-    named = {name: given for name in ("labels", "weights") if (given := getattr(args, name, None)) is not None}
-    how = ("outliers", "viewpoint", "intrinsics", "depth_scale", "mask")
-    scan = {name: given for name in how if (given := getattr(args, name, None)) is not None}
-    return {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed} | scan | named
+    """What was chosen of the options of a detection, for its record."""
+    return {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed} | reading_options(args)
+
+
+def reading_options(args: argparse.Namespace) -> dict[str, Any]:
+    """What was chosen of the options that say how points were taken and what of the file counts, where given."""
+    how = ("outliers", "viewpoint", "intrinsics", "depth_scale", "mask", "units", "labels", "weights")
+    return {name: given for name in how if (given := getattr(args, name, None)) is not None}
 
 
 def add_class_options(parser: argparse.ArgumentParser) -> None:
@@ -91,12 +115,19 @@ def add_class_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def tolerance(text: str) -> float:
-    """A fraction of the diagonal."""
+def tolerance(text: str) -> float | str:
+    """A fraction of the diagonal, or a length with its unit as it was written."""
     value = _float(text)
+    if math.isnan(value) and text[-1:].isalpha() and text[:1].isdigit():
+        try:
+            read_length(text)
+        except InputError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+        return text
     if not 0.0 < value <= LARGEST_TOLERANCE:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not a fraction of the bounding-box diagonal in (0, {LARGEST_TOLERANCE}], such as 0.02"
+            f"{text!r} is not a fraction of the bounding-box diagonal in (0, {LARGEST_TOLERANCE}], such as 0.02, nor a "
+            "length with its unit, such as 0.5mm"
         )
     return value
 

@@ -26,6 +26,7 @@ from symrefine.geometry import Array, Isometry, frame_with_z, rotation, toward_p
 from symrefine.groups import PointGroup
 from symrefine.shape import Shape
 from symrefine.symmetrize import exact_place
+from symrefine.units import EVERYDAY_M, METRES
 
 Entry = dict[str, Any]
 
@@ -92,6 +93,18 @@ def bop_limits(detection: Detection) -> str:
     if detection.group.proper_subgroup().name != "K":
         return ""
     return "BOP cannot express a sphere: three continuous axes through its centre stand for all the others"
+
+
+def metres_doubt(source: str, size: float, option: str) -> str:
+    """That a file taken to be in millimetres may be in metres, as a sentence; empty where nothing speaks for it.
+
+    Args:
+        size: diameter in units of the file.
+        option: of the command line that takes the millimetres in one unit of the file.
+    """
+    if size * METRES["mm"] >= EVERYDAY_M[0]:
+        return ""
+    return f"{source}: a diameter of {size:.3g} mm is little; metres? then give {option} 1000"
 
 
 def bop_text(path: Path, entries: Mapping[int, Entry]) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import ModuleType, NoneType, UnionType
 from typing import Any, get_args, get_type_hints
 
-from symrefine.errors import InputError
+from symrefine.errors import InputError, meant
 from symrefine.study.document import Node
 from symrefine.study.typed import Scalar
 
@@ -47,7 +47,8 @@ class Experiment:
             InputError: there is none.
         """
         if name not in self.hints:
-            raise node.error(f"{self.name} has no field {name!r}; expected one of {sorted(self.hints)}")
+            known = f"{sorted(self.hints)}{meant(name, self.hints)}"
+            raise node.error(f"{self.name} has no field {name!r}; expected one of {known}")
         return self.hints[name]
 
 

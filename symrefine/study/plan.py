@@ -78,14 +78,22 @@ def make_plan(path: Path, settings: Sequence[str] = (), *, quick: bool = False) 
     )
 
 
+def configs(folder: Path) -> list[Path]:
+    """The configs of studies in a directory, by name; other YAML files have no experiment."""
+    return sorted(f for f in folder.glob("*.yaml") if f.is_file() and _EXPERIMENT.search(f.read_bytes()))
+
+
+def varying(cases: Sequence[Any]) -> list[str]:
+    """The fields in which cases differ."""
+    rows = [asdict(case) for case in cases]
+    return [name for name in (rows[0] if rows else ()) if len({row[name] for row in rows}) > 1]
+
+
 def _elsewhere(path: Path) -> str:
     """Which configs there are, for messages: beside `path`, or in a directory `configs` here or above."""
     here = Path.cwd()
     for folder in (path.parent, *(above / "configs" for above in (here, *here.parents))):
-        names = sorted(
-            file.name for file in folder.glob("*.yaml") if file.is_file() and _EXPERIMENT.search(file.read_bytes())
-        )
-        if names:
+        if names := [file.name for file in configs(folder)]:
             return f"in {folder} there are {' '.join(names)}"
     return "configs are YAML files with a key `experiment`, as in the directory configs of symrefine's repository"
 

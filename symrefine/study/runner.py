@@ -1,7 +1,7 @@
 """A study from its config to rows, tables, figures and recordings; a killed run goes on where it ended."""
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ from symrefine.study.document import Node
 from symrefine.study.experiment import Row
 from symrefine.study.figures import check_figures, draw
 from symrefine.study.journal import Entry, Stamp, opened
-from symrefine.study.plan import Plan, select
+from symrefine.study.plan import Plan, select, varying
 from symrefine.study.summary import Measure, check_columns
 from symrefine.study.tables import check_tables, csv_text, markdown
 from symrefine.study.versions import code_version, library_versions
@@ -202,11 +202,9 @@ def _record(plan: Plan, folder: Path, chosen: Sequence[Any], progress: Progress)
             advance()
 
 
-def _name(case: Any, cases: Iterable[Any]) -> str:
+def _name(case: Any, cases: Sequence[Any]) -> str:
     """The fields in which the cases of the sweep differ, as a file name."""
-    rows = [asdict(c) for c in cases]
-    varying = [name for name in rows[0] if len({row[name] for row in rows}) > 1]
-    return _slug("-".join(str(asdict(case)[name]) for name in varying), keep=".") or "run"
+    return _slug("-".join(str(getattr(case, name)) for name in varying(cases)), keep=".") or "run"
 
 
 def _slug(text: str, keep: str = "") -> str:

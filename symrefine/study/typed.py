@@ -7,6 +7,7 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
+from symrefine.errors import meant
 from symrefine.study.document import Node, read_document
 
 T = TypeVar("T")
@@ -73,7 +74,7 @@ def _section(node: Node, kind: Any) -> Any:
         raise node.error(f"expected keys {list(inside)}, got {node.plain()!r}")
     for key, inner in node.value.items():
         if key not in inside:
-            raise inner.error(f"unknown key; expected one of {sorted(inside)}")
+            raise inner.error(f"unknown key; expected one of {sorted(inside)}{meant(key, inside)}")
     needed = [name for name, f in inside.items() if f.default is MISSING and f.default_factory is MISSING]
     if missing := [name for name in needed if name not in node.value]:
         raise node.error(f"missing {', '.join(missing)}")

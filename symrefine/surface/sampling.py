@@ -207,12 +207,24 @@ def clumps(points: Array, around: Surroundings) -> list[Index]:
     Points hang together if each is among the nearest of the other, whatever the density: a few between two dense parts
     join nothing. `around` tells of some of the points.
     """
+    apart = [m for m in _lone(_parts(around)) if _gap(around, m)] if np.median(around.reach) > 0.0 else []
+    return _members(points, around, apart)
+
+
+def count_parts(points: Array, rng: np.random.Generator) -> int:
+    """How many parts points [N, 3] have, strays left out, that hang together and are so large that they count."""
+    if len(points) <= AROUND:
+        return 1
+    sizes = np.bincount(_parts(_around(points, rng)))
+    return max(int((sizes > max(SHARES[-1] * sizes.sum(), AROUND)).sum()), 1)
+
+
+def _parts(around: Surroundings) -> Index:
+    """Number of the part that each of some points belongs to: they hang together if each is near the other."""
     count = len(around.points)
     one, other = np.repeat(np.arange(count), AROUND), around.near.ravel()
     mutual = np.isin(one * count + other, other * count + one)
-    part = connected_parts(one[mutual], other[mutual], count)
-    apart = [m for m in _lone(part) if _gap(around, m)] if np.median(around.reach) > 0.0 else []
-    return _members(points, around, apart)
+    return connected_parts(one[mutual], other[mutual], count)
 
 
 def filled(points: Array, around: Surroundings, rng: np.random.Generator) -> list[Index]:

@@ -1,0 +1,96 @@
+"""Signs of life on stderr while something takes long: a live line if somebody looks on, else one every ten seconds."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Event, Thread
+from time import perf_counter
+
+from symrefine.cli.outputs import console, is_quiet, is_verbose
+from symrefine.clock import watched
+
+# Seconds between two lines where nobody looks on: a log of an hour stays readable, and nobody thinks that it hangs.
+EVERY = 10.0
+
+
+class Doing:
+    """What is being done, in words that change with the stage, the steps that are done, and the time."""
+
+    def __init__(self, text: str, steps: int = 0, done: int = 0) -> None:
+        self.text, self.stage, self.steps, self.done, self.begun = text, "", steps, done, perf_counter()
+        self.changed: Callable[[], None] = lambda: None
+
+    def __str__(self) -> str:
+        steps = f"{self.done} of {self.steps}" if self.steps else ""
+        return ", ".join(part for part in (f"{self.text}: {self.stage}" if self.stage else self.text, steps) if part)
+
+    def advance(self) -> None:
+        """One more step is done."""
+        self.done += 1
+        self.changed()
+
+    def watch(self, stage: str, seconds: float | None) -> None:
+        """Follow the stages, and tell of each that has ended where that is asked for."""
+        name = stage.replace("_", " ")
+        self.stage = "" if seconds is not None else name
+        self.changed()
+        if seconds is not None and is_verbose():
+            print(f"symrefine: {name} {seconds:.2f} s", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def waiting(text: str) -> Iterator[None]:
+    """Show what is being done, in which stage, and for how long already."""
+    with _shown(Doing(text)):
+        yield
+
+
+@contextmanager
+def progress(text: str, total: int, done: int) -> Iterator[Callable[[], None]]:
+    """Show how many of all steps are done; the function it gives is called after each."""
+    doing = Doing(text, total, done)
+    with _shown(doing):
+        yield doing.advance
+
+
+@contextmanager
+def _shown(doing: Doing) -> Iterator[None]:
+    if is_quiet():
+        yield
+        return
+    with _live(doing) if sys.stderr.isatty() else _every_ten_seconds(doing), watched(doing.watch):
+        yield
+    if is_verbose():
+        print(f"symrefine: {doing.text} {perf_counter() - doing.begun:.2f} s in all", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def _live(doing: Doing) -> Iterator[None]:
+    """One line that is drawn again and again, and gone at the end; what is printed meanwhile stands above it."""
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    words = TextColumn("{task.description}", markup=False)
+    columns = [SpinnerColumn(), words, *([BarColumn()] if doing.steps else []), TimeElapsedColumn()]
+    # Else rich would send to the terminal what is printed to a file.
+    to_terminal = sys.stdout.isatty()
+    with Progress(*columns, console=console(stderr=True), transient=True, redirect_stdout=to_terminal) as bar:
+        only = bar.add_task(str(doing), total=doing.steps or None, completed=doing.done)
+        doing.changed = lambda: bar.update(only, description=str(doing), completed=doing.done)
+        yield
+
+
+@contextmanager
+def _every_ten_seconds(doing: Doing) -> Iterator[None]:
+    stream, over = sys.stderr, Event()
+
+    def tell() -> None:
+        while not over.wait(EVERY):
+            print(f"symrefine: {doing}, {perf_counter() - doing.begun:.0f} s", file=stream, flush=True)
+
+    teller = Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield
+    finally:
+        over.set()
+        teller.join()

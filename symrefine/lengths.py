@@ -1,0 +1,83 @@
+"""Lengths of an object: the diagonal that misses are measured by, and a tolerance in units as a fraction of it."""
+
+import numpy as np
+
+from symrefine.detection.measure import Outliers, is_few
+from symrefine.errors import InputError
+from symrefine.geometry import LARGEST_TOLERANCE, Array, tight_diagonal
+from symrefine.plane.outline import smallest_diagonal
+from symrefine.shape import Shape
+from symrefine.surface.sampling import sampling
+from symrefine.units import METRES, OF_FILE, read_length, unit_of_format
+
+
+def relative_tolerance(
+    asked: float | str, shape: Shape, *, units: str | None = None, outliers: Outliers = "auto"
+) -> float:
+    """A tolerance as the fraction of the diagonal that detections take.
+
+    Args:
+        asked: a fraction, which stays what it is, or a length with its unit, such as "0.5mm" or "2u".
+        units: what a length of 1 in the shape is, one of `units.METRES`; what the format of its source says if None.
+        outliers: whether points that belong to no surface count for the diagonal, as in `detect`.
+
+    Raises:
+        InputError: a unit that is not known, of the tolerance or of the shape; units for a tolerance that is none; a
+            tolerance beyond a fifth of the diagonal.
+    """
+    if not isinstance(asked, str):
+        if units is not None:
+            raise InputError(f"--units {units}: says what a tolerance with a unit is; --tolerance {asked:g} has none")
+        return asked
+    value, unit = read_length(asked)
+    length = value if unit == OF_FILE else value * METRES[unit] / METRES[_unit(asked, shape, units)]
+    diagonal = object_diagonal(shape, outliers=outliers)
+    if length > LARGEST_TOLERANCE * diagonal:
+        raise InputError(
+            f"{shape.source}: --tolerance {asked} is {length / diagonal:.3g} of the diagonal, {diagonal:.4g} in units "
+            f"of the file; expected at most {LARGEST_TOLERANCE} of it"
+        )
+    return length / diagonal
+
+
+def _unit(asked: str, shape: Shape, units: str | None) -> str:
+    """The unit that the points of a shape are in."""
+    found = units or unit_of_format(shape.source, labelled=shape.labels is not None)
+    if found is None:
+        raise InputError(
+            f"{shape.source}: --tolerance {asked}: the file does not say its unit; give it as --units mm (or "
+            f"{' '.join(unit for unit in METRES if unit != 'mm')}), or the tolerance as 0.5u in units of the file"
+        )
+    if found not in METRES:
+        raise InputError(f"units are {found!r}; expected one of {' '.join(METRES)}")
+    return found
+
+
+def object_diagonal(shape: Shape, *, outliers: Outliers = "auto") -> float:
+    """Diagonal of the smallest box around an object, over all orientations, in input units.
+
+    A detection tells that of the surface which it judged by, within a percent or so of this one.
+
+    Raises:
+        InputError: points of more than three coordinates.
+    """
+    if shape.dim > 3:
+        raise InputError(
+            f"{shape.source}: has {shape.dim} coordinates; give the tolerance as a fraction of the diameter"
+        )
+    if shape.dim == 2:
+        return smallest_diagonal(heavy(shape))
+    return tight_diagonal(body(shape, outliers=outliers))
+
+
+def body(shape: Shape, *, outliers: Outliers = "auto") -> Array:
+    """The points [K, 3] of a shape without those that belong to no surface, if outliers are looked for ("auto")."""
+    points = heavy(shape)
+    if shape.faces is not None or is_few(shape):
+        return points
+    return points[sampling(points, np.random.default_rng(0), outliers=outliers == "auto").kept]
+
+
+def heavy(shape: Shape) -> Array:
+    """The points [K, n] that weigh anything."""
+    return shape.points if shape.weights is None else shape.points[shape.weights > 0.0]

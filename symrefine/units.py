@@ -1,0 +1,63 @@
+"""Units of length: how they are written, how long they are, and which formats say theirs."""
+
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from symrefine.errors import InputError, meant
+
+# Metres in each.
+METRES: Mapping[str, float] = {
+    "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "A": 1e-10, "in": 0.0254,
+}  # fmt: skip
+# What a length in units of the file is written with, whatever these are.
+OF_FILE = "u"
+# Formats that say in what they are; of .xyz only chemical ones do.
+FIXED: Mapping[str, str] = {
+    ".cif": "A", ".glb": "m", ".gltf": "m", ".mol": "A", ".pdb": "A", ".sdf": "A",
+}  # fmt: skip
+# Things that people scan, model and grasp measure 5 mm to 5 m: as numbers, millimetres and metres do not overlap.
+EVERYDAY_M = (5e-3, 5.0)
+_LENGTH = re.compile(r"([-+0-9.eE]*[0-9.])\s*([^\W\d_]+)")
+_SPELT = {"µm": "um", "μm": "um", "Å": "A", "å": "A"}
+
+
+def read_length(text: str) -> tuple[float, str]:
+    """A positive number and its unit, one of `METRES` or `u`: `0.5mm`, `2e-3 m`, `0.1A`.
+
+    Raises:
+        InputError: something else.
+    """
+    found = _LENGTH.fullmatch(text.strip())
+    try:
+        value = float(found[1]) if found else math.nan
+    except ValueError:
+        value = math.nan
+    if found is None or not 0.0 < value < math.inf:
+        raise InputError(f"{text!r} is not a length above 0 with its unit, such as 0.5mm, 0.1A or 2u")
+    unit = _SPELT.get(found[2], found[2])
+    if unit not in (*METRES, OF_FILE):
+        known = " ".join(METRES)
+        raise InputError(
+            f"{text!r}: unit {unit} is not known; {known}, or u for units of the file{meant(unit, METRES)}"
+        )
+    return value, unit
+
+
+def unit_of_format(source: str, *, labelled: bool) -> str | None:
+    """The unit that a format fixes, None where it says none.
+
+    Args:
+        source: path of the file.
+        labelled: whether the points have elements or other classes, as those of chemical .xyz do.
+    """
+    path = Path(source)
+    suffix = (path.with_suffix("") if path.suffix.lower() == ".gz" else path).suffix.lower()
+    return "A" if suffix == ".xyz" and labelled else FIXED.get(suffix)
+
+
+def unit_of_size(size: float) -> str | None:
+    """The one of millimetres and metres in which a size is that of an everyday thing; None if it is in neither."""
+    low, high = EVERYDAY_M
+    return next((unit for unit in ("mm", "m") if low <= size * METRES[unit] < high), None)
