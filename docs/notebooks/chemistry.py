@@ -1,0 +1,7 @@
+# %% [markdown]
+# # chemistry
+
+# %%
+import symrefine
+
+print(symrefine.__version__)

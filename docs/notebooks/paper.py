@@ -1,0 +1,7 @@
+# %% [markdown]
+# # paper
+
+# %%
+import symrefine
+
+print(symrefine.__version__)

@@ -1,0 +1,7 @@
+# %% [markdown]
+# # robotics
+
+# %%
+import symrefine
+
+print(symrefine.__version__)

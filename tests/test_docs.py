@@ -1,0 +1,112 @@
+"""The documentation: it builds without a warning, needs no network to be read, and its code runs."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from symrefine.cli.parser import parse
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.py"))
+BUILDERS = ("mkdocs", "material", "mkdocstrings", "mkdocs_jupyter", "l2m4m")
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg", "NO_MKDOCS_2_WARNING": "1"}
+
+
+def run(*arguments: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    done = subprocess.run(
+        [sys.executable, *arguments], cwd=cwd, env=ENVIRONMENT, capture_output=True, text=True, timeout=600, check=False
+    )
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    return done
+
+
+class Fetched(HTMLParser):
+    """What a browser fetches to show a page: addresses of scripts, styles, pictures, fonts and frames."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.addresses: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        named = dict(attrs)
+        if tag in {"script", "img", "iframe", "source", "video"}:
+            self.addresses.append(named.get("src") or "")
+        elif tag == "link" and named.get("rel") != "canonical":
+            self.addresses.append(named.get("href") or "")
+
+
+def fetched(page: str) -> list[str]:
+    parser = Fetched()
+    parser.feed(page)
+    return [address for address in parser.addresses if re.match(r"(https?:)?//", address)]
+
+
+def test_what_a_page_fetches_is_seen() -> None:
+    page = '<script src="//a.b/c.js"></script><img src="x.png"><link rel="stylesheet" href="https://fonts/d">'
+    assert fetched(page + '<a href="https://elsewhere">') == ["//a.b/c.js", "https://fonts/d"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(any(find_spec(name) is None for name in BUILDERS), reason="the extra docs is not installed")
+def test_site_builds_without_a_warning_and_fetches_nothing(tmp_path: Path) -> None:
+    done = run("-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site"))
+    assert "WARNING" not in done.stdout + done.stderr
+    pages = sorted((tmp_path / "site").rglob("*.html"))
+    assert {"index.html", "robotics.html", "api.html"} <= {page.name for page in pages}
+    assert not {page.name: found for page in pages if (found := fetched(page.read_text(encoding="utf-8")))}
+
+
+def test_every_command_has_its_help_on_the_page_of_commands(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        parse(["--help"])
+    listed = re.findall(r"^ {4}(\w+)", capsys.readouterr().out.partition("COMMAND\n")[2], re.MULTILINE)
+    told = re.findall(r"^\[\[help (\w+)\]\]$", (DOCS / "commands.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(told) > 5
+    assert set(told) == set(listed)
+
+
+def used_modules(path: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield f"{node.module}"
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebooks_use_the_front_page_alone(path: Path) -> None:
+    ours = {name for name in used_modules(path) if name.partition(".")[0] in {"symrefine", "experiments", "tests"}}
+    assert ours == {"symrefine"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebooks_run(path: Path, tmp_path: Path) -> None:
+    run(str(path), cwd=tmp_path)
+
+
+def python_blocks(page: str) -> str:
+    """All Python of a page, as one program."""
+    return "\n".join(re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL))
+
+
+@pytest.mark.slow
+def test_the_first_page_does_what_it_says(tmp_path: Path) -> None:
+    """Its Python runs, its commands say what is printed there: the group, the confidence, the rows of figures."""
+    page = (DOCS / "index.md").read_text(encoding="utf-8")
+    (tmp_path / "page.py").write_text(python_blocks(page), encoding="utf-8")
+    run("page.py", cwd=tmp_path)
+    shown = re.search(r"^\$ symrefine detect stool.csv\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    assert shown
+    said = run("-m", "symrefine", "detect", "stool.csv", cwd=tmp_path).stdout
+    timeless = [re.sub(r", [\d.]+ s$", "", text.strip(), flags=re.MULTILINE) for text in (shown[1], said)]
+    assert timeless[0] == timeless[1]
