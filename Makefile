@@ -13,7 +13,7 @@ LOG := .make/setup.log
 SHELL := /bin/sh
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test bench reproduce docs lint lock clean
+.PHONY: help setup demo test bench reproduce docs wheel lint lock clean
 
 help: ## what each target does
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -35,6 +35,9 @@ reproduce: $(READY) ## the paper's experiments beside the baseline, in minutes; 
 
 docs: $(VENV)/.docs ## build the site, its notebooks run, in out/site
 	@NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict
+
+wheel: $(READY) ## build wheel and sdist into out/dist, and try the wheel in an environment of its own
+	@.ci/wheel
 
 # Runs a command in silence; says what it said if it fails.
 check = printf '%-26s' "$(1)"; if out=$$($(2) 2>&1); then echo ok; else echo FAILED; echo "$$out"; exit 1; fi
