@@ -1,11 +1,15 @@
-"""Pictures of `docs/how_it_decides.md`: `python -m experiments.studies.docs_figures [--out docs/figures]`.
+"""Pictures of the documentation: `python -m experiments.studies.docs_figures [--out docs/figures]`.
 
-What the n-tuples of three objects say, how a true mirror plane and a wrong one miss a mug, and how the answer changes
-while one leg of a table moves out of its place. Takes half a minute; the same bytes each time.
+The stool of the first page; what the n-tuples of three objects say, how a true mirror plane and a wrong one miss a mug,
+and how the answer changes while one leg of a table moves out of its place. Takes a minute; the same bytes each time.
 """
 
 import argparse
 import io
+import re
+import subprocess
+import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,6 +23,8 @@ from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
 from symrefine.files import whole
 from symrefine.geometry import Array, Isometry, Plane
+from symrefine.load import load
+from symrefine.picture.draw import picture_png
 from symrefine.picture.words import symbol
 from symrefine.shape import Shape
 from symrefine.surface.misses import LIMITS, SHARES, TOLERANCE
@@ -27,6 +33,7 @@ INK, SOFT, RULE = "#1d2430", "#5a6474", "#d8dde6"
 BLUE, ORANGE, GREY = "#0072b2", "#d55e00", "#a8b2c2"
 PALE = ("#9cc9e3", "#f1c09a")
 FONT = {"font.family": "DejaVu Sans", "font.size": 10, "text.color": INK, "axes.labelcolor": SOFT}
+FIRST_PAGE = Path(__file__).resolve().parents[2] / "docs" / "index.md"
 # Of the leg that moves, in diagonals of the table.
 PLACES = np.linspace(0.0, 0.05, 21)
 SEED, POINTS, NOISE_REL = 0, 20000, 0.003
@@ -153,11 +160,14 @@ def _quiet(axes: Any) -> None:
         spine.set_color(RULE)
 
 
-FIGURES: dict[str, Callable[[Any], None]] = {
-    "tuples": tuples_figure,
-    "misses": misses_figure,
-    "answers": answers_figure,
-}
+def start_picture() -> bytes:
+    """What is found in the cloud that the first page makes, by the code that stands there."""
+    code = re.search(r"^```python\n(.*?)^```$", FIRST_PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    assert code
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([sys.executable, "-c", code[1]], cwd=folder, check=True)
+        shape = load(Path(folder) / "stool.csv")
+    return smaller(io.BytesIO(picture_png(detect(shape), shape, width=760, height=560, title=False)))
 
 
 def png(draw: Callable[[Any], None]) -> bytes:
@@ -175,6 +185,14 @@ def png(draw: Callable[[Any], None]) -> bytes:
     return smaller(data)
 
 
+FIGURES: dict[str, Callable[[], bytes]] = {
+    "start": start_picture,
+    "tuples": lambda: png(tuples_figure),
+    "misses": lambda: png(misses_figure),
+    "answers": lambda: png(answers_figure),
+}
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Draw all of them, or some."""
     parser = argparse.ArgumentParser(prog="python -m experiments.studies.docs_figures", description=__doc__)
@@ -184,7 +202,7 @@ def main(arguments: list[str] | None = None) -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     for name in options.only:
         with whole(options.out / f"{name}.png") as draft:
-            draft.write_bytes(png(FIGURES[name]))
+            draft.write_bytes(FIGURES[name]())
         print(options.out / f"{name}.png")
 
 
