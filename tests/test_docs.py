@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from html.parser import HTMLParser
 from importlib.util import find_spec
@@ -110,3 +111,37 @@ def test_the_first_page_does_what_it_says(tmp_path: Path) -> None:
     said = run("-m", "symrefine", "detect", "stool.csv", cwd=tmp_path).stdout
     timeless = [re.sub(r", [\d.]+ s$", "", text.strip(), flags=re.MULTILINE) for text in (shown[1], said)]
     assert timeless[0] == timeless[1]
+
+
+def answers(page: str) -> list[str]:
+    """What a page says that the commands on it answer: a file and its group each."""
+    return re.findall(r"^(\S+: (?:at least )?\w+), ", page, re.MULTILINE)
+
+
+@pytest.mark.slow
+def test_the_gallery_says_what_its_commands_say(tmp_path: Path) -> None:
+    run("-m", "experiments.studies.docs_gallery", "--out", str(tmp_path))
+    told, said = ((folder / "gallery.md").read_text(encoding="utf-8") for folder in (DOCS, tmp_path))
+    assert len(answers(told)) > 8
+    assert answers(told) == answers(said)
+    shown = {path.name for path in (tmp_path / "figures").iterdir()}
+    assert shown == {path.name for path in (DOCS / "figures").glob("gallery_*")}
+    assert all(f"figures/{name}" in told for name in shown)
+
+
+@pytest.mark.slow
+def test_figures_of_the_documentation_are_drawn(tmp_path: Path) -> None:
+    run("-m", "experiments.studies.docs_figures", "--out", str(tmp_path))
+    drawn = {path.name for path in tmp_path.iterdir()}
+    pages = "".join(path.read_text(encoding="utf-8") for path in DOCS.glob("*.md"))
+    assert drawn == {path.name for path in (DOCS / "figures").iterdir() if not path.name.startswith("gallery_")}
+    assert all(f"figures/{name}" in pages for name in drawn)
+
+
+def test_contributing_names_the_rooms_that_the_contract_has_floor_by_floor() -> None:
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+    layers = next(c["layers"] for c in contracts["contracts"] if c["id"] == "house")
+    floors = [set(re.findall(r"\w+", layer)) for layer in layers if layer != "__main__"]
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").partition("| one thought each |")[2]
+    told = re.findall(r"^\| ((?:`\w+`(?:, )?)+) \|", page.partition("\n\n")[0], re.MULTILINE)
+    assert [set(re.findall(r"\w+", rooms)) for rooms in told] == floors
