@@ -11,9 +11,13 @@ from html.parser import HTMLParser
 from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from symrefine.cli.parser import parse
+from symrefine.detection.story import detect
+from symrefine.export.records import detection_record
+from symrefine.shape import Shape
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -111,6 +115,30 @@ def test_the_first_page_does_what_it_says(tmp_path: Path) -> None:
     said = run("-m", "symrefine", "detect", "stool.csv", cwd=tmp_path).stdout
     timeless = [re.sub(r", [\d.]+ s$", "", text.strip(), flags=re.MULTILINE) for text in (shown[1], said)]
     assert timeless[0] == timeless[1]
+
+
+def names(record: object) -> Iterator[str]:
+    """Names of all fields of a report, those inside others too, but of `options` and `timings`, which vary."""
+    if isinstance(record, dict):
+        for name, value in record.items():
+            yield name
+            yield from () if name in {"options", "timings"} else names(value)
+    elif isinstance(record, list):
+        for value in record:
+            yield from names(value)
+
+
+def test_the_page_on_reports_tells_every_field() -> None:
+    """Of octahedra with one atom of another kind: as they are, with planes and an axis; and bent, with near misses."""
+    found: set[str] = set()
+    for stretch in (1.0, 1.08):
+        points = np.vstack([np.diag([stretch, 1.0, 1.0]), -np.eye(3)])
+        shape = Shape(points=points, labels=[1, 1, 1, 1, 1, 2])
+        found |= set(names(detection_record(detect(shape, ladder=(0.01, 0.04)), shape, options={})))
+    page = (DOCS / "report.md").read_text(encoding="utf-8").partition("## The JSON")[2]
+    told = set(re.findall(r"`(\w+)", page))
+    assert {"improper", "offset", "excess", "forgiven", "staircase", "coverage", "sigma"} <= found
+    assert found - told == set()
 
 
 def answers(page: str) -> list[str]:
