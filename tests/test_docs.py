@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import symrefine
 from symrefine.cli.parser import parse
 from symrefine.detection.story import detect
 from symrefine.export.records import detection_record
@@ -77,6 +78,13 @@ def test_every_command_has_its_help_on_the_page_of_commands(capsys: pytest.Captu
     told = re.findall(r"^\[\[help (\w+)\]\]$", (DOCS / "commands.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert len(told) > 5
     assert set(told) == set(listed)
+
+
+def test_every_public_name_is_explained() -> None:
+    explained = re.findall(
+        r"^::: symrefine\.(?:\w+\.)*(\w+)$", (DOCS / "api.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert set(symrefine.__all__) - set(explained) == {"__version__"}
 
 
 def used_modules(path: Path) -> Iterator[str]:
