@@ -67,3 +67,11 @@ def test_sdist_makes_the_same_wheel(sdist: Path, wheel: Path, tmp_path: Path) ->
         archive.extractall(tmp_path, filter="data")
     again = built(tmp_path / sdist.name.removesuffix(".tar.gz"), tmp_path / "out", "wheel")
     assert [path.read_bytes() for path in again] == [wheel.read_bytes()]
+
+
+def test_the_container_gets_what_it_copies() -> None:
+    steps = (ROOT / "Dockerfile").read_text(encoding="utf-8").splitlines()
+    copied = {source for step in steps if step.startswith("COPY ") for source in step.split()[1:-1]}
+    let_in = {line[1:] for line in (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines() if line[0] == "!"}
+    assert copied == let_in
+    assert all((ROOT / name).exists() for name in copied)
