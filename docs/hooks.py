@@ -1,6 +1,7 @@
 """What mkdocs calls while it builds the site: text made from the code, so that it cannot lag behind.
 
-`[[help detect]]` in a page becomes the help of that command, `[[schema]]` the JSON schema of the package.
+`[[help detect]]` in a page becomes the help of that command, `[[schema]]` the JSON schema of the package. What the
+package has on its front page is headed by its name there.
 """
 
 import io
@@ -11,6 +12,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
+import symrefine
 from symrefine.cli import invoke
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -32,9 +34,17 @@ def on_config(config: Any) -> Any:
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """The text of a page with what it asks for."""
-    return re.sub(r"^\[\[help (\w+)\]\]$", lambda m: fenced(usage(m[1]), "text"), markdown, flags=re.MULTILINE).replace(
-        "[[schema]]", schema()
-    )
+    markdown = re.sub(r"^\[\[help (\w+)\]\]$", lambda m: fenced(usage(m[1]), "text"), markdown, flags=re.MULTILINE)
+    markdown = re.sub(r"^::: symrefine\.[\w.]*\b(\w+)$", headed, markdown, flags=re.MULTILINE)
+    return markdown.replace("[[schema]]", schema())
+
+
+def headed(asked: re.Match[str]) -> str:
+    """What mkdocstrings is asked to show, headed `symrefine.detect` if that is how it is reached."""
+    name = asked[1]
+    if name not in symrefine.__all__:
+        return asked[0]
+    return f"{asked[0]}\n    options:\n      heading: symrefine.{name}\n      toc_label: {name}"
 
 
 def usage(command: str) -> str:
