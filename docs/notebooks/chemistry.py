@@ -5,14 +5,19 @@
 # the tolerance is all that decides how far a structure may be from its ideal.
 
 # %%
+import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 import symrefine
+
+folder = tempfile.TemporaryDirectory()  # files are written there
+os.chdir(folder.name)
 
 # %% [markdown]
 # ## Staggered ferrocene

@@ -8,8 +8,10 @@
 
 # %%
 import json
+import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -17,6 +19,9 @@ import numpy as np
 import trimesh
 
 import symrefine
+
+folder = tempfile.TemporaryDirectory()  # files are written there
+os.chdir(folder.name)
 
 # %% [markdown]
 # ## A depth image
