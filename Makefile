@@ -13,7 +13,7 @@ LOG := .make/setup.log
 SHELL := /bin/sh
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test bench reproduce lint lock clean
+.PHONY: help setup demo test bench reproduce docs wheel lint lock clean
 
 help: ## what each target does
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -32,6 +32,12 @@ bench: $(READY) ## measure against the stored baseline
 
 reproduce: $(READY) ## the paper's experiments beside the baseline, in minutes; the report, the README's table
 	@$(PY) -m experiments.studies.reproduce
+
+docs: $(VENV)/.docs ## build the site, its notebooks run, in out/site
+	@NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict
+
+wheel: $(READY) ## build wheel and sdist into out/dist, and try the wheel in an environment of its own
+	@.ci/wheel
 
 # Runs a command in silence; says what it said if it fails.
 check = printf '%-26s' "$(1)"; if out=$$($(2) 2>&1); then echo ok; else echo FAILED; echo "$$out"; exit 1; fi
@@ -73,4 +79,9 @@ $(READY): requirements.lock pyproject.toml
 	echo "Setting up .venv: pinned Python packages, 2 GB on disk, a few minutes the first time"; \
 	$(PIP) -r requirements.lock >>$(LOG) 2>&1 || $(call fail,cannot install requirements.lock); \
 	$(PIP) --no-deps --no-build-isolation -e . >>$(LOG) 2>&1 || $(call fail,cannot install symrefine itself)
+	@touch $@
+
+$(VENV)/.docs: $(READY)
+	@echo "Adding what builds the site to .venv: 160 MB"
+	@$(PIP) -c requirements.lock --no-build-isolation -e '.[docs]' >>$(LOG) 2>&1 || $(call fail,cannot install the extra docs)
 	@touch $@

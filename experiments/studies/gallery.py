@@ -218,10 +218,10 @@ def contact_sheet(tiles: Sequence[Tile]) -> bytes:
     figure.figimage(sheet, origin="upper")
     data = io.BytesIO()
     figure.savefig(data, format="png", dpi=DPI, metadata={"Software": None})
-    return _smaller(data)
+    return smaller(data)
 
 
-def _smaller(png: io.BytesIO) -> bytes:
+def smaller(png: io.BytesIO) -> bytes:
     """The same picture in 256 colours, a third of the size."""
     from PIL import Image
 
