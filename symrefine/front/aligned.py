@@ -11,7 +11,13 @@ from symrefine.shape import Shape
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Alignment(Answer, BareAlignment):
-    __doc__ = BareAlignment.__doc__
+    """What `align` found: all that `symrefine.align.alignment.Alignment` has, and a voice.
+
+    Attributes:
+        source: what was moved.
+        target: what it was moved onto.
+        options: what it was asked with.
+    """
 
     source: Shape
     target: Shape

@@ -13,7 +13,12 @@ from symrefine.shape import Shape
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class SubspaceDetection(Found, BareSubspaceDetection):
-    __doc__ = BareSubspaceDetection.__doc__
+    """What `detect` found in points of four to eight coordinates: all that `symrefine.ndim.detection.SubspaceDetection` has, and a voice.
+
+    Attributes:
+        shape: what it was found in.
+        options: what it was asked with.
+    """
 
     shape: Shape
     options: Options

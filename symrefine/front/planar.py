@@ -11,7 +11,12 @@ from symrefine.shape import Shape
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class PlanarDetection(Found, BarePlanarDetection):
-    __doc__ = BarePlanarDetection.__doc__
+    """What `detect` found in a picture, or in points in the plane: all that `symrefine.plane.detection.PlanarDetection` has, and a voice.
+
+    Attributes:
+        shape: what it was found in.
+        options: what it was asked with.
+    """
 
     shape: Shape
     options: Options

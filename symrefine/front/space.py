@@ -12,7 +12,12 @@ from symrefine.shape import Shape
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Detection(Found, BareDetection):
-    __doc__ = BareDetection.__doc__
+    """What `detect` found in an object in space: all that `symrefine.detection.result.Detection` has, and a voice.
+
+    Attributes:
+        shape: what it was found in.
+        options: what it was asked with.
+    """
 
     shape: Shape
     options: Options
