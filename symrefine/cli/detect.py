@@ -22,6 +22,7 @@ from symrefine.cli.values import (
     add_class_options,
     add_depth_options,
     add_detection_options,
+    add_frame_option,
     add_scan_options,
     detection_options,
     grey,
@@ -72,6 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--strict", action="store_true", help=f"end with status {UNDETERMINED} where the answer is undetermined"
     )
     add_class_options(parser)
+    add_frame_option(parser)
     add_scan_options(parser)
     add_depth_options(parser)
     add_detection_options(parser)
@@ -108,11 +110,13 @@ def examine(
     The detection is a `PlanarDetection`, a `Detection` or a `SubspaceDetection`, as the points have two, three or more
     coordinates.
     """
-    from symrefine.load import IMAGES
+    from symrefine.load import IMAGES, suffix_of
 
     start = time.perf_counter()
     shape = read_scan(path, options, threshold=threshold, invert=invert)
     load_s = time.perf_counter() - start
+    if threshold is not None or invert or (shape.dim == 2 and suffix_of(Path(path)) in IMAGES):
+        options = options | {"threshold": threshold, "invert": invert}
     tolerance, seed, outliers = options["tolerance"], options["seed"], options.get("outliers", "auto")
     if shape.labels is not None and shape.dim != 3:
         raise InputError(
@@ -123,8 +127,6 @@ def examine(
         from symrefine.plane import detect_planar
 
         flat = detect_planar(shape, tolerance=tolerance, seed=seed)
-        if Path(path).suffix.lower() in IMAGES:
-            options = options | {"threshold": threshold, "invert": invert}
         return shape, flat, planar_record(flat, shape, options=options, load_s=load_s)
     if shape.dim > 3:
         from symrefine.export.records import subspace_record
@@ -145,7 +147,7 @@ def read_scan(path: str, options: dict[str, Any], **picture: Any) -> "Shape":
     """The shape in a file as `detection_options` say, and `picture`: a depth image, or a cloud that a camera saw."""
     from symrefine.load import load, load_depth
 
-    known = ("intrinsics", "depth_scale", "mask", "viewpoint", "measure", "labels", "weights")
+    known = ("intrinsics", "depth_scale", "mask", "viewpoint", "measure", "labels", "weights", "frame")
     said = {name: given for name in known if (given := options.get(name)) is not None}
     depth = {name: said.pop(name) for name in ("depth_scale", "mask") if name in said}
     if "intrinsics" in said:

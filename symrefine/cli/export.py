@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from symrefine.cli.outputs import bytes_writer, check_outputs, note, tell, waiting, write_all
-from symrefine.cli.values import add_detection_options, count, natural, positive
+from symrefine.cli.values import add_detection_options, add_frame_option, count, natural, positive
 from symrefine.errors import InputError
 from symrefine.files import check_target
 
@@ -51,6 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="canonical: where the 4 x 4 transform goes, .json or .npz (default: OUT_transform.json)",
     )
+    add_frame_option(parser)
     add_detection_options(parser)
 
 
@@ -82,7 +83,7 @@ def detected(args: argparse.Namespace) -> tuple["Shape", "Detection"]:
     from symrefine.detection.story import detect
     from symrefine.load import load
 
-    shape = load(args.path, measure=args.measure)
+    shape = load(args.path, measure=args.measure, frame=args.frame)
     return shape, detect(shape, tolerance=args.tolerance, seed=args.seed)
 
 

@@ -68,7 +68,7 @@ def add_depth_options(parser: argparse.ArgumentParser) -> None:
 def detection_options(args: argparse.Namespace) -> dict[str, Any]:
     """What was chosen of the options of a detection, for its record; names of fields only where one is given."""
     named = {name: given for name in ("labels", "weights") if (given := getattr(args, name, None)) is not None}
-    how = ("outliers", "viewpoint", "intrinsics", "depth_scale", "mask")
+    how = ("frame", "outliers", "viewpoint", "intrinsics", "depth_scale", "mask")
     scan = {name: given for name in how if (given := getattr(args, name, None)) is not None}
     return {"tolerance": args.tolerance, "measure": args.measure, "seed": args.seed} | scan | named
 
@@ -88,6 +88,16 @@ def add_class_options(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="masses of the points of a cloud: a property, titled column or array of numbers (default: equal, or the "
         "array `weights` of .npz)",
+    )
+
+
+def add_frame_option(parser: argparse.ArgumentParser) -> None:
+    """The option that chooses one of several objects in a file."""
+    parser.add_argument(
+        "--frame",
+        type=natural,
+        metavar="N",
+        help="which of several molecules, models or volumes in one file, from 0 (default: there has to be one)",
     )
 
 

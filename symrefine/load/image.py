@@ -8,20 +8,18 @@ smoothed away, unless the picture is binary.
 
 import io
 import warnings
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
-from symrefine.load.content import Content
+from symrefine.load.content import Content, Threshold, Wanted
 from symrefine.load.text import shorten
 
 if TYPE_CHECKING:
     from PIL.Image import Image
-
-Threshold = float | Literal["otsu"]
 
 FORMATS = {".bmp": "BMP", ".jpeg": "JPEG", ".jpg": "JPEG", ".png": "PNG"}
 # More pixels add nothing to the moments, only gigabytes.
@@ -35,13 +33,12 @@ _NOISE = 5.0
 _GRAIN, _SHARP, _SOFT, _SEEN = 0.02, 0.3, 5.0, 400
 
 
-def read_image(data: bytes, suffix: str, *, threshold: Threshold | None, invert: bool) -> Content:
+def read_image(data: bytes, suffix: str, wanted: Wanted) -> Content:
     """Pixels of the object in a picture, with their weights; what weighs nothing is left out.
 
     Args:
         suffix: one of `FORMATS`, which the content has to agree with.
-        threshold: make the picture binary: the grey value that parts dark from light, or "otsu" to choose it.
-        invert: exchange object and background.
+        wanted: whether to make the picture binary, or to exchange object and background.
 
     Raises:
         InputError: damaged, animated, too large, of one grey value only.
@@ -50,12 +47,12 @@ def read_image(data: bytes, suffix: str, *, threshold: Threshold | None, invert:
     if np.ptp(grey) == 0.0:
         size = f"{grey.shape[1]} x {grey.shape[0]} pixels"
         raise InputError(f"all {size} have the same grey value {grey.flat[0]:.3g}: there is no object")
-    weights = pixel_weights(without_grain(grey), threshold=threshold, invert=invert)
+    weights = pixel_weights(without_grain(grey), threshold=wanted.threshold, invert=wanted.invert)
     if np.ptp(weights) == 0.0:
         low, high = float(grey.min()), float(grey.max())
         raise InputError(
             f"nothing stands out: grey values run from {low:.3g} to {high:.3g}"
-            + (f"; choose a threshold between them, not {threshold}" if threshold is not None else "")
+            + (f"; choose a threshold between them, not {wanted.threshold}" if wanted.threshold is not None else "")
         )
     row, column = np.nonzero(weights)
     points = np.column_stack([column + 0.5, len(grey) - row - 0.5])
