@@ -18,16 +18,19 @@ from typing import Any, Literal
 
 from symrefine.errors import InputError, about
 from symrefine.files import file_bytes
+from symrefine.load.cif import read_cif
 from symrefine.load.content import Content, Threshold, Wanted, check_distinct, check_finite
 from symrefine.load.depth import load_depth
 from symrefine.load.gltf import read_glb, read_gltf
 from symrefine.load.image import FORMATS, read_image
 from symrefine.load.labels import point_classes, point_weights
 from symrefine.load.mesh import mesh_arrays
+from symrefine.load.molfile import read_molfile
 from symrefine.load.obj import read_obj
 from symrefine.load.off import read_off
 from symrefine.load.packed import GZIP, stem_of, suffix_of, unpacked
 from symrefine.load.pcd import read_pcd
+from symrefine.load.pdb import read_pdb
 from symrefine.load.ply import read_ply
 from symrefine.load.stl import read_stl
 from symrefine.load.tables import read_npy, read_npz, read_table, read_xyz
@@ -69,13 +72,20 @@ _MESHES_AND_CLOUDS = {
     ".txt": _Format(lambda data, _, wanted: read_table(data, wanted.fields)),
     ".xyz": _Format(lambda data, _, wanted: read_xyz(data, wanted.frame), ("fields", "frame")),
 }
+_MOLECULES = {
+    ".cif": _Format(lambda data, _, wanted: read_cif(data, wanted.frame, wanted.fields), ("fields", "frame")),
+    ".mol": _Format(lambda data, _, wanted: read_molfile(data, wanted.frame), ("fields", "frame")),
+    ".pdb": _Format(lambda data, _, wanted: read_pdb(data, wanted.frame, wanted.fields), ("fields", "frame")),
+    ".sdf": _Format(lambda data, _, wanted: read_molfile(data, wanted.frame), ("fields", "frame")),
+}
 _PICTURES = {
     suffix: _Format(lambda data, path, wanted: read_image(data, suffix_of(path), wanted), ("grey",))
     for suffix in FORMATS
 }
-_FORMATS = _MESHES_AND_CLOUDS | _PICTURES
+_IN_SPACE = _MESHES_AND_CLOUDS | _MOLECULES
+_FORMATS = _IN_SPACE | _PICTURES
 # Suffixes of objects in space.
-READERS = tuple(sorted(_MESHES_AND_CLOUDS))
+READERS = tuple(sorted(_IN_SPACE))
 # Suffixes of pictures: apart from the others, because the textures of meshes lie beside these in one directory.
 IMAGES = frozenset(FORMATS)
 # All that `load` reads; each may have `.gz` behind it.

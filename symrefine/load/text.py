@@ -18,11 +18,8 @@ NATURAL = re.compile(r"[0-9]{1,18}")
 _SPACED = re.compile(r"[^\t ] +[^\t ]")
 
 
-def numbered_lines(data: bytes, *, comment: str | None = None, tabs: bool = False) -> list[Line]:
-    """Lines that hold something; `comment` begins a remark that lasts to the end of its line.
-
-    Args:
-        tabs: keep tabs at the beginning of a line, where an empty entry may stand.
+def all_lines(data: bytes) -> list[Line]:
+    """Every line as it stands, empty ones too, without the white space behind it.
 
     Raises:
         InputError: bytes that no text file holds.
@@ -31,9 +28,22 @@ def numbered_lines(data: bytes, *, comment: str | None = None, tabs: bool = Fals
         raise InputError(f"not a text file: zero byte at offset {data.index(0)}")
     # Names and remarks may be in any encoding; a number that is not ASCII is refused where it is parsed.
     text = data.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
-    lines = enumerate(text.split("\n"), start=1)
-    bare = ((number, line if comment is None else line.partition(comment)[0]) for number, line in lines)
-    return [(number, line.rstrip().lstrip(" " if tabs else None)) for number, line in bare if line.strip()]
+    return [(number, line.rstrip()) for number, line in enumerate(text.split("\n"), start=1)]
+
+
+def numbered_lines(data: bytes, *, comment: str | None = None, tabs: bool = False) -> list[Line]:
+    """Lines that hold something; `comment` begins a remark that lasts to the end of its line.
+
+    Args:
+        tabs: keep tabs at the beginning of a line, where an empty entry may stand.
+
+    Raises:
+        InputError: as for `all_lines`.
+    """
+    lines = all_lines(data)
+    if comment is not None:
+        lines = [(number, line.partition(comment)[0].rstrip()) for number, line in lines]
+    return [(number, line.lstrip(" " if tabs else None)) for number, line in lines if line]
 
 
 def split_lines(data: bytes) -> tuple[list[Line], str | None]:
