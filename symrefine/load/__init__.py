@@ -34,6 +34,7 @@ from symrefine.load.pdb import read_pdb
 from symrefine.load.ply import read_ply
 from symrefine.load.stl import read_stl
 from symrefine.load.tables import read_npy, read_npz, read_table, read_xyz
+from symrefine.load.threemf import read_3mf
 from symrefine.shape import Shape
 
 __all__ = ["IMAGES", "READERS", "SUFFIXES", "load", "load_depth", "stem_of", "suffix_of"]
@@ -59,6 +60,7 @@ _OPTIONS = {
 }
 
 _MESHES_AND_CLOUDS = {
+    ".3mf": _Format(lambda data, *_: read_3mf(data)),
     ".csv": _Format(lambda data, _, wanted: read_table(data, wanted.fields)),
     ".glb": _Format(lambda data, path, _: read_glb(data, path)),
     ".gltf": _Format(lambda data, path, _: read_gltf(data, path)),
