@@ -32,6 +32,7 @@ from symrefine.load.packed import GZIP, stem_of, suffix_of, unpacked
 from symrefine.load.pcd import read_pcd
 from symrefine.load.pdb import read_pdb
 from symrefine.load.ply import read_ply
+from symrefine.load.scans import read_e57, read_las
 from symrefine.load.stl import read_stl
 from symrefine.load.tables import read_npy, read_npz, read_table, read_xyz
 from symrefine.load.threemf import read_3mf
@@ -62,8 +63,11 @@ _OPTIONS = {
 _MESHES_AND_CLOUDS = {
     ".3mf": _Format(lambda data, *_: read_3mf(data)),
     ".csv": _Format(lambda data, _, wanted: read_table(data, wanted.fields)),
+    ".e57": _Format(lambda data, path, _: read_e57(data, path)),
     ".glb": _Format(lambda data, path, _: read_glb(data, path)),
     ".gltf": _Format(lambda data, path, _: read_gltf(data, path)),
+    ".las": _Format(lambda data, *_: read_las(data)),
+    ".laz": _Format(lambda data, *_: read_las(data)),
     ".npy": _Format(lambda data, *_: read_npy(data)),
     ".npz": _Format(lambda data, _, wanted: read_npz(data, wanted.fields)),
     ".obj": _Format(lambda data, *_: read_obj(data)),

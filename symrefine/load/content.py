@@ -77,7 +77,7 @@ class Content:
         point_lines: line of the file that each point stands in, for text formats.
         face_lines: the same for the faces.
         first_index: number the format gives its first vertex (1 in OBJ), for messages.
-        viewpoint: [3] where the sensor stood, in the frame of the points, or None.
+        viewpoint: [3] or [N, 3] where the sensor stood, in the frame of the points, or None.
         split: the format repeats a vertex for each face or each attribute (STL, glTF).
     """
 
