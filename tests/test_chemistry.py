@@ -1,5 +1,6 @@
 """Molecules in files of chemists: what ASE writes is read, one frame is chosen, damage is told with its line."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -378,7 +379,7 @@ def test_disorder_needs_weights(tmp_path: Path) -> None:
 
 
 def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "gemmi", None)
+    monkeypatch.setitem(sys.modules, "gemmi", None)
     assert "gemmi is needed to read it and is not installed: pip install 'symrefine[chem]'" in refusal(
         tmp_path, CIF, "a.cif"
     )

@@ -36,6 +36,7 @@ from symrefine.load.scans import read_e57, read_las
 from symrefine.load.stl import read_stl
 from symrefine.load.tables import read_npy, read_npz, read_table, read_xyz
 from symrefine.load.threemf import read_3mf
+from symrefine.load.volume_files import read_mrc, read_nifti, read_nrrd
 from symrefine.shape import Shape
 
 __all__ = ["IMAGES", "READERS", "SUFFIXES", "load", "load_depth", "stem_of", "suffix_of"]
@@ -47,7 +48,7 @@ Reader = Callable[[bytes, Path, Wanted], Content]
 
 @dataclass(frozen=True, slots=True)
 class _Format:
-    """How to read files of one suffix, and which groups of options they take: `fields`, `frame`, `grey`."""
+    """How to read files of one suffix, and which groups of options they take: `fields`, `frame`, `grey`, `measure`."""
 
     read: Reader
     takes: tuple[str, ...] = ("fields",)
@@ -84,11 +85,17 @@ _MOLECULES = {
     ".pdb": _Format(lambda data, _, wanted: read_pdb(data, wanted.frame, wanted.fields), ("fields", "frame")),
     ".sdf": _Format(lambda data, _, wanted: read_molfile(data, wanted.frame), ("fields", "frame")),
 }
+_VOLUMES = {
+    ".map": _Format(lambda data, _, wanted: read_mrc(data, wanted), ("frame", "grey", "measure")),
+    ".mrc": _Format(lambda data, _, wanted: read_mrc(data, wanted), ("frame", "grey", "measure")),
+    ".nii": _Format(lambda data, _, wanted: read_nifti(data, wanted), ("frame", "grey", "measure")),
+    ".nrrd": _Format(lambda data, _, wanted: read_nrrd(data, wanted), ("frame", "grey", "measure")),
+}
 _PICTURES = {
     suffix: _Format(lambda data, path, wanted: read_image(data, suffix_of(path), wanted), ("grey",))
     for suffix in FORMATS
 }
-_IN_SPACE = _MESHES_AND_CLOUDS | _MOLECULES
+_IN_SPACE = _MESHES_AND_CLOUDS | _MOLECULES | _VOLUMES
 _FORMATS = _IN_SPACE | _PICTURES
 # Suffixes of objects in space.
 READERS = tuple(sorted(_IN_SPACE))
@@ -120,7 +127,7 @@ def load(
 
     Args:
         path: file whose suffix is one of `SUFFIXES`, in any case, and may be followed by `.gz`.
-        measure: what carries the mass of a mesh, "surface" if None. Clouds and pictures have no choice.
+        measure: what carries the mass of a mesh or a volume, "surface" if None. Clouds and pictures have no choice.
         labels: what tells the classes that every symmetry must keep: a vertex or face property of .ply (`label`,
             `material_index`), a field of .pcd, a titled column of .csv or .txt (numbers or texts), an array of .npz
             ([F] for faces, [N] for points), `material` for what `usemtl` names in .obj, or `color` for the colours of
@@ -148,10 +155,12 @@ def load(
     source, file = str(path), Path(path)
     with about(source):
         named = [name for name in (labels, weights) if name is not None]
-        content = _content(file, Wanted(fields=named, frame=frame, threshold=threshold, invert=invert))
+        wanted = Wanted(fields=named, frame=frame, measure=measure, threshold=threshold, invert=invert)
+        content = _content(file, wanted)
         check_finite(content)
         check_distinct(content)
-        arrays = _arrays(content, measure, labels, weights, source)
+        left = None if "measure" in _FORMATS[suffix_of(file)].takes else measure
+        arrays = _arrays(content, left, labels, weights, source)
     return Shape(source=source, **arrays)
 
 

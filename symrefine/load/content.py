@@ -30,12 +30,14 @@ class Wanted:
     Args:
         fields: names of labels and weights, for formats in which what nobody names is refused.
         frame: which of several molecules, models or volumes, from 0; None if there has to be one.
+        measure: "solid" for the voxels of a volume, else its surface.
         threshold: grey value that makes a picture or a volume binary, or how to find it; None leaves it as it is.
         invert: exchange object and background of a picture or a volume.
     """
 
     fields: Collection[str] = ()
     frame: int | None = None
+    measure: Literal["surface", "solid"] | None = None
     threshold: Threshold | None = None
     invert: bool = False
 

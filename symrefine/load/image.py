@@ -60,21 +60,24 @@ def read_image(data: bytes, suffix: str, wanted: Wanted) -> Content:
 
 
 def pixel_weights(grey: Array, *, threshold: Threshold | None = None, invert: bool = False) -> Array:
-    """What each pixel [H, W] weighs: 1 and 0 in a binary picture, its distance from the background in a grey one.
+    """What each pixel weighs: 1 and 0 in a binary picture, its distance from the background in a grey one.
 
-    The background is what most of the border shows. A picture with two grey values is binary; of a grey one the
-    background is the median of its border, and pixels within the scatter of the border weigh nothing.
+    The background is what most of the border shows; the border of a volume is its six sides. A picture with two grey
+    values is binary; of a grey one the background is the median of its border, and pixels within the scatter of the
+    border weigh nothing.
 
     Args:
-        grey: [H, W] values from 0 (black) to 1 (white).
+        grey: [H, W] or [A, B, C] values from 0 (black) to 1 (white).
         threshold: make it binary first, light being what reaches the threshold.
         invert: exchange object and background; in a grey picture, weights become their largest value minus them.
     """
     if threshold is not None:
         grey = (grey >= (otsu(grey) if threshold == "otsu" else threshold)).astype(np.float64)
-    border = np.concatenate([grey[0], grey[-1], grey[1:-1, 0], grey[1:-1, -1]])
-    levels = np.unique(grey)
-    if len(levels) <= 2:
+    inside = np.zeros(grey.shape, dtype=bool)
+    inside[(slice(1, -1),) * grey.ndim] = True
+    border = grey[~inside]
+    levels = np.array([grey.min(), grey.max()])
+    if ((grey == levels[0]) | (grey == levels[1])).all():
         # The level that most of the border has; of the whole picture if that is a tie; then the lightest.
         votes = [(int((border == level).sum()), int((grey == level).sum()), k) for k, level in enumerate(levels)]
         return ((grey != levels[max(votes)[-1]]) != invert).astype(np.float64)
