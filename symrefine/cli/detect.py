@@ -40,16 +40,17 @@ UNDETERMINED = 3
 HELP = "find the planes, axes and point group of a mesh, cloud or picture"
 DESCRIPTION = (
     "Find the mirror planes, rotation axes and point group of the mesh or point cloud in PATH (.ply .stl .obj .off "
-    ".glb .gltf .pcd .xyz .csv .txt .npy .npz), or the mirror lines and turns of a picture (.png .jpg .jpeg .bmp) or "
-    "of points with two coordinates (.csv .txt .npy .npz), or the hyperplanes of symmetry of points with 4 to 8 "
-    "coordinates. With --intrinsics PATH is a depth image. Prints a table; lengths are in the units of the file, "
-    "misses in percent of the bounding-box diagonal."
+    ".3mf .glb .gltf .pcd .las .laz .e57 .xyz .csv .txt .npy .npz), of a molecule (.xyz .mol .sdf .pdb .cif) or of a "
+    "volume (.nii .nrrd .mrc .map), or the mirror lines and turns of a picture (.png .jpg .jpeg .bmp) or of points "
+    "with two coordinates (.csv .txt .npy .npz), or the hyperplanes of symmetry of points with 4 to 8 coordinates; "
+    "each file may be packed (.gz). With --intrinsics PATH is a depth image. Prints a table; lengths are in the units "
+    "of the file, misses in percent of the bounding-box diagonal."
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("path", metavar="PATH", help="mesh, point cloud or picture")
+    parser.add_argument("path", metavar="PATH", help="mesh, point cloud, molecule, volume or picture")
     parser.add_argument("--json", metavar="FILE|-", help="write the whole report as JSON; - is stdout, with no table")
     parser.add_argument("--bop", metavar="FILE", help="put the symmetries into this models_info.json of BOP")
     parser.add_argument("--bop-id", type=natural, metavar="N", help="number of the object there (default: 1)")
@@ -66,7 +67,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=grey,
         metavar="GREY",
         help="make a picture binary: grey value from 0 (black) to 1 (white), or `otsu` (default: pixels weigh as much "
-        "as they differ from the background, which is what most of the border shows)",
+        "as they differ from the background, which is what most of the border shows); of a volume: the surface where "
+        "its values cross this share of their range (default: otsu)",
     )
     parser.add_argument("--invert", action="store_true", help="exchange object and background of a picture")
     parser.add_argument(

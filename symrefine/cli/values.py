@@ -21,7 +21,8 @@ def add_detection_options(parser: argparse.ArgumentParser, counts_as: str = "sym
     parser.add_argument(
         "--measure",
         choices=("surface", "solid"),
-        help="what carries the mass of a mesh: its surface (the default) or the solid inside; not for clouds",
+        help="what carries the mass of a mesh or a volume: its surface (the default) or the solid inside; not for "
+        "clouds",
     )
     parser.add_argument(
         "--seed", type=natural, default=0, metavar="N", help="of the random samples (default: %(default)s)"
@@ -81,7 +82,7 @@ def add_class_options(parser: argparse.ArgumentParser) -> None:
         help="classes that every symmetry must keep, from the file: a property of .ply or .pcd (label, class, "
         "material_index), a titled column of .csv or .txt (numbers or texts), an array of .npz, `material` for the "
         "usemtl of .obj, or `color` for the colours of vertices or faces, where colours closer than a quarter of the "
-        "scale are one class and images of textures are not read (default: none, but the elements of chemical .xyz)",
+        "scale are one class and images of textures are not read (default: none, but the elements of molecules)",
     )
     parser.add_argument(
         "--weights",

@@ -1,13 +1,16 @@
-"""Files to shapes: the one way in for meshes and clouds, and the only place that knows file formats.
+"""Files to shapes: the one way in for meshes, clouds, molecules and volumes, and the only place that knows formats.
 
 Nothing in a file is skipped, guessed or repaired: what cannot be read whole is refused with its place in the file.
 
 Each format has the reader that proved most faithful in tests. Measured with open3d 0.20: its PLY reader returns
 uninitialised memory for truncated files and ended the process (signal 11) on a header that counts one vertex too few;
 its OBJ and OFF readers round to float32, and that for OBJ leaves out every quadrilateral; its PCD reader returns zeros
-for binary doubles and reads `x` as 0. trimesh 5.2 cuts ragged OBJ rows to the shortest. So text formats, PLY, STL and
-uncompressed PCD are read here, line by line or straight from the bytes; glTF by trimesh, after a check of what it would
-leave out; compressed PCD by open3d, after a check of sizes. Images are read by Pillow.
+for binary doubles and reads `x` as 0. trimesh 5.2 cuts ragged OBJ rows to the shortest, and 3MF vertices that are no
+numbers. gemmi 0.7 takes 6.x34 of a PDB file for 6. laspy 2.7 returns fewer points than declared. So text formats, PLY,
+STL, 3MF, molecules and uncompressed PCD are read here, line by line or straight from the bytes; glTF by trimesh, LAS by
+laspy and compressed PCD by open3d, after a check of what they would leave out; the syntax of CIF by gemmi, E57 by
+pye57, volumes by nibabel, mrcfile and pynrrd, pictures by Pillow. COLLADA and STEP are not read: pycollada 0.9 rounds
+to float32 and stops at what is no number; cascadio 0.1 leaves out faces that lack a reference, and hangs on a NaN.
 """
 
 from collections.abc import Callable
@@ -117,12 +120,13 @@ def load(
 ) -> Shape:
     """Shape in a file: a mesh if it has faces, else a cloud with its normals where the file has them.
 
-    A picture becomes the weighted points of the plane that its pixels are (see `symrefine.load.image`).
+    A picture becomes the weighted points of the plane that its pixels are (see `symrefine.load.image`), a volume the
+    surface in it, or its voxels (see `symrefine.load.volume`).
 
     Coordinates keep the precision of the file, float64 where it has that. Polygons become triangles; several parts of
     a scene become one shape in the frame of the scene.
 
-    Chemical .xyz (the number of atoms, a remark, then an element and x y z for each atom) gives the elements as labels.
+    Molecules (.xyz with an element before each x y z, .mol, .sdf, .pdb, .cif) give their elements as labels.
     Other labels, and colours, are read only where they are asked for; images of textures never are.
 
     Args:
@@ -133,7 +137,7 @@ def load(
             ([F] for faces, [N] for points), `material` for what `usemtl` names in .obj, or `color` for the colours of
             vertices or faces (.ply, .obj, .off, .glb, and columns red green blue). Colours closer than about a quarter
             of the scale become one class (see `symrefine.load.colours`). A face whose vertices have labels takes that
-            of two corners, or of the first where all differ. Elements if None, for chemical .xyz.
+            of two corners, or of the first where all differ. Elements if None, for molecules.
         weights: a property, column or array of numbers that are the masses of the points of a cloud.
         frame: which of several molecules, models or volumes in one file, from 0; None where there is one.
         threshold: of a picture or a volume: grey value from 0 (its darkest) to 1 that makes it binary, or "otsu"; it is

@@ -37,11 +37,12 @@ def read_las(data: bytes) -> Content:
             points = np.array(cloud.xyz, dtype=np.float64)
             fields = _las_fields(cloud)
             expected = reader.header.point_count
-    except InputError:
+    except (InputError, MemoryError):
         raise
-    except (KeyboardInterrupt, SystemExit, MemoryError):
-        raise
-    except BaseException as error:  # noqa: BLE001 (a third party's reader, which panics, and nothing else in the block)
+    except BaseException as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
+        # What lazrs, in Rust, raises where it panics is no Exception.
+        if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
+            raise
         raise InputError(f"not a whole LAS file: {shorten(str(error), 80)}") from None
     if len(points) != expected:
         raise InputError(f"the header declares {count(expected, 'point')}; {len(points)} are there")
