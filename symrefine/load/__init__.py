@@ -9,8 +9,9 @@ for binary doubles and reads `x` as 0. trimesh 5.2 cuts ragged OBJ rows to the s
 numbers. gemmi 0.7 takes 6.x34 of a PDB file for 6. laspy 2.7 returns fewer points than declared. So text formats, PLY,
 STL, 3MF, molecules and uncompressed PCD are read here, line by line or straight from the bytes; glTF by trimesh, LAS by
 laspy and compressed PCD by open3d, after a check of what they would leave out; the syntax of CIF by gemmi, E57 by
-pye57, volumes by nibabel, mrcfile and pynrrd, pictures by Pillow. COLLADA and STEP are not read: pycollada 0.9 rounds
-to float32 and stops at what is no number; cascadio 0.1 leaves out faces that lack a reference, and hangs on a NaN.
+pye57, volumes by nibabel, mrcfile and pynrrd, pictures by Pillow. cascadio 0.1 leaves out faces of a STEP file that
+lack a reference, and hangs on a NaN: it works in a process of its own, and what it says there is heard. COLLADA is not
+read: pycollada 0.9 rounds to float32 and stops at what is no number.
 """
 
 from collections.abc import Callable
@@ -36,6 +37,7 @@ from symrefine.load.pcd import read_pcd
 from symrefine.load.pdb import read_pdb
 from symrefine.load.ply import read_ply
 from symrefine.load.scans import read_e57, read_las
+from symrefine.load.step import read_step
 from symrefine.load.stl import read_stl
 from symrefine.load.tables import read_npy, read_npz, read_table, read_xyz
 from symrefine.load.threemf import read_3mf
@@ -78,7 +80,9 @@ _MESHES_AND_CLOUDS = {
     ".off": _Format(lambda data, *_: read_off(data)),
     ".pcd": _Format(lambda data, path, _: read_pcd(data, path)),
     ".ply": _Format(lambda data, *_: read_ply(data)),
+    ".step": _Format(lambda data, path, _: read_step(data, path)),
     ".stl": _Format(lambda data, *_: read_stl(data)),
+    ".stp": _Format(lambda data, path, _: read_step(data, path)),
     ".txt": _Format(lambda data, _, wanted: read_table(data, wanted.fields)),
     ".xyz": _Format(lambda data, _, wanted: read_xyz(data, wanted.frame), ("fields", "frame")),
 }

@@ -18,7 +18,9 @@ def library(module: str, extra: str) -> Any:
     try:
         return import_module(module)
     except ImportError:
-        package = module.partition(".")[0]
-        raise InputError(
-            f"{package} is needed to read it and is not installed: pip install 'symrefine[{extra}]'"
-        ) from None
+        raise missing(module.partition(".")[0], extra) from None
+
+
+def missing(package: str, extra: str) -> InputError:
+    """What to raise where a package of an extra is not installed."""
+    return InputError(f"{package} is needed to read it and is not installed: pip install 'symrefine[{extra}]'")

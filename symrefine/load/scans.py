@@ -39,7 +39,7 @@ def read_las(data: bytes) -> Content:
             expected = reader.header.point_count
     except (InputError, MemoryError):
         raise
-    except BaseException as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
+    except BaseException as error:
         # What lazrs, in Rust, raises where it panics is no Exception.
         if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
             raise
