@@ -14,6 +14,7 @@ Where that would be more than `ENOUGH` points, blocks of voxels become one, by t
 
 import logging
 from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,17 +144,29 @@ def _solid(grey: NDArray[np.float32], volume: Volume, wanted: Wanted) -> Content
     if not weights.any() or np.ptp(weights) == 0.0:
         raise InputError("nothing stands out from the background; choose a threshold from 0 to 1")
     steps = np.ones(3, dtype=np.int64)
-    voxels = np.argwhere(weights)
-    own: Array = weights[tuple(voxels.T)].astype(np.float64)
-    masses, places = own, voxels.astype(np.float64)
-    while len(masses) > ENOUGH:
-        steps = _wider(volume.axes, steps, (len(masses) / ENOUGH) ** (1 / 3))
-        blocks, owner = np.unique(voxels // steps, axis=0, return_inverse=True)
-        masses = np.bincount(owner.reshape(-1), own, len(blocks)).astype(np.float64)
-        # The centre of what a block weighs: moments of order one stay what they are.
-        places = np.column_stack([np.bincount(owner.reshape(-1), own * voxels[:, k]) / masses for k in range(3)])
-    _tell(steps, len(masses))
+    while (heavy := int(np.count_nonzero(_blocks(weights, steps).any(axis=(1, 3, 5))))) > ENOUGH:
+        steps = _wider(volume.axes, steps, (heavy / ENOUGH) ** (1 / 3))
+    _tell(steps, heavy)
+    masses, places = _centres(_blocks(weights, steps))
     return Content(points=volume.origin + places @ volume.axes.T, weights=masses)
+
+
+def _centres(blocks: NDArray[Any]) -> tuple[Array, Array]:
+    """What each block that weighs anything weighs, [N], and the centre of that, [N, 3] in voxels.
+
+    Its centre and not its middle: moments of order one stay what they are.
+    """
+    masses = blocks.sum(axis=(1, 3, 5), dtype=np.float64)
+    heavy = np.nonzero(masses)
+    places = np.empty((len(heavy[0]), 3))
+    for k in range(3):
+        inside = 2 * k + 1
+        others = tuple(axis for axis in (1, 3, 5) if axis != inside)
+        # Sums over the other axes first leave one axis of the block, behind the axes of blocks up to its own.
+        layers = np.moveaxis(blocks.sum(axis=others, dtype=np.float64), k + 1, -1)
+        size = blocks.shape[inside]
+        places[:, k] = heavy[k] * size + (layers @ np.arange(size))[heavy] / masses[heavy]
+    return masses[heavy], places
 
 
 def _wider(axes: Array, steps: NDArray[np.int64], factor: float) -> NDArray[np.int64]:
@@ -166,10 +179,17 @@ def _wider(axes: Array, steps: NDArray[np.int64], factor: float) -> NDArray[np.i
 
 def _averaged(grey: NDArray[np.float32], steps: NDArray[np.int64]) -> NDArray[np.float32]:
     """Means over blocks; the last ones go on with what the edge of the grid has."""
-    rest = [(0, int(-size % step)) for size, step in zip(grey.shape, steps, strict=True)]
-    padded = np.pad(grey, rest, mode="edge")
+    return np.asarray(_blocks(grey, steps, mode="edge").mean(axis=(1, 3, 5), dtype=np.float32))
+
+
+def _blocks(
+    values: NDArray[Any], steps: NDArray[np.int64], mode: Literal["constant", "edge"] = "constant"
+) -> NDArray[Any]:
+    """A grid as [A, a, B, b, C, c]: blocks of a x b x c voxels, the last ones filled up with zeros or the edge."""
+    rest = [(0, int(-size % step)) for size, step in zip(values.shape, steps, strict=True)]
+    padded = np.pad(values, rest, mode=mode) if any(more for _, more in rest) else values
     (a, b, c), (u, v, w) = padded.shape, map(int, steps)
-    return np.asarray(padded.reshape(a // u, u, b // v, v, c // w, w).mean(axis=(1, 3, 5), dtype=np.float32))
+    return padded.reshape(a // u, u, b // v, v, c // w, w)
 
 
 def _tell(steps: NDArray[np.int64], points: int) -> None:
