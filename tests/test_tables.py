@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -48,6 +48,7 @@ def test_what_is_written_is_read(tmp_path: Path, name: str, title: list[str] | N
     comma=st.booleans(),
 )  # fmt: skip
 def test_decimal_commas_lose_no_digit(tmp_path_factory: pytest.TempPathFactory, points: np.ndarray, comma: bool):
+    assume(np.ptp(points, axis=0).max() > 1e-50)  # what is smaller is refused for its unit
     folder = tmp_path_factory.getbasetemp()
     assert np.array_equal(loaded(folder, written(points, ";", comma=comma)).points, points)
 
