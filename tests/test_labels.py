@@ -228,7 +228,7 @@ WATER = "3\nwater\nO 0 0 0\nH 0.76 0.59 0\nH -0.76 0.59 0\n"
     [
         (WATER.replace("3", "4", 1), "line 1 declares 4 atoms; 3 follow from line 3 on"),
         (WATER.replace("3", "2", 1), "line 5: 'H -0.76 0.59 0' behind the 2 atoms that line 1 declares"),
-        (WATER + WATER, "line 6: '3' behind the 3 atoms that line 1 declares; expected one molecule"),
+        (WATER + "O 0 0 0\n", "line 6: 'O 0 0 0' behind the 3 atoms that line 1 declares; expected nothing"),
         (WATER.replace("O", "Ox"), "line 3: 'Ox' is no element; expected a symbol (H, He, ... Og, D, T) or an atomic"),
         (WATER.replace("O", "0"), "line 3: '0' is no element"),
         (WATER.replace("O", "119"), "line 3: '119' is no element"),
@@ -404,7 +404,7 @@ def test_what_has_no_labels_says_so(tmp_path: Path) -> None:
     assert "no weights 'mass'; the file offers label" in refusal(path, weights="mass")
     path = tmp_path / "a.png"
     path.write_bytes(b"x")
-    assert "is a picture: labels and weights apply to meshes and clouds only" in refusal(path, labels="color")
+    assert "labels and weights apply to meshes, clouds and molecules only" in refusal(path, labels="color")
     path = ply(tmp_path / "b.ply", TETRA, of_points=rgb(np.full((4, 3), np.nan)), kind="float")
     assert "color of point 0 (line 11) is [nan, nan, nan]; labels are finite colours" in refusal(path, labels="color")
 

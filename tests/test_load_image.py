@@ -240,11 +240,11 @@ def test_thresholds_that_are_none(tmp_path: Path, threshold: Any) -> None:
 def test_options_go_with_their_kind_of_file(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("0,0\n1,1\n")
     for options in ({"threshold": 0.5}, {"invert": True}):
-        with pytest.raises(InputError, match=r"a\.csv: is no picture: threshold and invert apply to \.bmp"):
+        with pytest.raises(InputError, match=r"a\.csv: threshold and invert apply to pictures and volumes only: \.bmp"):
             load(tmp_path / "a.csv", **options)
     assert "measure 'solid' does not apply" in refusal(tmp_path, letter(), measure="solid")
     (tmp_path / "b.png").mkdir()
     with pytest.raises(InputError, match="is a directory"):
         load(tmp_path / "b.png")
-    with pytest.raises(InputError, match=r"and images \.bmp \.jpeg \.jpg \.png$"):
+    with pytest.raises(InputError, match=r"and images \.bmp \.jpeg \.jpg \.png, and \.gz of each$"):
         load(tmp_path / "a.gif")

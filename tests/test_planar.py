@@ -366,7 +366,7 @@ def test_thresholds_that_are_none(arrow: Path, value: str, capsys: pytest.Captur
 def test_threshold_is_for_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     np.savetxt(tmp_path / "a.csv", np.random.default_rng(0).normal(size=(40, 3)), delimiter=",")
     assert invoke(["detect", str(tmp_path / "a.csv"), "--invert"]) == 2
-    assert "is no picture: threshold and invert apply to .bmp" in capsys.readouterr().err
+    assert "threshold and invert apply to pictures and volumes only: .bmp" in capsys.readouterr().err
 
 
 def test_confidence_of_nothing() -> None:

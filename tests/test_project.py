@@ -18,7 +18,6 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 # A worker process may end itself when its parent is gone.
 WORKERS = {Path("study") / "work.py"}
 LONGEST_MODULE = 400
-UNLOCKED = {"docs"}  # large, for one purpose, and bounded in pyproject.toml itself
 HEAVY = {"casadi", "matplotlib", "open3d", "rerun", "scipy"}  # 0.1 s to 1 s each, and `--help` needs none
 
 
@@ -154,8 +153,8 @@ def test_lock_pins_every_requirement_and_names_no_place() -> None:
     locked = {canonicalize_name(pin.name): str(pin.specifier) for pin in pins}
     assert all(re.fullmatch(r"==[^*,]+", version) for version in locked.values())
     assert not any("/" in line for line in lines), "an index, a link or a path of one machine"
-    extras = PROJECT["optional-dependencies"]
-    for extra in ([], *(extras[name] for name in extras if name not in UNLOCKED)):
+    # What `make setup` installs; the other extras are the users' choice.
+    for extra in ([], PROJECT["optional-dependencies"]["dev"]):
         for wanted in map(Requirement, [*PROJECT["dependencies"], *extra]):
             version = locked.get(canonicalize_name(wanted.name), "nothing").removeprefix("==")
             assert version in wanted.specifier, f"requirements.lock has {version} for {wanted}: run `make lock`"

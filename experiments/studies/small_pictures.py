@@ -18,6 +18,7 @@ from PIL import Image
 from experiments.objects.icons import ICONS
 from experiments.objects.pictures import coverage, picture, random_pose
 from experiments.studies.jobs import add_jobs, in_order
+from symrefine.load.content import Wanted
 from symrefine.load.image import read_image
 from symrefine.plane import PlanarDetection, detect_planar
 from symrefine.shape import Shape
@@ -71,7 +72,7 @@ def _loaded(image: Image.Image, quality: int) -> Shape:
         image.save(file, "JPEG", quality=quality)
     else:
         image.save(file, "PNG")
-    content = read_image(file.getvalue(), ".jpg" if quality else ".png", threshold=None, invert=False)
+    content = read_image(file.getvalue(), ".jpg" if quality else ".png", Wanted())
     return Shape(points=content.points, weights=content.weights)
 
 

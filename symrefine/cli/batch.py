@@ -22,6 +22,7 @@ from symrefine.cli.signs import progress
 from symrefine.cli.values import (
     add_class_options,
     add_detection_options,
+    add_frame_option,
     add_scan_options,
     count,
     detection_options,
@@ -63,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--workers", type=count, default=1, metavar="N", help="files done at the same time (default: %(default)s)"
     )
     add_class_options(parser)
+    add_frame_option(parser)
     add_scan_options(parser)
     add_detection_options(parser)
 
@@ -118,11 +120,12 @@ def _check_bop(args: argparse.Namespace, files: list[str]) -> float | None:
     if args.bop is None:
         return None
     from symrefine.export.bop import read_models_info
+    from symrefine.load import stem_of
 
     read_models_info(Path(args.bop))
     owners: dict[int, str] = {}
     for name in files:
-        match = _BOP_NAME.fullmatch(Path(name).stem)
+        match = _BOP_NAME.fullmatch(stem_of(Path(name)))
         if match is None:
             raise InputError(f"{Path(args.dir, name)}: --bop takes the number of an object from names: obj_000001.ply")
         other = owners.setdefault(int(match[1]), name)
@@ -170,6 +173,7 @@ def _write_bop(name: str, rows: dict[str, Row], *, told: bool) -> int:
         told: whether the millimetres in one unit were given, so that there is nothing to doubt.
     """
     from symrefine.export.bop import bop_text, metres_doubt
+    from symrefine.load import stem_of
 
     entries, left_out = {}, 0
     for file, row in sorted(rows.items()):
@@ -178,7 +182,7 @@ def _write_bop(name: str, rows: dict[str, Row], *, told: bool) -> int:
             lost = "entry" not in found and row["error"] is None
             (complain if lost and is_quiet() else note)(found["note"])
         if "entry" in found:
-            entries[int(_BOP_NAME.fullmatch(Path(file).stem)[1])] = found["entry"]  # type: ignore[index]
+            entries[int(_BOP_NAME.fullmatch(stem_of(Path(file)))[1])] = found["entry"]  # type: ignore[index]
         else:
             left_out += 1
     write_all({name: text_writer(bop_text(Path(name), dict(sorted(entries.items()))))})
@@ -192,15 +196,15 @@ def _write_bop(name: str, rows: dict[str, Row], *, told: bool) -> int:
 
 def _files(folder: Path, *, recursive: bool) -> list[str]:
     """Paths below `folder` of the files that can be read, in order."""
-    from symrefine.load import READERS
+    from symrefine.load import READERS, suffix_of
 
     if not folder.is_dir():
         raise InputError(f"{folder}: {'is a file, not a' if folder.exists() else 'no such'} directory")
     found = folder.rglob("*") if recursive else folder.glob("*")
-    names = [p.relative_to(folder) for p in found if p.suffix.lower() in READERS and p.is_file()]
+    names = [p.relative_to(folder) for p in found if suffix_of(p) in READERS and p.is_file()]
     shown = sorted(name.as_posix() for name in names if not any(part.startswith(".") for part in name.parts))
     if not shown:
-        raise InputError(f"{folder}: no mesh and no cloud in it; known are {' '.join(sorted(READERS))}")
+        raise InputError(f"{folder}: no mesh and no cloud in it; known are {' '.join(READERS)}, and .gz of each")
     return shown
 
 

@@ -28,6 +28,7 @@ from symrefine.cli.values import (
     add_class_options,
     add_depth_options,
     add_detection_options,
+    add_frame_option,
     add_path,
     add_scan_options,
     detection_options,
@@ -50,17 +51,18 @@ _OF_ONE = ("bop", "recording", "report", "picture")
 HELP = "find the planes, axes and point group of a mesh, cloud or picture"
 DESCRIPTION = (
     "Find the mirror planes, rotation axes and point group of the mesh or point cloud in PATH (.ply .stl .obj .off "
-    ".glb .gltf .pcd .xyz .csv .txt .npy .npz), or the mirror lines and turns of a picture (.png .jpg .jpeg .bmp) or "
-    "of points with two coordinates (.csv .txt .npy .npz), or the hyperplanes of symmetry of points with 4 to 8 "
-    "coordinates. With --intrinsics PATH is a depth image. Prints a table; lengths are in the units of the file, "
-    "misses in percent of the bounding-box diagonal. Several files, or a pattern in quotes, give a line each; one that "
-    "cannot be used is told on its line, the others go on, and the exit status is 2."
+    ".3mf .step .glb .gltf .pcd .las .laz .e57 .xyz .csv .txt .npy .npz), of a molecule (.xyz .mol .sdf .pdb .cif) or "
+    "of a volume (.nii .nrrd .mrc .map), or the mirror lines and turns of a picture (.png .jpg .jpeg .bmp) or of "
+    "points with two coordinates (.csv .txt .npy .npz), or the hyperplanes of symmetry of points with 4 to 8 "
+    "coordinates; each file may be packed (.gz). With --intrinsics PATH is a depth image. Prints a table; lengths are "
+    "in the units of the file, misses in percent of the bounding-box diagonal. Several files, or a pattern in quotes, "
+    "give a line each; one that cannot be used is told on its line, the others go on, and the exit status is 2."
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    add_path(parser, "meshes, point clouds or pictures, or patterns of them", several=True)
+    add_path(parser, "meshes, clouds, molecules, volumes or pictures, or patterns of them", several=True)
     parser.add_argument(
         "--json",
         metavar="FILE|-",
@@ -82,13 +84,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=grey,
         metavar="GREY",
         help="make a picture binary: grey value from 0 (black) to 1 (white), or `otsu` (default: pixels weigh as much "
-        "as they differ from the background, which is what most of the border shows)",
+        "as they differ from the background, which is what most of the border shows); of a volume: the surface where "
+        "its values cross this share of their range (default: otsu)",
     )
     parser.add_argument("--invert", action="store_true", help="exchange object and background of a picture")
     parser.add_argument(
         "--strict", action="store_true", help=f"end with status {UNDETERMINED} where the answer is undetermined"
     )
     add_class_options(parser)
+    add_frame_option(parser)
     add_scan_options(parser)
     add_depth_options(parser)
     add_detection_options(parser)
@@ -201,12 +205,12 @@ def examine(
     from symrefine.detection.story import LADDER
     from symrefine.front.verbs import detect
     from symrefine.lengths import relative_tolerance
-    from symrefine.load import IMAGES
+    from symrefine.load import IMAGES, suffix_of
 
     clock, outliers = Clock(), options.get("outliers", "auto")
     with clock("load"):
         shape = read_scan(path, options, threshold=threshold, invert=invert)
-    if shape.dim == 2 and Path(path).suffix.lower() in IMAGES:
+    if threshold is not None or invert or (shape.dim == 2 and suffix_of(Path(path)) in IMAGES):
         options = options | {"threshold": threshold, "invert": invert}
     found = detect(
         shape,
@@ -222,7 +226,7 @@ def read_scan(path: str, options: dict[str, Any], **picture: Any) -> "Shape":
     """The shape in a file as `detection_options` say, and `picture`: a depth image, or a cloud that a camera saw."""
     from symrefine.load import load, load_depth
 
-    known = ("intrinsics", "depth_scale", "mask", "viewpoint", "measure", "labels", "weights")
+    known = ("intrinsics", "depth_scale", "mask", "viewpoint", "measure", "labels", "weights", "frame")
     said = {name: given for name in known if (given := options.get(name)) is not None}
     depth = {name: said.pop(name) for name in ("depth_scale", "mask") if name in said}
     if "intrinsics" in said:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from symrefine.cli.inputs import loaded
 from symrefine.cli.outputs import bytes_writer, check_outputs, note, tell, write_all
 from symrefine.cli.signs import waiting
-from symrefine.cli.values import add_detection_options, add_path, count, natural, positive
+from symrefine.cli.values import add_detection_options, add_frame_option, add_path, count, natural, positive
 from symrefine.errors import InputError
 from symrefine.files import check_target
 
@@ -54,6 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="canonical: where the 4 x 4 transform goes, .json or .npz (default: OUT_transform.json)",
     )
+    add_frame_option(parser)
     add_detection_options(parser)
 
 
@@ -91,7 +92,7 @@ def detected(args: argparse.Namespace) -> tuple["Shape", "Detection"]:
     from symrefine.lengths import relative_tolerance
     from symrefine.load import load
 
-    shape = loaded(args.path, args.format, partial(load, measure=args.measure))
+    shape = loaded(args.path, args.format, partial(load, measure=args.measure, frame=args.frame))
     tolerance = relative_tolerance(args.tolerance, shape, units=args.units)
     return shape, detect(shape, tolerance=tolerance, seed=args.seed)
 

@@ -97,15 +97,17 @@ def _check_named(path: Path) -> None:
     """Refuse slips of the pen with what may have been meant; whatever else is wrong the readers tell."""
     if path.is_dir():
         raise InputError(f"{path}: is a directory; expected a file (`symrefine batch {path}` takes all that are in it)")
-    known, suffix = _suffixes(), path.suffix.lower()
+    from symrefine.load import suffix_of
+
+    known, suffix = _suffixes(), suffix_of(path)
     if suffix not in known and path.is_file() and (close := meant(suffix, known)):
         raise InputError(f"{path}: unknown suffix {path.suffix!r}; known are {' '.join(known)}{close}")
 
 
 def _suffixes() -> list[str]:
-    from symrefine.load import IMAGES, READERS
+    from symrefine.load import SUFFIXES
 
-    return sorted({*READERS, *IMAGES})
+    return sorted(SUFFIXES)
 
 
 def _bare(suffixes: Sequence[str]) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from symrefine.cli.export import detected
 from symrefine.cli.outputs import bytes_writer, check_outputs, json_writer, note, tell, write_all
 from symrefine.cli.signs import waiting
-from symrefine.cli.values import add_detection_options, add_path, detection_options
+from symrefine.cli.values import add_detection_options, add_frame_option, add_path, detection_options
 from symrefine.errors import InputError
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--group", metavar="NAME", help="make only this subgroup of what was found exact, such as Cs")
     parser.add_argument("--json", metavar="FILE|-", help="write the figures as JSON; - is stdout, with no table")
+    add_frame_option(parser)
     add_detection_options(parser)
 
 

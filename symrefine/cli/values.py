@@ -30,7 +30,8 @@ def add_detection_options(parser: argparse.ArgumentParser, counts_as: str = "sym
     parser.add_argument(
         "--measure",
         choices=("surface", "solid"),
-        help="what carries the mass of a mesh: its surface (the default) or the solid inside; not for clouds",
+        help="what carries the mass of a mesh or a volume: its surface (the default) or the solid inside; not for "
+        "clouds",
     )
     parser.add_argument(
         "--seed", type=natural, default=0, metavar="N", help="of the random samples (default: %(default)s)"
@@ -93,7 +94,7 @@ def detection_options(args: argparse.Namespace) -> dict[str, Any]:
 
 def reading_options(args: argparse.Namespace) -> dict[str, Any]:
     """What was chosen of the options that say how points were taken and what of the file counts, where given."""
-    how = ("outliers", "viewpoint", "intrinsics", "depth_scale", "mask", "units", "labels", "weights")
+    how = ("frame", "outliers", "viewpoint", "intrinsics", "depth_scale", "mask", "units", "labels", "weights")
     return {name: given for name in how if (given := getattr(args, name, None)) is not None}
 
 
@@ -105,13 +106,23 @@ def add_class_options(parser: argparse.ArgumentParser) -> None:
         help="classes that every symmetry must keep, from the file: a property of .ply or .pcd (label, class, "
         "material_index), a titled column of .csv or .txt (numbers or texts), an array of .npz, `material` for the "
         "usemtl of .obj, or `color` for the colours of vertices or faces, where colours closer than a quarter of the "
-        "scale are one class and images of textures are not read (default: none, but the elements of chemical .xyz)",
+        "scale are one class and images of textures are not read (default: none, but the elements of molecules)",
     )
     parser.add_argument(
         "--weights",
         metavar="NAME",
         help="masses of the points of a cloud: a property, titled column or array of numbers (default: equal, or the "
         "array `weights` of .npz)",
+    )
+
+
+def add_frame_option(parser: argparse.ArgumentParser) -> None:
+    """The option that chooses one of several objects in a file."""
+    parser.add_argument(
+        "--frame",
+        type=natural,
+        metavar="N",
+        help="which of several molecules, models or volumes in one file, from 0 (default: there has to be one)",
     )
 
 

@@ -11,7 +11,9 @@ from symrefine.shape import Shape
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Alignment(Answer, BareAlignment):
-    """What `align` found: all that `symrefine.align.alignment.Alignment` has, and a voice.
+    """What `align` found, with a voice.
+
+    It has all that `symrefine.align.alignment.Alignment` has.
 
     Attributes:
         source: what was moved.

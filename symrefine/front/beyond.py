@@ -13,7 +13,9 @@ from symrefine.shape import Shape
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class SubspaceDetection(Found, BareSubspaceDetection):
-    """What `detect` found in points of four to eight coordinates: all that `symrefine.ndim.detection.SubspaceDetection` has, and a voice.
+    """What `detect` found in points of four to eight coordinates, with a voice.
+
+    It has all that `symrefine.ndim.detection.SubspaceDetection` has.
 
     Attributes:
         shape: what it was found in.

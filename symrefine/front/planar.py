@@ -11,7 +11,9 @@ from symrefine.shape import Shape
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class PlanarDetection(Found, BarePlanarDetection):
-    """What `detect` found in a picture, or in points in the plane: all that `symrefine.plane.detection.PlanarDetection` has, and a voice.
+    """What `detect` found in a picture, or in points in the plane, with a voice.
+
+    It has all that `symrefine.plane.detection.PlanarDetection` has.
 
     Attributes:
         shape: what it was found in.

@@ -12,7 +12,9 @@ from symrefine.shape import Shape
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Detection(Found, BareDetection):
-    """What `detect` found in an object in space: all that `symrefine.detection.result.Detection` has, and a voice.
+    """What `detect` found in an object in space, with a voice.
+
+    It has all that `symrefine.detection.result.Detection` has.
 
     Attributes:
         shape: what it was found in.

@@ -1,60 +1,115 @@
-"""Files to shapes: the one way in for meshes and clouds, and the only place that knows file formats.
+"""Files to shapes: the one way in for meshes, clouds, molecules and volumes, and the only place that knows formats.
 
 Nothing in a file is skipped, guessed or repaired: what cannot be read whole is refused with its place in the file.
 
 Each format has the reader that proved most faithful in tests. Measured with open3d 0.20: its PLY reader returns
 uninitialised memory for truncated files and ended the process (signal 11) on a header that counts one vertex too few;
 its OBJ and OFF readers round to float32, and that for OBJ leaves out every quadrilateral; its PCD reader returns zeros
-for binary doubles and reads `x` as 0. trimesh 5.2 cuts ragged OBJ rows to the shortest. So text formats, PLY, STL and
-uncompressed PCD are read here, line by line or straight from the bytes; glTF by trimesh, after a check of what it would
-leave out; compressed PCD by open3d, after a check of sizes. Images are read by Pillow.
+for binary doubles and reads `x` as 0. trimesh 5.2 cuts ragged OBJ rows to the shortest, and 3MF vertices that are no
+numbers. gemmi 0.7 takes 6.x34 of a PDB file for 6. laspy 2.7 returns fewer points than declared. So text formats, PLY,
+STL, 3MF, molecules and uncompressed PCD are read here, line by line or straight from the bytes; glTF by trimesh, LAS by
+laspy and compressed PCD by open3d, after a check of what they would leave out; the syntax of CIF by gemmi, E57 by
+pye57, volumes by nibabel, mrcfile and pynrrd, pictures by Pillow. cascadio 0.1 leaves out faces of a STEP file that
+lack a reference, and hangs on a NaN: it works in a process of its own, and what it says there is heard. COLLADA is not
+read: pycollada 0.9 rounds to float32 and stops at what is no number.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
 
 from symrefine.errors import InputError, about
 from symrefine.files import file_bytes
-from symrefine.load.content import Content, check_distinct, check_finite
+from symrefine.load.cif import read_cif
+from symrefine.load.content import Content, Threshold, Wanted, check_distinct, check_finite
 from symrefine.load.depth import load_depth
 from symrefine.load.gltf import read_glb, read_gltf
-from symrefine.load.image import FORMATS, Threshold, read_image
+from symrefine.load.image import FORMATS, read_image
 from symrefine.load.labels import point_classes, point_weights
 from symrefine.load.mesh import mesh_arrays
+from symrefine.load.molfile import read_molfile
 from symrefine.load.obj import read_obj
 from symrefine.load.off import read_off
+from symrefine.load.packed import GZIP, stem_of, suffix_of, unpacked
 from symrefine.load.pcd import read_pcd
+from symrefine.load.pdb import read_pdb
 from symrefine.load.ply import read_ply
+from symrefine.load.scans import read_e57, read_las
+from symrefine.load.step import read_step
 from symrefine.load.stl import read_stl
 from symrefine.load.tables import read_npy, read_npz, read_table, read_xyz
+from symrefine.load.threemf import read_3mf
+from symrefine.load.volume_files import read_mrc, read_nifti, read_nrrd
 from symrefine.shape import Shape
 
-__all__ = ["IMAGES", "READERS", "load", "load_depth"]
+__all__ = ["IMAGES", "READERS", "SUFFIXES", "load", "load_depth", "stem_of", "suffix_of"]
 
-# A reader gets the bytes of a file, its path where others lie beside it or another program reads it, and of a table of
-# any columns the names of those that it shall take beside coordinates. It says what is wrong, not in which file.
-Reader = Callable[[bytes, Path, Collection[str]], Content]
+# A reader gets the bytes of a file, its path where others lie beside it or another program reads it, and what the
+# caller wants beyond coordinates. It says what is wrong, not in which file.
+Reader = Callable[[bytes, Path, Wanted], Content]
 
-_READERS: dict[str, Reader] = {
-    ".csv": lambda data, _, named: read_table(data, named),
-    ".glb": lambda data, path, _: read_glb(data, path),
-    ".gltf": lambda data, path, _: read_gltf(data, path),
-    ".npy": lambda data, *_: read_npy(data),
-    ".npz": lambda data, _, named: read_npz(data, named),
-    ".obj": lambda data, *_: read_obj(data),
-    ".off": lambda data, *_: read_off(data),
-    ".pcd": lambda data, path, _: read_pcd(data, path),
-    ".ply": lambda data, *_: read_ply(data),
-    ".stl": lambda data, *_: read_stl(data),
-    ".txt": lambda data, _, named: read_table(data, named),
-    ".xyz": lambda data, *_: read_xyz(data),
+
+@dataclass(frozen=True, slots=True)
+class _Format:
+    """How to read files of one suffix, and which groups of options they take: `fields`, `frame`, `grey`, `measure`."""
+
+    read: Reader
+    takes: tuple[str, ...] = ("fields",)
+
+
+# What to say where a file takes none of a group.
+_OPTIONS = {
+    "fields": "labels and weights apply to meshes, clouds and molecules only",
+    "frame": "a frame is chosen of molecules and volumes only",
+    "grey": "threshold and invert apply to pictures and volumes only",
 }
-# Suffixes of meshes and clouds.
-READERS = tuple(_READERS)
+
+_MESHES_AND_CLOUDS = {
+    ".3mf": _Format(lambda data, *_: read_3mf(data)),
+    ".csv": _Format(lambda data, _, wanted: read_table(data, wanted.fields)),
+    ".e57": _Format(lambda data, path, _: read_e57(data, path)),
+    ".glb": _Format(lambda data, path, _: read_glb(data, path)),
+    ".gltf": _Format(lambda data, path, _: read_gltf(data, path)),
+    ".las": _Format(lambda data, *_: read_las(data)),
+    ".laz": _Format(lambda data, *_: read_las(data)),
+    ".npy": _Format(lambda data, *_: read_npy(data)),
+    ".npz": _Format(lambda data, _, wanted: read_npz(data, wanted.fields)),
+    ".obj": _Format(lambda data, *_: read_obj(data)),
+    ".off": _Format(lambda data, *_: read_off(data)),
+    ".pcd": _Format(lambda data, path, _: read_pcd(data, path)),
+    ".ply": _Format(lambda data, *_: read_ply(data)),
+    ".step": _Format(lambda data, path, _: read_step(data, path)),
+    ".stl": _Format(lambda data, *_: read_stl(data)),
+    ".stp": _Format(lambda data, path, _: read_step(data, path)),
+    ".txt": _Format(lambda data, _, wanted: read_table(data, wanted.fields)),
+    ".xyz": _Format(lambda data, _, wanted: read_xyz(data, wanted.frame), ("fields", "frame")),
+}
+_MOLECULES = {
+    ".cif": _Format(lambda data, _, wanted: read_cif(data, wanted.frame, wanted.fields), ("fields", "frame")),
+    ".mol": _Format(lambda data, _, wanted: read_molfile(data, wanted.frame), ("fields", "frame")),
+    ".pdb": _Format(lambda data, _, wanted: read_pdb(data, wanted.frame, wanted.fields), ("fields", "frame")),
+    ".sdf": _Format(lambda data, _, wanted: read_molfile(data, wanted.frame), ("fields", "frame")),
+}
+_VOLUMES = {
+    ".map": _Format(lambda data, _, wanted: read_mrc(data, wanted), ("frame", "grey", "measure")),
+    ".mrc": _Format(lambda data, _, wanted: read_mrc(data, wanted), ("frame", "grey", "measure")),
+    ".nii": _Format(lambda data, _, wanted: read_nifti(data, wanted), ("frame", "grey", "measure")),
+    ".nrrd": _Format(lambda data, _, wanted: read_nrrd(data, wanted), ("frame", "grey", "measure")),
+}
+_PICTURES = {
+    suffix: _Format(lambda data, path, wanted: read_image(data, suffix_of(path), wanted), ("grey",))
+    for suffix in FORMATS
+}
+_IN_SPACE = _MESHES_AND_CLOUDS | _MOLECULES | _VOLUMES
+_FORMATS = _IN_SPACE | _PICTURES
+# Suffixes of objects in space.
+READERS = tuple(sorted(_IN_SPACE))
 # Suffixes of pictures: apart from the others, because the textures of meshes lie beside these in one directory.
 IMAGES = frozenset(FORMATS)
+# All that `load` reads; each may have `.gz` behind it.
+SUFFIXES = tuple(sorted(_FORMATS))
 
 
 def load(
@@ -63,66 +118,85 @@ def load(
     measure: Literal["surface", "solid"] | None = None,
     labels: str | None = None,
     weights: str | None = None,
+    frame: int | None = None,
     threshold: Threshold | None = None,
     invert: bool = False,
 ) -> Shape:
     """Shape in a file: a mesh if it has faces, else a cloud with its normals where the file has them.
 
-    A picture becomes the weighted points of the plane that its pixels are (see `symrefine.load.image`).
+    A picture becomes the weighted points of the plane that its pixels are (see `symrefine.load.image`), a volume the
+    surface in it, or its voxels (see `symrefine.load.volume`).
 
     Coordinates keep the precision of the file, float64 where it has that. Polygons become triangles; several parts of
     a scene become one shape in the frame of the scene.
 
-    Chemical .xyz (the number of atoms, a remark, then an element and x y z for each atom) gives the elements as labels.
+    Molecules (.xyz with an element before each x y z, .mol, .sdf, .pdb, .cif) give their elements as labels.
     Other labels, and colours, are read only where they are asked for; images of textures never are.
 
     Args:
-        path: file whose suffix is one of `READERS` or `IMAGES`, in any case.
-        measure: what carries the mass of a mesh, "surface" if None. Clouds and pictures have no choice.
+        path: file whose suffix is one of `SUFFIXES`, in any case, and may be followed by `.gz`.
+        measure: what carries the mass of a mesh or a volume, "surface" if None. Clouds and pictures have no choice.
         labels: what tells the classes that every symmetry must keep: a vertex or face property of .ply (`label`,
             `material_index`), a field of .pcd, a titled column of .csv or .txt (numbers or texts), an array of .npz
             ([F] for faces, [N] for points), `material` for what `usemtl` names in .obj, or `color` for the colours of
             vertices or faces (.ply, .obj, .off, .glb, and columns red green blue). Colours closer than about a quarter
             of the scale become one class (see `symrefine.load.colours`). A face whose vertices have labels takes that
-            of two corners, or of the first where all differ. Elements if None, for chemical .xyz.
+            of two corners, or of the first where all differ. Elements if None, for molecules.
         weights: a property, column or array of numbers that are the masses of the points of a cloud.
-        threshold: of a picture: grey value from 0 to 1 that makes it binary, or "otsu"; it is taken as it is if None.
-        invert: of a picture: exchange object and background.
+        frame: which of several molecules, models or volumes in one file, from 0; None where there is one.
+        threshold: of a picture or a volume: grey value from 0 (its darkest) to 1 that makes it binary, or "otsu"; it is
+            taken as it is if None.
+        invert: of a picture or a volume: exchange object and background.
 
     Raises:
         InputError: the file is missing, unreadable, not what its suffix says, incomplete, contradicts itself, holds
-            coordinates that are not finite, fewer than two distinct points or no area; a measure for a cloud, a
-            threshold or `invert` for what is no picture; labels or weights that the file does not have, or that are
-            of the wrong kind.
+            coordinates that are not finite, fewer than two distinct points or no area; a measure for a cloud; several
+            frames of which none is chosen; options that the format knows nothing of; labels or weights that the file
+            does not have, or that are of the wrong kind; a library that is not installed.
     """
     if measure not in (None, "surface", "solid"):
         raise InputError(f"measure is {measure!r}; expected 'surface', 'solid' or None")
     if threshold not in (None, "otsu") and not (isinstance(threshold, int | float) and 0.0 < threshold < 1.0):
         raise InputError(f"threshold is {threshold}; expected a grey value between 0 (black) and 1 (white), or 'otsu'")
+    if frame is not None and (isinstance(frame, bool) or not isinstance(frame, int)):
+        raise InputError(f"frame is {frame!r}; expected a whole number from 0, or None")
     source, file = str(path), Path(path)
     with about(source):
         named = [name for name in (labels, weights) if name is not None]
-        content = _content(file, named, threshold=threshold, invert=invert)
+        wanted = Wanted(fields=named, frame=frame, measure=measure, threshold=threshold, invert=invert)
+        content = _content(file, wanted)
         check_finite(content)
         check_distinct(content)
-        arrays = _arrays(content, measure, labels, weights, source)
+        left = None if "measure" in _FORMATS[suffix_of(file)].takes else measure
+        arrays = _arrays(content, left, labels, weights, source)
     return Shape(source=source, **arrays)
 
 
-def _content(file: Path, named: Collection[str], *, threshold: Threshold | None, invert: bool) -> Content:
-    suffix = file.suffix.lower()
+def _content(file: Path, wanted: Wanted) -> Content:
+    suffix = suffix_of(file)
     if file.is_dir():
         raise InputError("is a directory; expected a file")
-    if suffix in IMAGES:
-        if named:
-            raise InputError("is a picture: labels and weights apply to meshes and clouds only")
-        return read_image(file_bytes(file), suffix, threshold=threshold, invert=invert)
-    images = " ".join(sorted(IMAGES))
-    if suffix not in READERS:
-        raise InputError(f"unknown suffix {file.suffix!r}; known are {' '.join(READERS)}, and images {images}")
-    if threshold is not None or invert:
-        raise InputError(f"is no picture: threshold and invert apply to {images} only")
-    return _READERS[suffix](file_bytes(file), file, named)
+    if suffix not in _FORMATS:
+        images = " ".join(sorted(IMAGES))
+        raise InputError(
+            f"unknown suffix {suffix!r}; known are {' '.join(READERS)}, and images {images}, and {GZIP} of each"
+        )
+    _check_options(_FORMATS[suffix], wanted)
+    data = file_bytes(file)
+    return _FORMATS[suffix].read(unpacked(data) if file.suffix.lower() == GZIP else data, file, wanted)
+
+
+def _check_options(kind: _Format, wanted: Wanted) -> None:
+    """Refuse what the files of one suffix know nothing of."""
+    given = {
+        "fields": bool(wanted.fields),
+        "frame": wanted.frame is not None,
+        "grey": wanted.threshold is not None or wanted.invert,
+    }
+    for group, said in given.items():
+        if said and group not in kind.takes:
+            users = [suffix for suffix in SUFFIXES if group in _FORMATS[suffix].takes]
+            raise InputError(_OPTIONS[group] + (f": {' '.join(users)}" if group != "fields" else ""))
 
 
 def _arrays(

@@ -8,20 +8,18 @@ smoothed away, unless the picture is binary.
 
 import io
 import warnings
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
-from symrefine.load.content import Content
+from symrefine.load.content import Content, Threshold, Wanted
 from symrefine.load.text import shorten
 
 if TYPE_CHECKING:
     from PIL.Image import Image
-
-Threshold = float | Literal["otsu"]
 
 FORMATS = {".bmp": "BMP", ".jpeg": "JPEG", ".jpg": "JPEG", ".png": "PNG"}
 # More pixels add nothing to the moments, only gigabytes.
@@ -35,13 +33,12 @@ _NOISE = 5.0
 _GRAIN, _SHARP, _SOFT, _SEEN = 0.02, 0.3, 5.0, 400
 
 
-def read_image(data: bytes, suffix: str, *, threshold: Threshold | None, invert: bool) -> Content:
+def read_image(data: bytes, suffix: str, wanted: Wanted) -> Content:
     """Pixels of the object in a picture, with their weights; what weighs nothing is left out.
 
     Args:
         suffix: one of `FORMATS`, which the content has to agree with.
-        threshold: make the picture binary: the grey value that parts dark from light, or "otsu" to choose it.
-        invert: exchange object and background.
+        wanted: whether to make the picture binary, or to exchange object and background.
 
     Raises:
         InputError: damaged, animated, too large, of one grey value only.
@@ -50,12 +47,12 @@ def read_image(data: bytes, suffix: str, *, threshold: Threshold | None, invert:
     if np.ptp(grey) == 0.0:
         size = f"{grey.shape[1]} x {grey.shape[0]} pixels"
         raise InputError(f"all {size} have the same grey value {grey.flat[0]:.3g}: there is no object")
-    weights = pixel_weights(without_grain(grey), threshold=threshold, invert=invert)
+    weights = pixel_weights(without_grain(grey), threshold=wanted.threshold, invert=wanted.invert)
     if np.ptp(weights) == 0.0:
         low, high = float(grey.min()), float(grey.max())
         raise InputError(
             f"nothing stands out: grey values run from {low:.3g} to {high:.3g}"
-            + (f"; choose a threshold between them, not {threshold}" if threshold is not None else "")
+            + (f"; choose a threshold between them, not {wanted.threshold}" if wanted.threshold is not None else "")
         )
     row, column = np.nonzero(weights)
     points = np.column_stack([column + 0.5, len(grey) - row - 0.5])
@@ -63,21 +60,24 @@ def read_image(data: bytes, suffix: str, *, threshold: Threshold | None, invert:
 
 
 def pixel_weights(grey: Array, *, threshold: Threshold | None = None, invert: bool = False) -> Array:
-    """What each pixel [H, W] weighs: 1 and 0 in a binary picture, its distance from the background in a grey one.
+    """What each pixel weighs: 1 and 0 in a binary picture, its distance from the background in a grey one.
 
-    The background is what most of the border shows. A picture with two grey values is binary; of a grey one the
-    background is the median of its border, and pixels within the scatter of the border weigh nothing.
+    The background is what most of the border shows; the border of a volume is its six sides. A picture with two grey
+    values is binary; of a grey one the background is the median of its border, and pixels within the scatter of the
+    border weigh nothing.
 
     Args:
-        grey: [H, W] values from 0 (black) to 1 (white).
+        grey: [H, W] or [A, B, C] values from 0 (black) to 1 (white).
         threshold: make it binary first, light being what reaches the threshold.
         invert: exchange object and background; in a grey picture, weights become their largest value minus them.
     """
     if threshold is not None:
         grey = (grey >= (otsu(grey) if threshold == "otsu" else threshold)).astype(np.float64)
-    border = np.concatenate([grey[0], grey[-1], grey[1:-1, 0], grey[1:-1, -1]])
-    levels = np.unique(grey)
-    if len(levels) <= 2:
+    inside = np.zeros(grey.shape, dtype=bool)
+    inside[(slice(1, -1),) * grey.ndim] = True
+    border = grey[~inside]
+    levels = np.array([grey.min(), grey.max()])
+    if ((grey == levels[0]) | (grey == levels[1])).all():
         # The level that most of the border has; of the whole picture if that is a tie; then the lightest.
         votes = [(int((border == level).sum()), int((grey == level).sum()), k) for k, level in enumerate(levels)]
         return ((grey != levels[max(votes)[-1]]) != invert).astype(np.float64)

@@ -10,6 +10,7 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.content import Content, as_float64
 from symrefine.load.open3d import open3d
+from symrefine.load.packed import on_disk
 from symrefine.load.text import NATURAL, count, numbered_lines, parse_table, shorten
 
 _KEYS = frozenset("VERSION FIELDS SIZE TYPE COUNT WIDTH HEIGHT VIEWPOINT POINTS DATA".split())
@@ -174,7 +175,8 @@ def _read_compressed(data: bytes, path: Path, header: _Header, wanted: list[str]
         )
     if any(header.types[header.names.index(name)] != "F4" for name in wanted):
         raise InputError("compressed coordinates must be of TYPE F and SIZE 4; save it as binary or ascii")
-    return _open3d_points(path, header, len(wanted))
+    with on_disk(data, path) as file:
+        return _open3d_points(file, header, len(wanted))
 
 
 def _open3d_points(path: Path, header: _Header, columns: int) -> Array:

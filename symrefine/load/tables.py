@@ -2,7 +2,6 @@
 
 import io
 import re
-import zipfile
 from collections.abc import Collection
 from typing import Any
 
@@ -11,21 +10,37 @@ from numpy.typing import NDArray
 
 from symrefine.errors import InputError, about
 from symrefine.geometry import Array
-from symrefine.load.content import Content, Polygons, Values, as_float64
-from symrefine.load.molecule import is_molecule, read_molecule
-from symrefine.load.text import Line, count, is_number, numbered_lines, parse_table, separators, shorten
+from symrefine.load.content import Content, Polygons, Values, as_float64, chosen
+from symrefine.load.molecule import is_bare_molecule, is_molecule, read_bare_molecule, read_molecule
+from symrefine.load.packed import archive
+from symrefine.load.text import (
+    Line,
+    count,
+    is_number,
+    numbered_lines,
+    parse_table,
+    separators,
+    shorten,
+    split_lines,
+    with_points,
+)
 
 _FIELDS = ("points", "normals", "weights", "faces")
 _COLOURS = (("red", "green", "blue"), ("r", "g", "b"))
+# First columns that number the rows; pandas writes the last where it has read the first.
+_INDEX = re.compile(r"|index|id|unnamed: 0")
 # Rounding of normals written with three digits; colours and coordinates are far from it.
 _UNIT = 1e-2
 
 
-def read_xyz(data: bytes) -> Content:
+def read_xyz(data: bytes, frame: int | None = None) -> Content:
     """Points of 3-space, with unit normals or without, where `#` begins a remark; or the atoms of chemical .xyz."""
     lines = numbered_lines(data, comment="#")
     if is_molecule(lines):
-        return read_molecule(data)
+        return read_molecule(data, frame)
+    chosen(frame, 1, "clouds")
+    if is_bare_molecule(lines):
+        return read_bare_molecule(lines)
     table = parse_table(lines, columns=(3, 6), layout="3 columns (x y z) or 6 (x y z and a unit normal)")
     normals = table[:, 3:] if table.shape[1] == 6 else None
     if normals is not None and (bad := np.flatnonzero(~_is_unit(normals))).size:
@@ -37,27 +52,30 @@ def read_xyz(data: bytes) -> Content:
 
 
 def read_table(data: bytes, named: Collection[str] = ()) -> Content:
-    """Points of n-space, one a line, between commas if the first line has any; `#` begins a remark.
+    """Points of n-space, one a line, between semicolons, commas, tabs or white space, as the first line has them.
 
-    A first line of names may say which columns are coordinates and which a normal.
+    `#` begins a remark. Between semicolons decimals may have a comma. A first line of names may say which columns are
+    coordinates and which a normal; a first column without a name, or named index or id, is none.
 
     Args:
         named: fields that the caller asks for: names of columns of numbers or texts, or `color` for those of red,
             green and blue. Other columns are refused as ever.
     """
-    lines = numbered_lines(data, comment="#")
-    delimiter = "," if lines and "," in lines[0][1] else None
+    lines, delimiter = split_lines(data)
     names = [name.strip().strip('"').lower() for name in lines[0][1].split(delimiter)] if lines else []
-    titled = bool(names) and not any(re.match(r"[+-]?\.?[0-9]|[+-]?(nan|inf)", name) for name in names)
+    titled = bool(names) and not any(re.match(r"[+-]?[.,]?[0-9]|[+-]?(nan|inf)", name) for name in names)
     rows = lines[1:] if titled else lines
+    index = [0] if titled and _INDEX.fullmatch(names[0]) else []
     fields = _field_columns(names if titled else [], named)
-    taken = {column for group in fields.values() for column in group}
+    taken = {column for group in fields.values() for column in group}.union(index)
     places = [column for column in range(len(names)) if column not in taken]
     normals = _check_names([names[k] for k in places], lines[0][0]) if titled else False
     columns = (len(names),) if titled else ()
     layout = f"{count(len(names), 'column')} as in the first line" if titled else "as many numbers in every line"
     texts = {k: entries for k in taken if (entries := _texts(rows, k, delimiter))}
     numeric = [_without(row, texts, delimiter) for row in rows] if texts else rows
+    if delimiter == ";":
+        numeric = with_points(numeric)
     table = parse_table(numeric, columns=columns, layout=layout, delimiter=delimiter)
     values = {name: np.array(texts.get(group[0], table[:, group])) for name, group in fields.items()}
     if titled:
@@ -85,7 +103,8 @@ def _field_columns(names: list[str], named: Collection[str]) -> dict[str, list[i
 def _texts(rows: list[Line], column: int, delimiter: str | None) -> list[str]:
     """Entries of a column that holds anything but numbers; none of a column of numbers, or where a row is short."""
     entries = [fields[column].strip().strip('"') for _, text in rows if len(fields := text.split(delimiter)) > column]
-    if len(entries) < len(rows) or all(is_number(entry) for entry in entries):
+    numbers = [entry.replace(",", ".") for entry in entries] if delimiter == ";" else entries
+    if len(entries) < len(rows) or all(map(is_number, numbers)):
         return []
     if "" in entries:
         raise InputError(f"line {rows[entries.index('')][0]}, column {column + 1}: is empty")
@@ -172,13 +191,8 @@ def _sorted(fields: dict[str, NDArray[Any]], points: int, faces: int) -> tuple[d
 
 
 def _read_archive(data: bytes) -> dict[str, NDArray[Any]]:
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            members = {name: archive.read(name) for name in archive.namelist()}
-    except Exception as error:  # noqa: BLE001 (zipfile leaks many types on damaged files; nothing else in the block)
-        raise InputError(f"not a whole .npz archive: {shorten(str(error), 80)}") from None
     arrays = {}
-    for name, member in members.items():
+    for name, member in archive(data, ".npz").items():
         with about(name):
             arrays[name.removesuffix(".npy")] = read_array(io.BytesIO(member))
     return arrays

@@ -14,10 +14,12 @@ Line = tuple[int, str]
 # Eighteen digits fit into int64; Python itself refuses to convert thousands of them.
 INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 NATURAL = re.compile(r"[0-9]{1,18}")
+# White space of another kind than tabs between entries.
+_SPACED = re.compile(r"[^\t ] +[^\t ]")
 
 
-def numbered_lines(data: bytes, *, comment: str | None = None) -> list[Line]:
-    """Lines that hold something; `comment` begins a remark that lasts to the end of its line.
+def all_lines(data: bytes) -> list[Line]:
+    """Every line as it stands, empty ones too, without the white space behind it.
 
     Raises:
         InputError: bytes that no text file holds.
@@ -26,10 +28,65 @@ def numbered_lines(data: bytes, *, comment: str | None = None) -> list[Line]:
         raise InputError(f"not a text file: zero byte at offset {data.index(0)}")
     # Names and remarks may be in any encoding; a number that is not ASCII is refused where it is parsed.
     text = data.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
-    lines = enumerate(text.split("\n"), start=1)
-    if comment is None:
-        return [(number, stripped) for number, line in lines if (stripped := line.strip())]
-    return [(number, stripped) for number, line in lines if (stripped := line.partition(comment)[0].strip())]
+    return [(number, line.rstrip()) for number, line in enumerate(text.split("\n"), start=1)]
+
+
+def numbered_lines(data: bytes, *, comment: str | None = None, tabs: bool = False) -> list[Line]:
+    """Lines that hold something; `comment` begins a remark that lasts to the end of its line.
+
+    Args:
+        tabs: keep tabs at the beginning of a line, where an empty entry may stand.
+
+    Raises:
+        InputError: as for `all_lines`.
+    """
+    lines = all_lines(data)
+    if comment is not None:
+        lines = [(number, line.partition(comment)[0].rstrip()) for number, line in lines]
+    return [(number, line.lstrip(" " if tabs else None)) for number, line in lines if line]
+
+
+def split_lines(data: bytes) -> tuple[list[Line], str | None]:
+    """Lines of a table without its remarks, and what separates columns: `;`, `,`, a tab, or None for white space.
+
+    The first line decides: semicolons before commas, and commas before tabs, but for commas in entries between tabs,
+    which may be decimal. Between tabs an entry may be empty.
+
+    Raises:
+        InputError: no text, or a first line with both tabs and commas between entries.
+    """
+    lines = numbered_lines(data, comment="#", tabs=True)
+    first = lines[0][1] if lines else ""
+    stripped = [(number, text.strip()) for number, text in lines]
+    if ";" in first:
+        return stripped, ";"
+    if "," in first:
+        if any("\t" in field.strip() for field in first.split(",")):
+            raise InputError(
+                f"line {lines[0][0]}: {shorten(first)} has tabs and commas; expected one of them between columns, and "
+                "points in decimals (commas, where semicolons separate columns)"
+            )
+        return stripped, ","
+    if "\t" not in first.strip() or any(" " in text and _SPACED.search(text) for _, text in lines[1:]):
+        return stripped, None
+    return (stripped if all(text.startswith("\t") for _, text in lines) else lines), "\t"
+
+
+def with_points(lines: Sequence[Line]) -> list[Line]:
+    """Lines between semicolons with a point in decimals that have a comma.
+
+    Raises:
+        InputError: commas in one entry and points in another, or both in one: neither can be told from a separator of
+            thousands.
+    """
+    comma = next((line for line in lines if "," in line[1]), None)
+    point = next((line for line in lines if "." in line[1]), None)
+    if comma is not None and point is not None:
+        raise InputError(
+            f"line {comma[0]} has commas in decimals, line {point[0]} points; expected one of them, and no separators "
+            "of thousands"
+        )
+    return [(number, text.replace(",", ".")) for number, text in lines] if comma is not None else list(lines)
 
 
 def parse_table(
@@ -113,8 +170,8 @@ def _explain(lines: Sequence[Line], columns: Collection[int], layout: str, delim
 
 def separators(text: str, delimiter: str | None) -> str:
     """What a row of a table has between its columns instead of what belongs there, to end a message with."""
-    if ";" in text:
-        return "; semicolons separate nothing: put commas (.csv, .txt) or white space there, and points into decimals"
+    if ";" in text and delimiter != ";":
+        return "; semicolons separate columns of .csv and .txt only, from the first line on"
     if "," in text and delimiter is None:
         return "; commas separate columns of .csv and .txt only, from the first line on, and decimals have a point"
     return ""

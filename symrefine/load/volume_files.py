@@ -1,0 +1,199 @@
+"""Formats of volumes, each read by the library that keeps it: nibabel, mrcfile, and pynrrd for headers."""
+
+import bz2
+import io
+import math
+import warnings
+import zlib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from symrefine.errors import InputError
+from symrefine.load.content import Content, Wanted, chosen
+from symrefine.load.extras import library
+from symrefine.load.packed import unpacked
+from symrefine.load.text import count, shorten
+from symrefine.load.volume import Volume, check_size, volume_content
+
+# Names that NRRD has for types of numbers.
+_TYPES = {
+    "i1": ("signed char", "int8", "int8_t"),
+    "u1": ("uchar", "unsigned char", "uint8", "uint8_t"),
+    "i2": ("short", "short int", "signed short", "signed short int", "int16", "int16_t"),
+    "u2": ("ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"),
+    "i4": ("int", "signed int", "int32", "int32_t"),
+    "u4": ("uint", "unsigned int", "uint32", "uint32_t"),
+    "i8": ("longlong", "long long", "long long int", "signed long long", "signed long long int", "int64", "int64_t"),
+    "u8": ("ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"),
+    "f4": ("float",),
+    "f8": ("double",),
+}
+
+
+def read_nifti(data: bytes, wanted: Wanted) -> Content:
+    """A volume of a NIfTI file, by its affine map, in millimetres as a rule; of a series one is chosen.
+
+    Raises:
+        InputError: damaged, colours or complex numbers, several volumes of which none was chosen, and as
+            `volume_content`; nibabel is not installed.
+    """
+    nibabel = library("nibabel", "volumes")
+    kind = nibabel.Nifti2Image if 540 in _heads(data) else nibabel.Nifti1Image
+    try:
+        with nibabel.imageglobals.LoggingOutputSuppressor(), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            image = kind.from_bytes(data)
+            shape, dtype = image.shape, np.dtype(image.get_data_dtype())
+            start = int(image.dataobj.offset)
+            affine = np.array(image.affine, dtype=np.float64)
+    except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
+        raise InputError(f"not a whole NIfTI file: {shorten(str(error), 80)}") from None
+    if dtype.kind not in "iuf":
+        raise InputError(f"holds values of type {dtype}; expected real numbers, integer or floating")
+    _check_length(shape, dtype, len(data) - start)
+    check_size(shape[:3])
+    series = [(0,) * (len(shape) - 3)] if len(shape) == 3 else list(np.ndindex(*shape[3:]))
+    number = chosen(wanted.frame, len(series), "volumes")
+    try:
+        with np.errstate(all="ignore"):
+            values = np.asarray(image.dataobj[(..., *series[number])], dtype=np.float32)
+    except Exception as error:  # noqa: BLE001 (as above)
+        raise InputError(f"not a whole NIfTI file: {shorten(str(error), 80)}") from None
+    return volume_content(Volume(values=values, axes=affine[:3, :3], origin=affine[:3, 3]), wanted)
+
+
+def _heads(data: bytes) -> tuple[int, int]:
+    """The size of its header that a NIfTI file begins with, in both orders of bytes."""
+    return int.from_bytes(data[:4], "little"), int.from_bytes(data[:4], "big")
+
+
+def _check_length(shape: tuple[int, ...], dtype: "np.dtype[Any]", there: int) -> None:
+    size = math.prod(shape) * dtype.itemsize if shape else 0
+    if size != there:
+        raise InputError(
+            f"the header gives {' x '.join(map(str, shape))} values of {dtype}, {size} bytes; {there} follow it"
+        )
+
+
+def read_mrc(data: bytes, wanted: Wanted) -> Content:
+    """A density map, in the unit of its cell (Angstrom); of a stack of volumes one is chosen.
+
+    The place of the grid is the origin in the header, or its first voxel where that is 0. A cell without lengths, as
+    of maps in voxels, counts as one of the unit for each voxel.
+
+    Raises:
+        InputError: damaged, pictures instead of volumes, complex numbers, cells without right angles, several volumes
+            of which none was chosen, and as `volume_content`; mrcfile is not installed.
+    """
+    interpreter = library("mrcfile.mrcinterpreter", "volumes")
+    sizes = [
+        [abs(int.from_bytes(data[k : k + 4], order, signed=True)) for k in (0, 4, 8)] for order in ("little", "big")
+    ]
+    # Half a byte is the least that a voxel takes.
+    if min(math.prod(size) for size in sizes) > 2 * len(data):
+        raise InputError(
+            f"has {' x '.join(map(str, sizes[0]))} voxels, which {len(data)} bytes cannot hold; not a MRC file?"
+        )
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            opened = interpreter.MrcInterpreter(iostream=io.BytesIO(data))
+            header, values = opened.header.copy(), opened.data
+            stack = opened.is_image_stack(), opened.is_volume_stack()
+    except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
+        raise InputError(f"not a whole MRC file: {shorten(str(error), 80)}") from None
+    if values is None or values.dtype.kind not in "iuf":
+        raise InputError(f"holds values of {'no type' if values is None else values.dtype}; expected real numbers")
+    _check_length(values.shape, values.dtype, len(data) - 1024 - int(header.nsymbt))
+    if stack[0] or values.ndim == 2:
+        raise InputError(
+            f"holds {count(1 if values.ndim == 2 else len(values), 'picture')}, no volume (mode of its grid)"
+        )
+    parts = values if stack[1] else values[None]
+    return volume_content(_map(parts[chosen(wanted.frame, len(parts), "volumes")], header), wanted)
+
+
+def _map(values: Any, header: Any) -> Volume:
+    """A map whose axes are put in the order x, y, z."""
+    check_size(values.shape)
+    order = [int(header[name]) for name in ("mapc", "mapr", "maps")]
+    if sorted(order) != [1, 2, 3] and order != [0, 0, 0]:
+        raise InputError(f"axes MAPC MAPR MAPS are {order}; expected 1, 2 and 3 in some order")
+    angles = [float(header.cellb[name]) for name in ("alpha", "beta", "gamma")]
+    if any(angle not in (0.0, 90.0) for angle in angles):
+        raise InputError(f"angles of the cell are {angles}; expected right angles: resample it")
+    places = [order.index(axis) for axis in (1, 2, 3)] if any(order) else [0, 1, 2]
+    # Columns are the last axis of the array; transposed, they are the first.
+    turned = np.transpose(values.T, places).astype(np.float32)
+    samples = np.array([int(header[name]) for name in ("mx", "my", "mz")], dtype=np.float64)
+    cell = np.array([float(header.cella[name]) for name in "xyz"])
+    steps = cell / np.maximum(samples, 1.0) if cell.any() else np.ones(3)
+    origin = np.array([float(header.origin[name]) for name in "xyz"])
+    starts = np.array([int(header[name]) for name in ("nxstart", "nystart", "nzstart")], dtype=np.float64)[places]
+    return Volume(values=turned, axes=np.diag(steps), origin=origin if origin.any() else starts * steps)
+
+
+def read_nrrd(data: bytes, wanted: Wanted) -> Content:
+    """A volume of a NRRD file, by its directions and origin, or its spacings.
+
+    Raises:
+        InputError: damaged, data in another file, other axes than three of space, and as `volume_content`; pynrrd is
+            not installed.
+    """
+    nrrd = library("nrrd", "volumes")
+    chosen(wanted.frame, 1, "volumes")
+    stream = io.BytesIO(data)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            header = nrrd.read_header(stream)
+    except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
+        raise InputError(f"not a whole NRRD file: {shorten(str(error), 80)}") from None
+    detached = {"data file", "datafile", "line skip", "lineskip", "byte skip", "byteskip"} & set(header)
+    if detached:
+        raise InputError(f"has {min(detached)!r}: expected header and data in one file, one behind the other")
+    shape = tuple(int(size) for size in np.atleast_1d(header.get("sizes", [])))
+    check_size(shape)
+    dtype = _nrrd_type(header)
+    body = _unpacked(data[stream.tell() :], str(header.get("encoding")), math.prod(shape) * dtype.itemsize)
+    _check_length(shape, dtype, len(body))
+    values = np.frombuffer(body, dtype).reshape(shape, order="F").astype(np.float32)
+    axes, origin = _nrrd_frame(header)
+    return volume_content(Volume(values=values, axes=axes, origin=origin), wanted)
+
+
+def _nrrd_type(header: Mapping[str, Any]) -> "np.dtype[Any]":
+    word = " ".join(str(header.get("type", "")).lower().split())
+    code = next((code for code, words in _TYPES.items() if word in words), None)
+    endian = header.get("endian")
+    if code is None or (code[1] != "1" and endian not in ("little", "big")):
+        raise InputError(f"type is {shorten(word)}, endian {endian!r}; expected real numbers, little or big")
+    return np.dtype(("<" if endian == "little" else ">") + code)
+
+
+def _unpacked(body: bytes, encoding: str, size: int) -> bytes:
+    """Data of a NRRD file; one byte more than expected at most."""
+    if encoding == "raw":
+        return body
+    if encoding in ("gzip", "gz"):
+        return unpacked(body)
+    if encoding in ("bzip2", "bz2"):
+        try:
+            return bz2.BZ2Decompressor().decompress(body, size + 1)
+        except (OSError, zlib.error, EOFError) as error:
+            raise InputError(f"the data are damaged: {shorten(str(error), 80)}") from None
+    raise InputError(f"encoding is {shorten(encoding)}; expected raw, gzip or bzip2")
+
+
+def _nrrd_frame(header: Mapping[str, Any]) -> tuple[Any, Any]:
+    """Axes [3, 3] as columns, and the middle of the first voxel."""
+    directions, spacings = header.get("space directions"), header.get("spacings")
+    axes = np.diag(np.ones(3) if spacings is None else np.array(spacings, dtype=np.float64))
+    if directions is not None:
+        axes = np.array(directions, dtype=np.float64).T
+    if axes.shape != (3, 3):
+        raise InputError(f"space directions are {axes.T.tolist()}; expected three of three numbers")
+    origin = np.array(header.get("space origin", np.zeros(3)), dtype=np.float64)
+    return axes, origin if origin.shape == (3,) else np.full(3, np.nan)
