@@ -1,21 +1,18 @@
 """`symrefine export`: the symmetries of a file as other programs read them."""
 
 import argparse
-from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from symrefine.cli.inputs import loaded
-from symrefine.cli.outputs import bytes_writer, check_outputs, note, tell, write_all
+from symrefine.cli.outputs import check_outputs, note, tell
 from symrefine.cli.signs import waiting
 from symrefine.cli.values import add_detection_options, add_frame_option, add_path, count, natural, positive
 from symrefine.errors import InputError
-from symrefine.files import check_target
 
 if TYPE_CHECKING:
-    from symrefine.detection.result import Detection
-    from symrefine.export.packages import Package
+    from symrefine.front.space import Detection
     from symrefine.shape import Shape
 
 HELP = "write the symmetries as BOP, FoundationPose, MegaPose, DOPE or Isaac read them, or a canonical model"
@@ -60,17 +57,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Detect, write the files of the format, tell what they cannot express."""
+    from symrefine.export.packages import package_of, write_package
+
     _check(args)
     with waiting("detecting"):
         shape, detection = detected(args)
-        package = _package(args, shape, detection)
-        _check_files(args, package)
-        with ExitStack() as undo:
-            if args.to in _FOLDERS and not Path(args.out).exists():
-                Path(args.out).mkdir()
-                undo.callback(Path(args.out).rmdir)
-            write_all({str(path): bytes_writer(data) for path, data in package.files.items()})
-            undo.pop_all()
+        package = package_of(args.to, Path(args.out), detection, shape, **_options(args))
+        write_package(package, args.to, Path(args.out))
     tell(None, {}, [f"{args.path}: {detection.point_group}"], map(str, package.files))
     for text in package.notes:
         note(text)
@@ -88,13 +81,13 @@ def detected(args: argparse.Namespace) -> tuple["Shape", "Detection"]:
     Raises:
         InputError: a picture, or points with two coordinates.
     """
-    from symrefine.detection.story import detect
+    from symrefine.front.verbs import detect_in_space
     from symrefine.lengths import relative_tolerance
     from symrefine.load import load
 
     shape = loaded(args.path, args.format, partial(load, measure=args.measure, frame=args.frame))
     tolerance = relative_tolerance(args.tolerance, shape, units=args.units)
-    return shape, detect(shape, tolerance=tolerance, seed=args.seed)
+    return shape, detect_in_space(shape, tolerance=tolerance, seed=args.seed)
 
 
 def _check(args: argparse.Namespace) -> None:
@@ -131,30 +124,14 @@ def _check_names(args: argparse.Namespace) -> None:
             raise InputError(f"--transform {args.transform}: expected a name that ends in .json or .npz")
 
 
-def _check_files(args: argparse.Namespace, package: "Package") -> None:
-    """Refuse to write over the input, or over what cannot be written."""
-    for path in package.files:
-        if path.resolve() == Path(args.path).resolve():
-            raise InputError(f"--out {args.out}: {path} is the input itself; name another folder")
-        if path.parent.is_dir():
-            check_target(path)
-
-
 def _transform(args: argparse.Namespace) -> Path:
-    out = Path(args.out)
-    return out.with_name(f"{out.stem}_transform.json") if args.transform is None else Path(args.transform)
+    from symrefine.export.packages import place_of_transform
+
+    return place_of_transform(Path(args.out)) if args.transform is None else Path(args.transform)
 
 
-def _package(args: argparse.Namespace, shape: "Shape", detection: "Detection") -> "Package":
-    from symrefine.export import packages
-    from symrefine.export.operations import STEPS
-
-    out, number, scale = Path(args.out), 1 if args.id is None else args.id, args.scale or 1.0
-    if args.to == "bop":
-        return packages.bop_package(out, detection, shape, number=number, scale=scale)
-    if args.to == "npz":
-        options: dict[str, Any] = {"improper": bool(args.improper), "steps": args.steps or STEPS}
-        return packages.npz_package(out, detection, shape, **options)
-    if args.to == "canonical":
-        return packages.canonical_package(out, detection, shape, transform=_transform(args))
-    return packages.consumer_package(args.to, out, detection, shape, number=number, scale=scale)
+def _options(args: argparse.Namespace) -> dict[str, Any]:
+    """The options of the format that were given, by the names that `package_of` has for them."""
+    given = {"number": args.id, "scale": args.scale, "improper": args.improper, "steps": args.steps}
+    given["transform"] = args.transform and Path(args.transform)
+    return {name: value for name, value in given.items() if value is not None}

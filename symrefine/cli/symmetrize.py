@@ -8,10 +8,9 @@ from symrefine.cli.export import detected
 from symrefine.cli.outputs import bytes_writer, check_outputs, json_writer, note, tell, write_all
 from symrefine.cli.signs import waiting
 from symrefine.cli.values import add_detection_options, add_frame_option, add_path, detection_options
-from symrefine.errors import InputError
 
 if TYPE_CHECKING:
-    from symrefine.detection.result import Detection
+    from symrefine.front.space import Detection
     from symrefine.shape import Shape
     from symrefine.symmetrize import Symmetrized
 
@@ -43,12 +42,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Detect, make symmetric, write, print by how much points moved."""
     from symrefine.export.models import check_suffix, model_bytes
+    from symrefine.front.verbs import symmetrize
 
     check_outputs({"--out": args.out, "--json": args.json}, [Path(args.path)])
     check_suffix(Path(args.out))
     with waiting("detecting"):
         shape, detection = detected(args)
-        made = _symmetrize(args, shape, detection)
+        made = symmetrize(shape, detection, group=args.group, tolerance=detection.tolerance, seed=args.seed)
         data = model_bytes(Path(args.out), made.shape)
         record = _record(args, shape, detection, made)
         writers = {args.out: bytes_writer(data)} | json_writer(args.json, record)
@@ -59,27 +59,6 @@ def run(args: argparse.Namespace) -> int:
     if not detection.group.is_finite and args.group is None:
         note(f"{detection.point_group} is continuous, no finite set of points has it: {made.group.name} was made exact")
     return 0
-
-
-def _symmetrize(args: argparse.Namespace, shape: "Shape", detection: "Detection") -> "Symmetrized":
-    from symrefine.symmetrize import placed_subgroup, symmetrize
-
-    if detection.undetermined:
-        raise InputError(f"{args.path}: no symmetry to make exact: {detection.undetermined}")
-    if detection.point_group == "C1":
-        raise InputError(f"{args.path}: is C1, nothing to make symmetric{_nearest_miss(detection)}")
-    group = detection.group if args.group is None else placed_subgroup(detection.group, args.group)
-    return symmetrize(shape, group, detection.center, tolerance=detection.tolerance, seed=args.seed)
-
-
-def _nearest_miss(detection: "Detection") -> str:
-    if not detection.near_misses:
-        return ""
-    miss = detection.near_misses[0]
-    return (
-        f"; the nearest, a {miss.kind}, misses by {miss.residual.p95:.1%} of the diagonal at the 95th percentile: "
-        "choose a larger --tolerance if that counts as symmetric"
-    )
 
 
 def _record(args: argparse.Namespace, shape: "Shape", detection: "Detection", made: "Symmetrized") -> dict[str, Any]:

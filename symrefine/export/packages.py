@@ -1,9 +1,11 @@
 """Everything that one export writes: names and contents of files, and what they cannot express."""
 
 from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -13,11 +15,12 @@ from symrefine.export.bop import bop_entry, bop_limits, bop_text, decided
 from symrefine.export.canonical import Canonical, canonical_pose
 from symrefine.export.consumers import CONSUMERS, Consumer, reading
 from symrefine.export.models import check_suffix, model_bytes, moved, npz_bytes
-from symrefine.export.operations import motions_bytes, motions_limits, reflections_left_out
-from symrefine.files import json_text
+from symrefine.export.operations import STEPS, motions_bytes, motions_limits, reflections_left_out
+from symrefine.files import check_target, json_text, write_all
 from symrefine.shape import Shape
 
 SCHEMA = "symrefine.canonical/1"
+Format = Literal["bop", "npz", "canonical", "foundationpose", "megapose", "dope", "isaac"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,6 +29,68 @@ class Package:
 
     files: Mapping[Path, bytes]
     notes: tuple[str, ...]
+
+
+def package_of(
+    to: Format,
+    out: Path,
+    detection: Detection,
+    shape: Shape,
+    *,
+    number: int = 1,
+    scale: float = 1.0,
+    improper: bool = False,
+    steps: int = STEPS,
+    transform: Path | None = None,
+) -> Package:
+    """What one export writes.
+
+    Args:
+        out: the file, or the folder of a consumer.
+        number: of the object in `models_info.json`.
+        scale: millimetres in one unit of the shape.
+        improper: npz: whether mirrors and the like belong to the matrices.
+        steps: npz: turns that stand for a continuous axis.
+        transform: canonical: where the transform goes; `place_of_transform` if None.
+
+    Raises:
+        InputError: another format, nothing decided, or a file that would take the place of the input.
+    """
+    if to not in get_args(Format):
+        raise InputError(f"to is {to!r}; expected one of {list(get_args(Format))}")
+    if to == "bop":
+        made = bop_package(out, detection, shape, number=number, scale=scale)
+    elif to == "npz":
+        made = npz_package(out, detection, shape, improper=improper, steps=steps)
+    elif to == "canonical":
+        made = canonical_package(out, detection, shape, transform=transform or place_of_transform(out))
+    else:
+        made = consumer_package(to, out, detection, shape, number=number, scale=scale)
+    for path in made.files:
+        if path.resolve() == Path(shape.source).resolve():
+            raise InputError(f"{path}: is the input itself; name another {'folder' if to in CONSUMERS else 'file'}")
+        if path.parent.is_dir():
+            check_target(path)
+    return made
+
+
+def place_of_transform(out: Path) -> Path:
+    """Where the transform to a canonical model goes unless told otherwise."""
+    return out.with_name(f"{out.stem}_transform.json")
+
+
+def write_package(package: Package, to: Format, out: Path) -> None:
+    """Write all files or none; a folder that was not there goes again if one cannot be written."""
+    with ExitStack() as undo:
+        if to in CONSUMERS and not out.exists():
+            out.mkdir()
+            undo.callback(out.rmdir)
+        write_all({str(path): partial(_fill, data) for path, data in package.files.items()})
+        undo.pop_all()
+
+
+def _fill(data: bytes, path: Path) -> None:
+    path.write_bytes(data)
 
 
 def bop_package(out: Path, detection: Detection, shape: Shape, *, number: int, scale: float) -> Package:

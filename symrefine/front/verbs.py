@@ -1,25 +1,21 @@
 """What can be asked of any object: `detect`, `align`, `symmetrize`, `complete`, `export`, `report`."""
 
 from collections.abc import Sequence
-from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from numpy.typing import ArrayLike
 
 from symrefine.errors import InputError
-from symrefine.files import write_all
 from symrefine.front.answers import Found
 from symrefine.load.objects import shape_of
-from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 
 # Each verb imports what it needs when it is used: who detects waits for no alignment.
 if TYPE_CHECKING:
     from symrefine.complete import Completion
     from symrefine.detection.measure import Outliers
-    from symrefine.export.packages import Package
+    from symrefine.export.packages import Format, Package
     from symrefine.front.aligned import Alignment
     from symrefine.front.beyond import SubspaceDetection
     from symrefine.front.planar import PlanarDetection
@@ -27,8 +23,6 @@ if TYPE_CHECKING:
     from symrefine.symmetrize import Symmetrized
 
     Detected: TypeAlias = Detection | PlanarDetection | SubspaceDetection
-
-Format = Literal["bop", "npz", "canonical", "foundationpose", "megapose", "dope", "isaac"]
 
 
 def detect(
@@ -90,6 +84,22 @@ def detect(
     return SubspaceDetection.of(detect_nd(shape, tolerance=tolerance, seed=seed), shape=shape, options=options)
 
 
+def detect_in_space(shape: Any, *, tolerance: float = TOLERANCE, seed: int = 0) -> "Detection":
+    """What `detect` says of an object in space.
+
+    Raises:
+        InputError: points of another number of coordinates.
+    """
+    from symrefine.front.space import Detection
+
+    shape = shape_of(shape)
+    if shape.dim != 3:
+        raise InputError(f"{shape.source}: points have {shape.dim} coordinates; this is for objects in space")
+    found = detect(shape, tolerance=tolerance, seed=seed)
+    assert isinstance(found, Detection)
+    return found
+
+
 def align(
     source: Any,
     target: Any,
@@ -149,7 +159,7 @@ def symmetrize(
     from symrefine.symmetrize import placed_subgroup, symmetrize
 
     shape = shape_of(shape)
-    found = _in_space(shape, detect(shape, tolerance=tolerance, seed=seed)) if found is None else found
+    found = detect_in_space(shape, tolerance=tolerance, seed=seed) if found is None else found
     if found.undetermined:
         raise InputError(f"{shape.source}: no symmetry to make exact: {found.undetermined}")
     if found.point_group == "C1":
@@ -188,7 +198,7 @@ def complete(
 
 def export(
     shape: Any,
-    to: Format,
+    to: "Format",
     out: str | Path,
     *,
     found: "Detection | None" = None,
@@ -218,29 +228,15 @@ def export(
     Raises:
         InputError: another format, nothing decided, or files that cannot be written.
     """
-    from symrefine.export import packages
-    from symrefine.export.consumers import CONSUMERS
     from symrefine.export.operations import STEPS
+    from symrefine.export.packages import package_of, write_package
 
-    if to not in get_args(Format):
-        raise InputError(f"to is {to!r}; expected one of {list(get_args(Format))}")
     shape, out = shape_of(shape), Path(out)
-    found = _in_space(shape, detect(shape)) if found is None else found
-    if to == "bop":
-        package = packages.bop_package(out, found, shape, number=number, scale=scale)
-    elif to == "npz":
-        package = packages.npz_package(out, found, shape, improper=improper, steps=steps or STEPS)
-    elif to == "canonical":
-        place = out.with_name(f"{out.stem}_transform.json") if transform is None else Path(transform)
-        package = packages.canonical_package(out, found, shape, transform=place)
-    else:
-        package = packages.consumer_package(to, out, found, shape, number=number, scale=scale)
-    with ExitStack() as undo:
-        if to in CONSUMERS and not out.exists():
-            out.mkdir()
-            undo.callback(out.rmdir)
-        write_all({str(path): partial(_written, data) for path, data in package.files.items()})
-        undo.pop_all()
+    found = detect_in_space(shape) if found is None else found
+    place = None if transform is None else Path(transform)
+    numbers: Any = {"number": number, "scale": scale, "improper": improper, "steps": steps or STEPS}
+    package = package_of(to, out, found, shape, transform=place, **numbers)
+    write_package(package, to, out)
     return package
 
 
@@ -257,18 +253,6 @@ def report(given: Any, path: str | Path) -> "Detected":
     found: Any = given if isinstance(given, Found) else detect(given)
     found.save(path)
     return found
-
-
-def _written(data: bytes, path: Path) -> None:
-    path.write_bytes(data)
-
-
-def _in_space(shape: Shape, found: "Detected") -> "Detection":
-    from symrefine.front.space import Detection
-
-    if isinstance(found, Detection):
-        return found
-    raise InputError(f"{shape.source}: points have {shape.dim} coordinates; this is for objects in space")
 
 
 def _nearest_miss(found: "Detection") -> str:
