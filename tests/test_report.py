@@ -21,12 +21,13 @@ from symrefine.geometry import Array, Plane, rotation
 from symrefine.groups import point_group
 from symrefine.picture import words
 from symrefine.picture.camera import Camera, look_at
-from symrefine.picture.draw import picture_png, place_labels
+from symrefine.picture.draw import picture_png
 from symrefine.picture.measures import rms_series, theta_series_deg, turn_series_deg
 from symrefine.picture.painter import paint
 from symrefine.picture.raster import Raster
 from symrefine.picture.rows import found_rows
 from symrefine.picture.scene import Scene, make_scene, make_stage
+from symrefine.picture.space import place_labels
 from symrefine.picture.surface import Surface, make_surface
 from symrefine.report import draw, write_html
 from symrefine.report.charts import bar_chart, line_chart

@@ -4,28 +4,20 @@ Everything is relative to the centre of the detection, in input units, so that s
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from symrefine.complete import Verdicts, verdicts
 from symrefine.detection.result import Detection, FoundAxis
 from symrefine.geometry import Array, Mask, Plane, ReadOnly, unit
+from symrefine.moments.quadrature import triangle_areas_and_normals
+from symrefine.picture.atoms import Balls, balls
+from symrefine.picture.palette import AXIS, CONTRADICTED, INFERRED, MISS, OBJECT, Colour, plane_colour
 from symrefine.picture.words import order_name
 from symrefine.shape import Shape
 
-Colour = tuple[int, int, int]
-
-# Okabe and Ito's colours, which colour-blind people tell apart too, without those that white swallows.
-PALETTE: tuple[Colour, ...] = (
-    (0, 114, 178), (213, 94, 0), (0, 158, 115), (180, 80, 150), (224, 150, 0), (64, 160, 220),
-)  # fmt: skip
-OBJECT: Colour = (168, 178, 194)
-AXIS: Colour = (38, 42, 52)
-MISS: Colour = (120, 120, 128)
-# What was seen and agrees is grey like any object; no plane has these.
-INFERRED: Colour = (116, 190, 96)
-CONTRADICTED: Colour = (200, 30, 70)
 # Points that tell how space was seen to be free.
 RAYS = 200
 # How far planes and axes stick out of the object, in diagonals.
@@ -35,13 +27,11 @@ SAME_LINE_RAD = math.radians(1.0)
 # Radius of the mark that tells the order of an axis, in diagonals.
 MARK = 0.05
 MAX_MARKS = 3
+# So far from the vertical of the input the object may still be meant to stand as it does; sides of its hull that are
+# looked at, the largest.
+UPRIGHT_RAD, SIDES = math.radians(10.0), 400
 # Planes without an axis in common that can be seen at once.
 MOST_SHEETS = 8
-
-
-def plane_colour(index: int) -> Colour:
-    """Colour of the plane listed at `index`."""
-    return PALETTE[index % len(PALETTE)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -161,7 +151,8 @@ class Scan(ReadOnly):
 class Scene:
     """What there is to draw beside the shape: planes and axes found, and the candidates turned down.
 
-    Of a scan that shows a part of an object, `scan` has what was seen and what is inferred.
+    Of a scan that shows a part of an object, `scan` has what was seen and what is inferred; of points that stand for
+    themselves, `balls` has what is drawn in their stead, relative to the centre.
     """
 
     stage: Stage
@@ -170,6 +161,7 @@ class Scene:
     missed_planes: tuple[Quad, ...]
     missed_axes: tuple[Line, ...]
     scan: Scan | None = None
+    balls: Balls | None = None
 
     @property
     def main_axes(self) -> tuple[Line, ...]:
@@ -195,7 +187,13 @@ def make_scene(detection: Detection, shape: Shape) -> Scene:
         missed_planes=missed_planes,
         missed_axes=missed_axes,
         scan=_scan(detection, shape) if detection.at_least else None,
+        balls=balls(replace(shape, points=shape.points - detection.center)) if are_atoms(detection, shape) else None,
     )
+
+
+def are_atoms(detection: Detection, shape: Shape) -> bool:
+    """Whether the points of a shape stand for themselves."""
+    return shape.faces is None and detection.surface.cloud.body == "atoms"
 
 
 def _scan(detection: Detection, shape: Shape) -> Scan:
@@ -228,26 +226,60 @@ def make_stage(detection: Detection, shape: Shape, most: int = 20000) -> Stage:
 
 
 def _upright(detection: Detection, points: Array) -> Array:
-    """Frame with the vertical on the main axis; without one, near the third axis of the input."""
+    """Frame with the vertical where a person would put it, as far as the symmetry lets it be.
+
+    The main axis of an axial group stands. Of other objects the third axis of the input does, where the symmetry found
+    agrees that it is the vertical: it lies in the one mirror plane, or along a two-fold axis, within ten degrees. If
+    not, the object was turned, and its largest flat side lies, again within the symmetry. Nothing found says nothing.
+    """
     name, group = detection.point_group, detection.group
     x, y, z = group.frame
-    if name == "Cs":
-        return _standing(_in_plane(detection.planes[0].plane.normal if detection.planes else z, points), z)
-    if name in ("C1", "Ci", "Kh"):
+    if name in ("C1", "Ci", "Kh", "undetermined"):
         return np.eye(3)
+    if name == "Cs":
+        normal = detection.planes[0].plane.normal if detection.planes else z
+        return _standing(_in_plane(normal, points), normal)
     if group.symbol.fold in (0, 2):
-        up = max((x, y, z), key=lambda row: round(abs(float(row[2])), 6))
-        return _standing(up, x if up is not x else y)
+        up = _of_three(group.frame, points)
+        return _standing(up, x if abs(x @ up) < 0.5 else y)
     return _standing(z, x)
 
 
 def _in_plane(normal: Array, points: Array) -> Array:
-    """Vertical of an object with one mirror: the input's, or where that is no choice the object's longest extent."""
-    if abs(normal[2]) < 0.85:
+    """Vertical of an object with one mirror: in it lies what stands."""
+    if abs(normal[2]) < math.sin(UPRIGHT_RAD):
         return unit(np.array([0.0, 0.0, 1.0]) - normal[2] * normal)
-    across = points - np.multiply.outer(points @ normal, normal)
-    longest: Array = np.linalg.eigh(across.T @ across)[1][:, -1]
-    return unit(longest - (longest @ normal) * normal)
+    normals, areas = _sides(points)
+    lying = np.abs(normals @ normal) < math.sin(UPRIGHT_RAD)
+    if not lying.any():  # flat or without a side: its longest extent stands
+        across = points - np.multiply.outer(points @ normal, normal)
+        longest: Array = np.linalg.eigh(across.T @ across)[1][:, -1]
+        return unit(longest - (longest @ normal) * normal)
+    best = normals[lying][int(np.argmax(areas[lying].round(6)))]
+    return unit(best - (best @ normal) * normal)
+
+
+def _of_three(frame: Array, points: Array) -> Array:
+    """The row of a frame that is the vertical of the input, or else the one on whose side the object can lie."""
+    along = np.abs(frame[:, 2])
+    if along.max() > math.cos(UPRIGHT_RAD):
+        return np.asarray(frame[int(along.argmax())])
+    normals, areas = _sides(points)
+    facing = np.abs(normals @ frame.T) > math.cos(UPRIGHT_RAD)
+    covered = (facing * areas[:, None]).sum(axis=0).round(6)
+    return np.asarray(frame[int(np.lexsort((-along, -covered))[0])])
+
+
+def _sides(points: Array) -> tuple[Array, Array]:
+    """Unit normals [K, 3] of the sides of the convex hull, and the share of the hull [K] that faces so, nearly."""
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError):
+        return np.zeros((0, 3)), np.zeros(0)
+    areas, normals = triangle_areas_and_normals(points, hull.simplices)
+    largest = np.argsort(-areas)[:SIDES]
+    near = np.abs(normals[largest] @ normals.T) > math.cos(0.5 * UPRIGHT_RAD)
+    return normals[largest], near @ areas / areas.sum()
 
 
 def _standing(up: Array, side: Array) -> Array:

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from symrefine.detection.result import Detection
 from symrefine.geometry import Array, toward_positive
 from symrefine.groups import PointGroup
+from symrefine.ndim.detection import SubspaceDetection
+from symrefine.plane.detection import PlanarDetection
 
 _NAMED = {
     "C1": "no symmetry",
@@ -51,6 +53,38 @@ def headline(detection: Detection) -> str:
         return f"Undetermined: {detection.undetermined}"
     least = "At least " if detection.at_least else ""
     return f"{least}{symbol(detection.point_group)}: {meaning(detection.group)}"
+
+
+def planar_headline(detection: PlanarDetection) -> str:
+    """The same of an object in the plane."""
+    if detection.undetermined:
+        return f"Undetermined: {detection.undetermined}"
+    return f"{detection.point_group}: {planar_meaning(detection)}"
+
+
+def planar_meaning(detection: PlanarDetection) -> str:
+    """What the lines and turns of an object in the plane come to."""
+    if detection.point_group in ("C1", "O(2)", "SO(2)"):
+        return {"C1": "no symmetry", "O(2)": "round"}.get(detection.point_group, "all turns, no mirror line")
+    lines = count(len(detection.lines), "mirror line") if detection.lines else "no mirror line"
+    return lines + ("" if detection.rotation is None else f", {turns_name(detection.rotation.order)}")
+
+
+def turns_name(order: float) -> str:
+    """What the turns of an object in the plane are called."""
+    return "all turns" if math.isinf(order) else f"turns of order {round(order)}"
+
+
+def subspace_headline(detection: SubspaceDetection) -> str:
+    """How many hyperplanes of symmetry there are, and the order of the group they generate."""
+    if detection.undetermined:
+        return f"Undetermined: {detection.undetermined}"
+    number, dim = len(detection.hyperplanes), len(detection.center)
+    if not number:
+        return f"None: no hyperplane of symmetry in {dim} dimensions"
+    order = detection.reflection_group_order
+    group = "" if order is None else f"; their reflections generate a group of order {order:,}"
+    return f"{number}: {'hyperplane' if number == 1 else 'hyperplanes'} of symmetry in {dim} dimensions{group}"
 
 
 def symbol(name: str) -> str:

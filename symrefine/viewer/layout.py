@@ -7,7 +7,8 @@ import rerun.blueprint as rrb
 
 from symrefine.detection.result import Detection
 from symrefine.picture.camera import look_at
-from symrefine.picture.scene import Colour, Scene
+from symrefine.picture.palette import Colour
+from symrefine.picture.scene import Scene
 
 # Series of the refinement: entity under /series, title and colour.
 SERIES: dict[str, tuple[str, Colour]] = {

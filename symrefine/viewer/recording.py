@@ -23,19 +23,9 @@ from symrefine.fit.refine import Iterate
 from symrefine.geometry import Array, Plane
 from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.picture.measures import series, theta_series_deg, turn_series_deg
-from symrefine.picture.scene import AXIS as DARK
-from symrefine.picture.scene import (
-    CONTRADICTED,
-    INFERRED,
-    MISS,
-    OBJECT,
-    Colour,
-    Line,
-    Quad,
-    Scene,
-    make_scene,
-    plane_colour,
-)
+from symrefine.picture.palette import AXIS as DARK
+from symrefine.picture.palette import CONTRADICTED, INFERRED, MISS, OBJECT, Colour, plane_colour
+from symrefine.picture.scene import Line, Quad, Scene, make_scene
 from symrefine.shape import Index, Shape
 from symrefine.viewer.layout import SERIES, blueprint
 from symrefine.viewer.text import iteration_line, markdown, report_lines
