@@ -31,6 +31,7 @@ class Balls(ReadOnly):
         faces: [F, 3].
         colours: [F, 3] of the faces, 0 to 1.
         atoms: [V] which atom each vertex belongs to.
+        centres: [N, 3] of the atoms.
         bonds: how many pairs are joined.
     """
 
@@ -38,6 +39,7 @@ class Balls(ReadOnly):
     faces: Index
     colours: Array
     atoms: Index
+    centres: Array
     bonds: int
 
 
@@ -58,6 +60,7 @@ def balls(shape: Shape) -> Balls:
         faces=np.concatenate([faces + o for (_, faces, _), o in zip(parts, offsets[:-1], strict=True)]),
         colours=np.concatenate([np.tile(colours[k], (len(faces), 1)) for _, faces, k in parts]),
         atoms=np.concatenate([np.full(len(vertices), k) for vertices, _, k in parts]),
+        centres=shape.points,
         bonds=len(pairs),
     )
 

@@ -12,6 +12,7 @@ MISS: Colour = (120, 120, 128)
 # What was seen and agrees is grey like any object; no plane has these.
 INFERRED: Colour = (116, 190, 96)
 CONTRADICTED: Colour = (200, 30, 70)
+OUTLIER: Colour = (190, 70, 110)
 
 
 def plane_colour(index: int) -> Colour:

@@ -16,7 +16,7 @@ from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.picture.atoms import Balls, balls
 from symrefine.picture.palette import AXIS, CONTRADICTED, INFERRED, MISS, OBJECT, Colour, plane_colour
 from symrefine.picture.words import order_name
-from symrefine.shape import Shape
+from symrefine.shape import Index, Shape
 
 # Points that tell how space was seen to be free.
 RAYS = 200
@@ -152,7 +152,8 @@ class Scene:
     """What there is to draw beside the shape: planes and axes found, and the candidates turned down.
 
     Of a scan that shows a part of an object, `scan` has what was seen and what is inferred; of points that stand for
-    themselves, `balls` has what is drawn in their stead, relative to the centre.
+    themselves, `balls` has what is drawn in their stead, relative to the centre. `outliers` are indices of points that
+    are no part of the object.
     """
 
     stage: Stage
@@ -162,6 +163,7 @@ class Scene:
     missed_axes: tuple[Line, ...]
     scan: Scan | None = None
     balls: Balls | None = None
+    outliers: Index = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @property
     def main_axes(self) -> tuple[Line, ...]:
@@ -178,7 +180,10 @@ class Scene:
 
 def make_scene(detection: Detection, shape: Shape) -> Scene:
     """The scene of a detection; planes are named 1, 2, ... in their order there, axes by their symbol."""
-    stage = make_stage(detection, shape)
+    stage, solid = make_stage(detection, shape), None
+    if are_atoms(detection, shape):
+        solid = balls(replace(shape, points=shape.points - detection.center))
+        stage = replace(stage, points=solid.points)
     missed_planes, missed_axes = _missed(detection, stage)
     return Scene(
         stage=stage,
@@ -187,7 +192,8 @@ def make_scene(detection: Detection, shape: Shape) -> Scene:
         missed_planes=missed_planes,
         missed_axes=missed_axes,
         scan=_scan(detection, shape) if detection.at_least else None,
-        balls=balls(replace(shape, points=shape.points - detection.center)) if are_atoms(detection, shape) else None,
+        balls=solid,
+        outliers=detection.outliers,
     )
 
 
@@ -216,8 +222,9 @@ def _scan(detection: Detection, shape: Shape) -> Scan:
 
 
 def make_stage(detection: Detection, shape: Shape, most: int = 20000) -> Stage:
-    """Where the shape stands: up to `most` of its points, and a frame with the main axis upright."""
-    relative = shape.points[:: max(1, len(shape.points) // most)] - detection.center
+    """Where the shape stands: up to `most` of its points, outliers left out, and a frame with the main axis upright."""
+    own = np.delete(shape.points, detection.outliers, axis=0)
+    relative = own[:: max(1, len(own) // most)] - detection.center
     if shape.faces is None and len(relative) >= 1000:
         distance = np.linalg.norm(relative, axis=1)
         relative = relative[distance <= 1.02 * np.quantile(distance, 0.999)]

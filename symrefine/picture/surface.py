@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from symrefine.geometry import Array, ReadOnly
 from symrefine.moments.quadrature import triangle_areas_and_normals
-from symrefine.picture.palette import OBJECT
+from symrefine.picture.palette import OBJECT, OUTLIER
 from symrefine.picture.scene import Quad, Scene
 from symrefine.shape import Index, Shape
 
@@ -67,7 +67,10 @@ def make_surface(shape: Shape, scene: Scene) -> Surface:
     step = max(1, -(-len(every) // MOST_POINTS))
     points = every[::step]
     radius = COVER * stage.diagonal * _spacing(points / stage.diagonal)
-    plain = _plain(len(points)) if scene.scan is None else scene.scan.colours[::step]
+    colours = _plain(len(every)) if scene.scan is None else scene.scan.colours.copy()
+    if scene.scan is None:
+        colours[scene.outliers] = np.array(OUTLIER) / 255.0
+    plain = colours[::step]
     known = None if scene.scan is not None else shape.normals
     return Surface(
         points=points,

@@ -8,6 +8,7 @@ from symrefine.geometry import Array, toward_positive
 from symrefine.groups import PointGroup
 from symrefine.ndim.detection import SubspaceDetection
 from symrefine.plane.detection import PlanarDetection
+from symrefine.surface.misses import LIMITS
 
 _NAMED = {
     "C1": "no symmetry",
@@ -120,10 +121,17 @@ def fit(detection: Detection) -> str:
     if not misses or detection.undetermined:
         return ""
     each = "it" if len(misses) == 1 else "each of them"
+    body = body_name(detection.surface.cloud.body)
+    meets = "meets itself" if body == "surface" else "meet their images"
     return (
-        f"Under {each}, 95 % of the surface meets itself within {percent(max(*misses, 1e-4))} of the diagonal; "
-        f"{percent(detection.tolerance)} is allowed."
+        f"Under {each}, 95 % of the {body} {meets} within {percent(max(*misses, 1e-4))} of the diagonal, "
+        f"where the tolerance of {percent(detection.tolerance)} allows {percent(LIMITS[1] * detection.tolerance)}."
     )
+
+
+def body_name(body: str) -> str:
+    """What misses its image: the surface, or points that stand for themselves or for a volume."""
+    return "surface" if body == "surface" else "points"
 
 
 def scanned(detection: Detection) -> str:
@@ -180,6 +188,11 @@ def direction(vector: Array) -> str:
     """A unit vector in brackets, turned so that its first component of some size is positive."""
     turned = toward_positive(vector) * vector
     return "(" + ", ".join(f"{round(float(v), 4) + 0.0:.4f}" for v in turned) + ")"
+
+
+def length(value: float, scale: float) -> str:
+    """A length, to a ten-thousandth of `scale`."""
+    return coordinates([value], scale)[1:-1]
 
 
 def coordinates(values: Iterable[float], scale: float) -> str:

@@ -24,7 +24,7 @@ from symrefine.geometry import Array, Plane
 from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.picture.measures import series, theta_series_deg, turn_series_deg
 from symrefine.picture.palette import AXIS as DARK
-from symrefine.picture.palette import CONTRADICTED, INFERRED, MISS, OBJECT, Colour, plane_colour
+from symrefine.picture.palette import CONTRADICTED, INFERRED, MISS, OBJECT, OUTLIER, Colour, plane_colour
 from symrefine.picture.scene import Line, Quad, Scene, make_scene
 from symrefine.shape import Index, Shape
 from symrefine.viewer.layout import SERIES, blueprint
@@ -39,7 +39,6 @@ TUPLE: Colour = (240, 228, 66)
 AXIS: Colour = (245, 247, 250)
 OPACITY, MISS_OPACITY = 60, 40
 MATCHED: Colour = (110, 120, 138)
-OUTLIER: Colour = (190, 70, 110)
 RAY: Colour = (70, 90, 80)
 # Radius of a point and length of the longest n-tuple, in diagonals.
 POINT, ARROW = 0.0035, 0.42
