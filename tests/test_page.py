@@ -241,6 +241,7 @@ def test_page_is_small_and_asks_for_nothing(any_case: Case, pages: Pages) -> Non
     assert "default-src 'none'" in page
 
 
+@pytest.mark.slow
 def test_large_inputs_make_small_pages() -> None:
     coarse = mug()
     assert coarse.faces is not None
