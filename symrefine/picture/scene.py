@@ -7,14 +7,13 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from symrefine.complete import Verdicts, verdicts
 from symrefine.detection.result import Detection, FoundAxis
 from symrefine.geometry import Array, Mask, Plane, ReadOnly, unit
-from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.picture.atoms import Balls, balls
 from symrefine.picture.palette import AXIS, CONTRADICTED, INFERRED, MISS, OBJECT, Colour, plane_colour
+from symrefine.picture.upright import sign, upright
 from symrefine.picture.words import order_name
 from symrefine.shape import Index, Shape
 
@@ -27,9 +26,6 @@ SAME_LINE_RAD = math.radians(1.0)
 # Radius of the mark that tells the order of an axis, in diagonals.
 MARK = 0.05
 MAX_MARKS = 3
-# So far from the vertical of the input the object may still be meant to stand as it does; sides of its hull that are
-# looked at, the largest.
-UPRIGHT_RAD, SIDES = math.radians(10.0), 400
 # Planes without an axis in common that can be seen at once.
 MOST_SHEETS = 8
 
@@ -85,7 +81,7 @@ class Stage(ReadOnly):
         self, point: Array, direction: Array, name: str, colour: Colour, order: float, *, marked: bool = False
     ) -> Line:
         """The part of an axis (input units) that pierces the shape, and a little more, the upper end last."""
-        u = direction * _sign(float(self.frame[2] @ direction))
+        u = direction * sign(float(self.frame[2] @ direction))
         foot = point - self.center
         foot = foot - (foot @ u) * u
         low, high = self._extent(u, AXIS_MARGIN)
@@ -229,76 +225,7 @@ def make_stage(detection: Detection, shape: Shape, most: int = 20000) -> Stage:
         distance = np.linalg.norm(relative, axis=1)
         relative = relative[distance <= 1.02 * np.quantile(distance, 0.999)]
     diagonal = detection.diagonal or float(np.linalg.norm(np.ptp(relative, axis=0)))
-    return Stage(center=detection.center, points=relative, frame=_upright(detection, relative), diagonal=diagonal)
-
-
-def _upright(detection: Detection, points: Array) -> Array:
-    """Frame with the vertical where a person would put it, as far as the symmetry lets it be.
-
-    The main axis of an axial group stands. Of other objects the third axis of the input does, where the symmetry found
-    agrees that it is the vertical: it lies in the one mirror plane, or along a two-fold axis, within ten degrees. If
-    not, the object was turned, and its largest flat side lies, again within the symmetry. Nothing found says nothing.
-    """
-    name, group = detection.point_group, detection.group
-    x, y, z = group.frame
-    if name in ("C1", "Ci", "Kh", "undetermined"):
-        return np.eye(3)
-    if name == "Cs":
-        normal = detection.planes[0].plane.normal if detection.planes else z
-        return _standing(_in_plane(normal, points), normal)
-    if group.symbol.fold in (0, 2):
-        up = _of_three(group.frame, points)
-        return _standing(up, x if abs(x @ up) < 0.5 else y)
-    return _standing(z, x)
-
-
-def _in_plane(normal: Array, points: Array) -> Array:
-    """Vertical of an object with one mirror: in it lies what stands."""
-    if abs(normal[2]) < math.sin(UPRIGHT_RAD):
-        return unit(np.array([0.0, 0.0, 1.0]) - normal[2] * normal)
-    normals, areas = _sides(points)
-    lying = np.abs(normals @ normal) < math.sin(UPRIGHT_RAD)
-    if not lying.any():  # flat or without a side: its longest extent stands
-        across = points - np.multiply.outer(points @ normal, normal)
-        longest: Array = np.linalg.eigh(across.T @ across)[1][:, -1]
-        return unit(longest - (longest @ normal) * normal)
-    best = normals[lying][int(np.argmax(areas[lying].round(6)))]
-    return unit(best - (best @ normal) * normal)
-
-
-def _of_three(frame: Array, points: Array) -> Array:
-    """The row of a frame that is the vertical of the input, or else the one on whose side the object can lie."""
-    along = np.abs(frame[:, 2])
-    if along.max() > math.cos(UPRIGHT_RAD):
-        return np.asarray(frame[int(along.argmax())])
-    normals, areas = _sides(points)
-    facing = np.abs(normals @ frame.T) > math.cos(UPRIGHT_RAD)
-    covered = (facing * areas[:, None]).sum(axis=0).round(6)
-    return np.asarray(frame[int(np.lexsort((-along, -covered))[0])])
-
-
-def _sides(points: Array) -> tuple[Array, Array]:
-    """Unit normals [K, 3] of the sides of the convex hull, and the share of the hull [K] that faces so, nearly."""
-    try:
-        hull = ConvexHull(points)
-    except (QhullError, ValueError):
-        return np.zeros((0, 3)), np.zeros(0)
-    areas, normals = triangle_areas_and_normals(points, hull.simplices)
-    largest = np.argsort(-areas)[:SIDES]
-    near = np.abs(normals[largest] @ normals.T) > math.cos(0.5 * UPRIGHT_RAD)
-    return normals[largest], near @ areas / areas.sum()
-
-
-def _standing(up: Array, side: Array) -> Array:
-    """Right-handed rows (side, front, up), the vertical pointing to the upper side of the input."""
-    largest = up[2] if abs(up[2]) > 0.05 else up[int(np.argmax(np.abs(up)))]
-    up = up * _sign(float(largest))
-    side = unit(side - (side @ up) * up)
-    return np.stack([side, np.cross(up, side), up])
-
-
-def _sign(value: float) -> float:
-    return -1.0 if value < 0 else 1.0
+    return Stage(center=detection.center, points=relative, frame=upright(detection, relative), diagonal=diagonal)
 
 
 def _lines(detection: Detection, stage: Stage) -> tuple[Line, ...]:

@@ -105,7 +105,7 @@ def _list(d: Detection, elements: Sequence[Element]) -> str:
     rows = [
         Row(
             index=k,
-            name="" if e.kind == "inversion" and e.missed else e.row.name,
+            name=e.row.name,
             colour=e.row.colour,
             kind=_kind(e),
             vector="" if e.kind == "inversion" else direction(e.direction),

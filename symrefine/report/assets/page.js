@@ -175,7 +175,8 @@
     });
     geometry.setAttribute("position", new THREE.BufferAttribute(positions, 3));
     const creased = THREE.toCreasedNormals(geometry, 0.6);
-    return { geometry: creased, corner: (k) => parts.faces[k], length: parts.faces.length, part: (k) => Math.floor(k / 3) };
+    const [length, part] = [parts.faces.length, (k) => Math.floor(k / 3)];
+    return { geometry: creased, corner: (k) => parts.faces[k], length, part };
   }
 
   function coloured(length, colourOf, linear) {
@@ -197,7 +198,8 @@
         void main() {
           vec4 eye = modelViewMatrix * vec4(position, 1.0);
           vec3 facing = normalMatrix * normal;
-          float light = length(facing) > 0.0 ? 0.45 + 0.6 * abs(dot(normalize(facing), normalize(vec3(-0.25, 0.4, 0.88)))) : 0.95;
+          float light = 0.95;
+          if (length(facing) > 0.0) light = 0.45 + 0.6 * abs(dot(normalize(facing), normalize(vec3(-0.25, 0.4, 0.88))));
           shade = tint * light * pale;
           gl_Position = projectionMatrix * eye;
           vec4 ahead = projectionMatrix * (eye + vec4(0.0, 0.0, nearer, 0.0));
@@ -248,7 +250,7 @@
         const a = faces[f + side], b = faces[f + (side + 1) % 3];
         if (height[a] > 0 === height[b] > 0) continue;
         const share = height[a] / (height[a] - height[b]);
-        for (let i = 0; i < 3; i++) ends.push(positions[3 * a + i] + share * (positions[3 * b + i] - positions[3 * a + i]));
+        for (let i = 0; i < 3; i++) ends.push((1 - share) * positions[3 * a + i] + share * positions[3 * b + i]);
       }
     }
     const geometry = new THREE.BufferGeometry();
@@ -280,7 +282,8 @@
     const imageGeometry = geometry.clone();
     const traced = parts.mesh && !parts.owners;
     const lit = (shift) => new THREE.MeshLambertMaterial({
-      vertexColors: true, side: THREE.DoubleSide, polygonOffset: true, polygonOffsetFactor: shift, polygonOffsetUnits: shift,
+      vertexColors: true, side: THREE.DoubleSide,
+      polygonOffset: true, polygonOffsetFactor: shift, polygonOffsetUnits: shift,
     });
     const thing = parts.mesh
       ? new THREE.Mesh(geometry, lit(1))
@@ -346,7 +349,9 @@
           return mesh;
         };
         const solid = rod(0.0042, {});
-        const ghost = rod(0.0042, { transparent: true, opacity: 0.3, depthTest: true, depthFunc: THREE.GreaterDepth, depthWrite: false });
+        const ghost = rod(0.0042, {
+          transparent: true, opacity: 0.3, depthFunc: THREE.GreaterDepth, depthWrite: false,
+        });
         const reach = rod(0.022, { transparent: true, opacity: 0, depthWrite: false, colorWrite: false });
         hits.push(reach);
         paint.strokes.push(solid.material, ghost.material);
@@ -360,8 +365,7 @@
       }
       const label = labels.appendChild(document.createElement("span"));
       label.textContent = element.missed ? "" : element.label;
-      const anchors = element.corners
-        ? element.corners.map((c) => new THREE.Vector3(...c)) : (element.ends || []).map((c) => new THREE.Vector3(...c)).reverse();
+      const anchors = (element.corners ?? element.ends?.toReversed() ?? []).map((c) => new THREE.Vector3(...c));
       return { element, group, hits, sheets, paint, label, anchors, colour };
     }
 
@@ -414,20 +418,25 @@
     /** The camera so far away that everything is in view, and nothing is far from its edge. */
     function fit() {
       const outline = data.object.outline.map((p) => new THREE.Vector3(...p));
-      for (const { element, anchors } of shown) if (element.shown || element.missed) outline.push(...anchors.map((p) => p.clone()));
+      for (const { element, anchors } of shown) {
+        if (element.shown || element.missed) outline.push(...anchors.map((p) => p.clone()));
+      }
       const back = new THREE.Vector3(...data.object.view).normalize();
       const right = new THREE.Vector3().crossVectors(camera.up, back).normalize();
       const above = new THREE.Vector3().crossVectors(back, right);
-      const local = outline.map((p) => p.applyMatrix4(root.matrix)).map((p) => [p.dot(right), p.dot(above), p.dot(back)]);
+      for (const p of outline) p.applyMatrix4(root.matrix);
+      const local = outline.map((p) => [p.dot(right), p.dot(above), p.dot(back)]);
       const tangent = 0.86 * Math.tan(0.5 * camera.fov * Math.PI / 180);
-      const tangents = [tangent * camera.aspect, tangent], middle = [0, 1, 2].map((i) => extent(local.map((p) => p[i])).middle);
+      const [wide, high] = [tangent * camera.aspect, tangent];
+      const middle = [0, 1, 2].map((i) => middleOf(local.map((p) => p[i])));
       let distance = 1;
       for (let round = 0; round < 4; round++) {
         const away = local.map((p) => p.map((v, i) => v - middle[i]));
-        distance = away.reduce((most, p) => Math.max(most, p[2] + Math.abs(p[0]) / tangents[0], p[2] + Math.abs(p[1]) / tangents[1]), 0);
-        for (const i of [0, 1]) middle[i] += distance * extent(away.map((p) => p[i] / (distance - p[2]))).middle;
+        distance = Math.max(...away.map(([x, y, z]) => z + Math.max(Math.abs(x) / wide, Math.abs(y) / high)));
+        for (const i of [0, 1]) middle[i] += distance * middleOf(away.map((p) => p[i] / (distance - p[2])));
       }
-      controls.target.set(0, 0, 0).addScaledVector(right, middle[0]).addScaledVector(above, middle[1]).addScaledVector(back, middle[2]);
+      controls.target.set(0, 0, 0);
+      [right, above, back].forEach((direction, i) => controls.target.addScaledVector(direction, middle[i]));
       camera.position.copy(controls.target).addScaledVector(back, distance);
       camera.near = 0.02 * distance;
       camera.far = 10 * distance;
@@ -437,10 +446,7 @@
       controls.update();
     }
 
-    function extent(values) {
-      const [low, high] = values.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]);
-      return { middle: 0.5 * (low + high) };
-    }
+    const middleOf = (values) => 0.5 * (Math.min(...values) + Math.max(...values));
 
     function resize() {
       const { clientWidth: width, clientHeight: height } = viewer;
@@ -491,8 +497,8 @@
 
     function under(event) {
       const box = canvas.getBoundingClientRect();
-      const at = new THREE.Vector2(2 * (event.clientX - box.left) / box.width - 1, 1 - 2 * (event.clientY - box.top) / box.height);
-      ray.setFromCamera(at, camera);
+      const x = (event.clientX - box.left) / box.width, y = (event.clientY - box.top) / box.height;
+      ray.setFromCamera(new THREE.Vector2(2 * x - 1, 1 - 2 * y), camera);
       const open = shown.map((s, k) => ({ ...s, k })).filter(({ group }) => group.visible);
       const met = open.flatMap(({ hits, k }) => ray.intersectObjects(hits.filter((h) => h.visible), false)
         .map(({ distance, object }) => ({ distance, k, thin: !object.material.side })));
@@ -528,7 +534,8 @@
       const from = camera.position.clone().sub(controls.target);
       if (turns) {
         const right = new THREE.Vector3().crossVectors(camera.up, from).normalize();
-        const polar = from.angleTo(camera.up), step = Math.min(Math.max(0.09 * turns[1], 0.05 - polar), Math.PI - 0.05 - polar);
+        const polar = from.angleTo(camera.up);
+        const step = Math.min(Math.max(0.09 * turns[1], 0.05 - polar), Math.PI - 0.05 - polar);
         from.applyAxisAngle(right, step).applyAxisAngle(camera.up, 0.09 * turns[0]);
       }
       camera.position.copy(controls.target).add(from.multiplyScalar(nearer ?? 1));
