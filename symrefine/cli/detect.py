@@ -259,10 +259,10 @@ def _writers(args: argparse.Namespace, shape: "Shape", detection: "Detection") -
         InputError: one is for objects in space only, and the points have two coordinates, or four and more.
     """
     writers: dict[str, Writer] = {}
-    for option, name in {"--bop": args.bop, "--recording": args.recording, "--report": args.report}.items():
+    for option, name in {"--bop": args.bop, "--recording": args.recording}.items():
         if name is not None and shape.dim != 3:
             where = "lies in the plane" if shape.dim == 2 else f"has {shape.dim} coordinates"
-            raise InputError(f"{option} {name}: is for objects in space; {shape.source} {where}, use --json")
+            raise InputError(f"{option} {name}: is for objects in space; {shape.source} {where}, use --json or --report")
     if args.bop is not None:
         from symrefine.export.bop import bop_entry, bop_text
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from symrefine.geometry import Array, unit
 from symrefine.picture.camera import Camera
+from symrefine.picture.palette import Colour
 from symrefine.picture.raster import Raster
-from symrefine.picture.scene import Colour, Line, Quad, Scene
+from symrefine.picture.scene import Line, Quad, Scene
 from symrefine.picture.surface import Surface
 from symrefine.shape import Index
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from symrefine.detection.result import Detection
-from symrefine.picture.scene import AXIS, MISS, Colour, plane_colour
+from symrefine.picture.palette import AXIS, MISS, Colour, plane_colour
 from symrefine.picture.words import direction, kind_name, order_name
 from symrefine.surface.misses import Deviation
 

@@ -4,28 +4,19 @@ Everything is relative to the centre of the detection, in input units, so that s
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from symrefine.complete import Verdicts, verdicts
 from symrefine.detection.result import Detection, FoundAxis
 from symrefine.geometry import Array, Mask, Plane, ReadOnly, unit
+from symrefine.picture.atoms import Balls, balls
+from symrefine.picture.palette import AXIS, CONTRADICTED, INFERRED, MISS, OBJECT, Colour, plane_colour
+from symrefine.picture.upright import sign, upright
 from symrefine.picture.words import order_name
-from symrefine.shape import Shape
+from symrefine.shape import Index, Shape
 
-Colour = tuple[int, int, int]
-
-# Okabe and Ito's colours, which colour-blind people tell apart too, without those that white swallows.
-PALETTE: tuple[Colour, ...] = (
-    (0, 114, 178), (213, 94, 0), (0, 158, 115), (180, 80, 150), (224, 150, 0), (64, 160, 220),
-)  # fmt: skip
-OBJECT: Colour = (168, 178, 194)
-AXIS: Colour = (38, 42, 52)
-MISS: Colour = (120, 120, 128)
-# What was seen and agrees is grey like any object; no plane has these.
-INFERRED: Colour = (116, 190, 96)
-CONTRADICTED: Colour = (200, 30, 70)
 # Points that tell how space was seen to be free.
 RAYS = 200
 # How far planes and axes stick out of the object, in diagonals.
@@ -37,11 +28,6 @@ MARK = 0.05
 MAX_MARKS = 3
 # Planes without an axis in common that can be seen at once.
 MOST_SHEETS = 8
-
-
-def plane_colour(index: int) -> Colour:
-    """Colour of the plane listed at `index`."""
-    return PALETTE[index % len(PALETTE)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -95,7 +81,7 @@ class Stage(ReadOnly):
         self, point: Array, direction: Array, name: str, colour: Colour, order: float, *, marked: bool = False
     ) -> Line:
         """The part of an axis (input units) that pierces the shape, and a little more, the upper end last."""
-        u = direction * _sign(float(self.frame[2] @ direction))
+        u = direction * sign(float(self.frame[2] @ direction))
         foot = point - self.center
         foot = foot - (foot @ u) * u
         low, high = self._extent(u, AXIS_MARGIN)
@@ -161,7 +147,9 @@ class Scan(ReadOnly):
 class Scene:
     """What there is to draw beside the shape: planes and axes found, and the candidates turned down.
 
-    Of a scan that shows a part of an object, `scan` has what was seen and what is inferred.
+    Of a scan that shows a part of an object, `scan` has what was seen and what is inferred; of points that stand for
+    themselves, `balls` has what is drawn in their stead, relative to the centre. `outliers` are indices of points that
+    are no part of the object.
     """
 
     stage: Stage
@@ -170,6 +158,8 @@ class Scene:
     missed_planes: tuple[Quad, ...]
     missed_axes: tuple[Line, ...]
     scan: Scan | None = None
+    balls: Balls | None = None
+    outliers: Index = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @property
     def main_axes(self) -> tuple[Line, ...]:
@@ -186,7 +176,10 @@ class Scene:
 
 def make_scene(detection: Detection, shape: Shape) -> Scene:
     """The scene of a detection; planes are named 1, 2, ... in their order there, axes by their symbol."""
-    stage = make_stage(detection, shape)
+    stage, solid = make_stage(detection, shape), None
+    if are_atoms(detection, shape):
+        solid = balls(replace(shape, points=shape.points - detection.center))
+        stage = replace(stage, points=solid.points)
     missed_planes, missed_axes = _missed(detection, stage)
     return Scene(
         stage=stage,
@@ -195,7 +188,14 @@ def make_scene(detection: Detection, shape: Shape) -> Scene:
         missed_planes=missed_planes,
         missed_axes=missed_axes,
         scan=_scan(detection, shape) if detection.at_least else None,
+        balls=solid,
+        outliers=detection.outliers,
     )
+
+
+def are_atoms(detection: Detection, shape: Shape) -> bool:
+    """Whether the points of a shape stand for themselves."""
+    return shape.faces is None and detection.surface.cloud.body == "atoms"
 
 
 def _scan(detection: Detection, shape: Shape) -> Scan:
@@ -218,48 +218,14 @@ def _scan(detection: Detection, shape: Shape) -> Scan:
 
 
 def make_stage(detection: Detection, shape: Shape, most: int = 20000) -> Stage:
-    """Where the shape stands: up to `most` of its points, and a frame with the main axis upright."""
-    relative = shape.points[:: max(1, len(shape.points) // most)] - detection.center
+    """Where the shape stands: up to `most` of its points, outliers left out, and a frame with the main axis upright."""
+    own = np.delete(shape.points, detection.outliers, axis=0)
+    relative = own[:: max(1, len(own) // most)] - detection.center
     if shape.faces is None and len(relative) >= 1000:
         distance = np.linalg.norm(relative, axis=1)
         relative = relative[distance <= 1.02 * np.quantile(distance, 0.999)]
     diagonal = detection.diagonal or float(np.linalg.norm(np.ptp(relative, axis=0)))
-    return Stage(center=detection.center, points=relative, frame=_upright(detection, relative), diagonal=diagonal)
-
-
-def _upright(detection: Detection, points: Array) -> Array:
-    """Frame with the vertical on the main axis; without one, near the third axis of the input."""
-    name, group = detection.point_group, detection.group
-    x, y, z = group.frame
-    if name == "Cs":
-        return _standing(_in_plane(detection.planes[0].plane.normal if detection.planes else z, points), z)
-    if name in ("C1", "Ci", "Kh"):
-        return np.eye(3)
-    if group.symbol.fold in (0, 2):
-        up = max((x, y, z), key=lambda row: round(abs(float(row[2])), 6))
-        return _standing(up, x if up is not x else y)
-    return _standing(z, x)
-
-
-def _in_plane(normal: Array, points: Array) -> Array:
-    """Vertical of an object with one mirror: the input's, or where that is no choice the object's longest extent."""
-    if abs(normal[2]) < 0.85:
-        return unit(np.array([0.0, 0.0, 1.0]) - normal[2] * normal)
-    across = points - np.multiply.outer(points @ normal, normal)
-    longest: Array = np.linalg.eigh(across.T @ across)[1][:, -1]
-    return unit(longest - (longest @ normal) * normal)
-
-
-def _standing(up: Array, side: Array) -> Array:
-    """Right-handed rows (side, front, up), the vertical pointing to the upper side of the input."""
-    largest = up[2] if abs(up[2]) > 0.05 else up[int(np.argmax(np.abs(up)))]
-    up = up * _sign(float(largest))
-    side = unit(side - (side @ up) * up)
-    return np.stack([side, np.cross(up, side), up])
-
-
-def _sign(value: float) -> float:
-    return -1.0 if value < 0 else 1.0
+    return Stage(center=detection.center, points=relative, frame=upright(detection, relative), diagonal=diagonal)
 
 
 def _lines(detection: Detection, stage: Stage) -> tuple[Line, ...]:

@@ -7,7 +7,8 @@ from scipy.spatial import cKDTree
 
 from symrefine.geometry import Array, ReadOnly
 from symrefine.moments.quadrature import triangle_areas_and_normals
-from symrefine.picture.scene import OBJECT, Quad, Scene
+from symrefine.picture.palette import OBJECT, OUTLIER
+from symrefine.picture.scene import Quad, Scene
 from symrefine.shape import Index, Shape
 
 # Points of a cloud that are painted, and the fewest whose neighbourhoods say anything about normals.
@@ -42,9 +43,21 @@ class Surface(ReadOnly):
 def make_surface(shape: Shape, scene: Scene) -> Surface:
     """The shape, or a part of the points of a large cloud; those that lie in a plane have its colour.
 
-    Of a scan that shows a part of an object, its points without outliers and what is inferred.
+    Points that stand for themselves are balls. Of a scan that shows a part of an object, its points without outliers
+    and what is inferred.
     """
     stage = scene.stage
+    if scene.balls is not None:
+        solid, scale = scene.balls, 0.06 * stage.diagonal
+        _, normals = triangle_areas_and_normals(solid.points, solid.faces)
+        return Surface(
+            points=solid.points,
+            normals=normals,
+            colours=solid.colours,
+            faces=solid.faces,
+            radius=0.0,
+            depth_scale=scale,
+        )
     if shape.faces is not None:
         corners, scale = shape.points - stage.center, 0.03 * stage.diagonal
         _, normals = triangle_areas_and_normals(corners, shape.faces)
@@ -54,7 +67,10 @@ def make_surface(shape: Shape, scene: Scene) -> Surface:
     step = max(1, -(-len(every) // MOST_POINTS))
     points = every[::step]
     radius = COVER * stage.diagonal * _spacing(points / stage.diagonal)
-    plain = _plain(len(points)) if scene.scan is None else scene.scan.colours[::step]
+    colours = _plain(len(every)) if scene.scan is None else scene.scan.colours.copy()
+    if scene.scan is None:
+        colours[scene.outliers] = np.array(OUTLIER) / 255.0
+    plain = colours[::step]
     known = None if scene.scan is not None else shape.normals
     return Surface(
         points=points,

@@ -6,6 +6,9 @@ from collections.abc import Iterable
 from symrefine.detection.result import Detection
 from symrefine.geometry import Array, positive
 from symrefine.groups import PointGroup
+from symrefine.ndim.detection import SubspaceDetection
+from symrefine.plane.detection import PlanarDetection
+from symrefine.surface.misses import LIMITS
 
 _NAMED = {
     "C1": "no symmetry",
@@ -53,6 +56,38 @@ def headline(detection: Detection) -> str:
     return f"{least}{symbol(detection.point_group)}: {meaning(detection.group)}"
 
 
+def planar_headline(detection: PlanarDetection) -> str:
+    """The same of an object in the plane."""
+    if detection.undetermined:
+        return f"Undetermined: {detection.undetermined}"
+    return f"{detection.point_group}: {planar_meaning(detection)}"
+
+
+def planar_meaning(detection: PlanarDetection) -> str:
+    """What the lines and turns of an object in the plane come to."""
+    if detection.point_group in ("C1", "O(2)", "SO(2)"):
+        return {"C1": "no symmetry", "O(2)": "round"}.get(detection.point_group, "all turns, no mirror line")
+    lines = count(len(detection.lines), "mirror line") if detection.lines else "no mirror line"
+    return lines + ("" if detection.rotation is None else f", {turns_name(detection.rotation.order)}")
+
+
+def turns_name(order: float) -> str:
+    """What the turns of an object in the plane are called."""
+    return "all turns" if math.isinf(order) else f"turns of order {round(order)}"
+
+
+def subspace_headline(detection: SubspaceDetection) -> str:
+    """How many hyperplanes of symmetry there are, and the order of the group they generate."""
+    if detection.undetermined:
+        return f"Undetermined: {detection.undetermined}"
+    number, dim = len(detection.hyperplanes), len(detection.center)
+    if not number:
+        return f"None: no hyperplane of symmetry in {dim} dimensions"
+    order = detection.reflection_group_order
+    group = "" if order is None else f"; their reflections generate a group of order {order:,}"
+    return f"{number}: {'hyperplane' if number == 1 else 'hyperplanes'} of symmetry in {dim} dimensions{group}"
+
+
 def symbol(name: str) -> str:
     """Schoenflies symbol with its infinity: Cinfv becomes C∞v."""
     return name.replace("inf", "∞")
@@ -86,10 +121,17 @@ def fit(detection: Detection) -> str:
     if not misses or detection.undetermined:
         return ""
     each = "it" if len(misses) == 1 else "each of them"
+    body = body_name(detection.surface.cloud.body)
+    meets = "meets itself" if body == "surface" else "meet their images"
     return (
-        f"Under {each}, 95 % of the surface meets itself within {percent(max(*misses, 1e-4))} of the diagonal; "
-        f"{percent(detection.tolerance)} is allowed."
+        f"Under {each}, 95 % of the {body} {meets} within {percent(max(*misses, 1e-4))} of the diagonal, "
+        f"where the tolerance of {percent(detection.tolerance)} allows {percent(LIMITS[1] * detection.tolerance)}."
     )
+
+
+def body_name(body: str) -> str:
+    """What misses its image: the surface, or points that stand for themselves or for a volume."""
+    return "surface" if body == "surface" else "points"
 
 
 def scanned(detection: Detection) -> str:
@@ -145,6 +187,11 @@ def order_name(order: float, improper: bool = False) -> str:
 def direction(vector: Array) -> str:
     """A unit vector in brackets, turned so that its first component of some size is positive."""
     return "(" + ", ".join(f"{round(float(v), 4) + 0.0:.4f}" for v in positive(vector)) + ")"
+
+
+def length(value: float, scale: float) -> str:
+    """A length, to a ten-thousandth of `scale`."""
+    return coordinates([value], scale)[1:-1]
 
 
 def coordinates(values: Iterable[float], scale: float) -> str:

@@ -2,17 +2,16 @@
 
 from pathlib import Path
 
-from symrefine.detection.result import Detection
 from symrefine.files import whole
-from symrefine.picture.draw import picture_png
+from symrefine.picture.draw import Found, picture_png
 from symrefine.report.page import html_page
 from symrefine.shape import Shape
 
 __all__ = ["draw", "write_html"]
 
 
-def draw(detection: Detection, shape: Shape, path: Path | str) -> None:
-    """Write a PNG of the shape with the planes and axes that were found.
+def draw(detection: Found, shape: Shape, path: Path | str) -> None:
+    """Write a PNG of the shape with what was found: planes and axes in space, lines in the plane, hyperplanes beyond.
 
     Raises:
         InputError: the file cannot be written.
@@ -21,12 +20,11 @@ def draw(detection: Detection, shape: Shape, path: Path | str) -> None:
         draft.write_bytes(picture_png(detection, shape))
 
 
-def write_html(detection: Detection, shape: Shape, path: Path | str) -> None:
-    """Write one HTML page, pictures included, that tells what was found and how well it holds.
+def write_html(detection: Found, shape: Shape, path: Path | str) -> None:
+    """Write one HTML page that needs nothing else: a model to turn, what was found, and how well it holds.
 
     Raises:
         InputError: the file cannot be written.
     """
     with whole(Path(path)) as draft:
-        page = html_page(detection, shape, picture_png(detection, shape, title=False))
-        draft.write_text(page, encoding="utf-8", newline="")
+        draft.write_text(html_page(detection, shape), encoding="utf-8", newline="")

@@ -1,4 +1,4 @@
-"""Charts as inline SVG: small, sharp, and readable without a script."""
+"""Charts as inline SVG and HTML: small, sharp, and readable without a script, on white and on black."""
 
 import math
 from collections.abc import Sequence
@@ -6,16 +6,16 @@ from html import escape
 
 import numpy as np
 
-INK, PALE, GRID = "#2b3240", "#6b7484", "#e3e7ee"
 WIDTH, HEIGHT = 400, 210
 LEFT, RIGHT, TOP, BOTTOM = 62, 22, 16, 40
 
 
-def line_chart(title: str, values: Sequence[float], *, first: int, unit: str, colour: str, log: bool = False) -> str:
+def line_chart(title: str, values: Sequence[float], *, first: int, unit: str, name: str, log: bool = False) -> str:
     """A quantity over the iterations `first`, `first + 1`, ...; every point carries its value.
 
     Args:
         title: what the chart tells someone who cannot see it.
+        name: of its colour in the style sheet.
         log: whether the scale is logarithmic; values that are not above zero are then left out.
     """
     kept = [(first + k, v) for k, v in enumerate(values) if math.isfinite(v) and (v > 0 or not log)]
@@ -33,15 +33,13 @@ def line_chart(title: str, values: Sequence[float], *, first: int, unit: str, co
     points = [place(k, v) for k, v in kept]
     parts = [_gridline(place(first, t)[1], _short(t)) for t in ticks]
     named = range(first, first + len(values), math.ceil(len(values) / 10))
-    parts += [_text(place(k, kept[0][1])[0], HEIGHT - BOTTOM + 18, str(k), "middle", PALE) for k in named]
-    parts.append(_text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 6, "iteration", "middle", PALE))
+    parts += [_text(place(k, kept[0][1])[0], HEIGHT - BOTTOM + 18, str(k), "middle") for k in named]
+    parts.append(_text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 6, "iteration", "middle"))
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-    parts.append(
-        f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="2.2" stroke-linejoin="round"/>'
-    )
+    parts.append(f'<polyline class="{name}" points="{path}" fill="none" stroke-width="2.2" stroke-linejoin="round"/>')
     for (x, y), (k, v) in zip(points, kept, strict=True):
         hint = f"<title>iteration {k}: {_short(v)}{unit}</title>"
-        parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.2" fill="{colour}">{hint}</circle>')
+        parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.2" class="{name}">{hint}</circle>')
     return _svg(title, WIDTH, HEIGHT, parts)
 
 
@@ -49,26 +47,72 @@ def bar_chart(title: str, rows: Sequence[tuple[str, float, str, bool]], threshol
     """Horizontal bars on a logarithmic scale: (name, value, remark, strong); a line marks the threshold."""
     positive = [v for _, v, _, _ in rows if 0 < v < math.inf] + [threshold]
     low, high = math.floor(math.log10(min(positive)) - 0.2), math.ceil(math.log10(max(positive)) + 0.1)
-    left, right, width = 32, 190, 640
 
     def place(value: float) -> float:
         level = math.log10(min(max(value, 10.0**low), 10.0**high))
-        return left + (level - low) / (high - low) * (width - left - right)
+        return 100.0 * (level - low) / (high - low)
 
-    height = 34 * len(rows) + 34
-    parts = []
-    for k, (name, value, remark, strong) in enumerate(rows):
-        y = 34 * k + 8
-        fill = "#0072b2" if strong else "#b9c2d0"
-        parts.append(_text(left - 10, y + 16, name, "end", INK))
-        parts.append(
-            f'<rect x="{left}" y="{y}" width="{max(place(value) - left, 2):.1f}" height="22" rx="3" fill="{fill}"/>'
-        )
-        parts.append(_text(max(place(value), place(threshold)) + 10, y + 16, remark, "start", INK))
-    x = place(threshold)
-    parts.append(f'<line x1="{x:.1f}" y1="2" x2="{x:.1f}" y2="{height - 26}" stroke="{INK}" stroke-dasharray="4 3"/>')
-    parts.append(_text(x, height - 8, threshold_name, "middle", PALE))
-    return _svg(title, width, height, parts)
+    mark = f'<u style="left:{place(threshold):.1f}%"></u>'
+    lines = "".join(
+        f'<li><b>{escape(name)}</b><span class="track">{mark}<i{"" if strong else " class=weak"} '
+        f'style="width:{max(place(value), 0.5):.1f}%"></i></span><span>{escape(remark)}</span></li>'
+        for name, value, remark, strong in rows
+    )
+    key = f'<p class="quiet"><u></u>{escape(threshold_name)}</p>'
+    return f'<ul class="bars" aria-label="{escape(title, quote=True)}">{lines}</ul>{key}'
+
+
+def decision_chart(
+    answer: str, groups: Sequence[tuple[str, float, float]], steps: Sequence[tuple[float, str]], tolerance: float
+) -> str:
+    """A row for each group: how likely it is, what it would forgive, and at which tolerances it is the answer.
+
+    Args:
+        answer: name of the group that is the answer.
+        groups: name, probability, and what has to be forgiven; those of `steps` that are not among them are less
+            likely than is worth telling.
+        steps: tolerances in ascending order, each with the group that is the answer there.
+        tolerance: the one that was asked for.
+    """
+    known = [name for name, _, _ in groups]
+    only = [(name, math.nan, 0.0) for name in dict.fromkeys(name for _, name in steps) if name not in known]
+    rows = [*groups, *only]
+    reached = {name: min(t for t, at in steps if at == name) for _, name in steps}
+    rows = sorted(rows, key=lambda row: (reached.get(row[0], math.inf), row[2])) if steps else rows
+    forgives = ["forgives"] if any(forgiven for _, _, forgiven in groups) else []
+    heads = ["group", "probability", *forgives, *(f"{100 * t:g} %" for t, _ in steps)]
+    first = len(heads) - len(steps)
+    head = "".join(
+        f'<th scope="col"{_asked(k - first, steps, tolerance)}>{escape(h)}</th>' for k, h in enumerate(heads)
+    )
+    body = "".join(_decided(row, steps, tolerance, bool(forgives), row[0] == answer) for row in rows)
+    return (
+        '<div class="wide" tabindex="0" role="region" aria-label="Groups by probability and tolerance">'
+        f'<table class="decision"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+    )
+
+
+def _decided(
+    row: tuple[str, float, float], steps: Sequence[tuple[float, str]], tolerance: float, forgives: bool, answer: bool
+) -> str:
+    name, probability, forgiven = row
+    needs = f"<td>{100 * forgiven:.2g} %</td>" if forgiven else "<td></td>" if forgives else ""
+    share = f'<span class="bar"><i style="width:{100 * probability:.1f}%"></i></span> {100 * probability:.0f} %'
+    if math.isnan(probability):
+        share = ""
+    cells = "".join(
+        f'<td class="{"step" if at == name else "off"}{" asked" if t == tolerance else ""}">'
+        f"{'<i></i><span class=unseen>the answer</span>' if at == name else ''}</td>"
+        for t, at in steps
+    )
+    strong = ' class="answer"' if answer else ""
+    title = "undetermined" if name == "undetermined" else name.replace("inf", "∞")
+    return f'<tr{strong}><th scope="row">{escape(title)}</th><td>{share}</td>{needs}{cells}</tr>'
+
+
+def _asked(column: int, steps: Sequence[tuple[float, str]], tolerance: float) -> str:
+    """The mark of the column of the tolerance that was asked for."""
+    return ' class="asked"' if column >= 0 and steps[column][0] == tolerance else ""
 
 
 def _svg(title: str, width: int, height: int, parts: Sequence[str]) -> str:
@@ -79,13 +123,13 @@ def _svg(title: str, width: int, height: int, parts: Sequence[str]) -> str:
     )
 
 
-def _text(x: float, y: float, text: str, anchor: str, colour: str) -> str:
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}">{escape(text)}</text>'
+def _text(x: float, y: float, text: str, anchor: str) -> str:
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{escape(text)}</text>'
 
 
 def _gridline(y: float, name: str) -> str:
-    line = f'<line x1="{LEFT}" y1="{y:.1f}" x2="{WIDTH - RIGHT}" y2="{y:.1f}" stroke="{GRID}"/>'
-    return line + _text(LEFT - 8, y + 4, name, "end", PALE)
+    line = f'<line x1="{LEFT}" y1="{y:.1f}" x2="{WIDTH - RIGHT}" y2="{y:.1f}" class="grid"/>'
+    return line + _text(LEFT - 8, y + 4, name, "end")
 
 
 def _ticks(high: float) -> list[float]:

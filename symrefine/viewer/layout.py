@@ -7,7 +7,8 @@ import rerun.blueprint as rrb
 
 from symrefine.detection.result import Detection
 from symrefine.picture.camera import look_at
-from symrefine.picture.scene import Colour, Scene
+from symrefine.picture.palette import Colour
+from symrefine.picture.scene import Scene
 
 # The timeline that is scrubbed.
 STORY = "story"

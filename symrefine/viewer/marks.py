@@ -6,8 +6,9 @@ import numpy as np
 import rerun as rr
 
 from symrefine.geometry import Array
-from symrefine.picture.scene import AXIS as DARK
-from symrefine.picture.scene import Colour, Line, Quad
+from symrefine.picture.palette import AXIS as DARK
+from symrefine.picture.palette import Colour
+from symrefine.picture.scene import Line, Quad
 
 # Colours for a dark background.
 AXIS: Colour = (245, 247, 250)

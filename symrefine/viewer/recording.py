@@ -22,14 +22,14 @@ from symrefine.errors import InputError, SymrefineError
 from symrefine.files import whole
 from symrefine.geometry import Array
 from symrefine.moments.quadrature import triangle_areas_and_normals
-from symrefine.picture.scene import CONTRADICTED, INFERRED, OBJECT, Colour, Scene, make_scene
+from symrefine.picture.palette import CONTRADICTED, INFERRED, OBJECT, OUTLIER, Colour
+from symrefine.picture.scene import Scene, make_scene
 from symrefine.shape import Index, Shape
 from symrefine.viewer.layout import blueprint
 from symrefine.viewer.marks import AXIS, bright, pixels
 from symrefine.viewer.story import POINT, log_story
 from symrefine.viewer.text import markdown
 
-OUTLIER: Colour = (190, 70, 110)
 RAY: Colour = (70, 90, 80)
 
 

@@ -14,7 +14,8 @@ from symrefine.detection.result import Detection
 from symrefine.fit.refine import Iterate
 from symrefine.geometry import Plane
 from symrefine.picture.measures import series, theta_series_deg, turn_series_deg
-from symrefine.picture.scene import MISS, OBJECT, Colour, Quad, Scene, plane_colour
+from symrefine.picture.palette import MISS, OBJECT, Colour, plane_colour
+from symrefine.picture.scene import Quad, Scene
 from symrefine.picture.words import TUPLES, count
 from symrefine.shape import Shape
 from symrefine.viewer.layout import SERIES, STORY

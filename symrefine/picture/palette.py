@@ -1,0 +1,20 @@
+"""The colours of all pictures."""
+
+Colour = tuple[int, int, int]
+
+# Okabe and Ito's colours, which colour-blind people tell apart too, without those that white swallows.
+PALETTE: tuple[Colour, ...] = (
+    (0, 114, 178), (213, 94, 0), (0, 158, 115), (180, 80, 150), (224, 150, 0), (64, 160, 220),
+)  # fmt: skip
+OBJECT: Colour = (168, 178, 194)
+AXIS: Colour = (38, 42, 52)
+MISS: Colour = (120, 120, 128)
+# What was seen and agrees is grey like any object; no plane has these.
+INFERRED: Colour = (116, 190, 96)
+CONTRADICTED: Colour = (200, 30, 70)
+OUTLIER: Colour = (190, 70, 110)
+
+
+def plane_colour(index: int) -> Colour:
+    """Colour of the plane listed at `index`."""
+    return PALETTE[index % len(PALETTE)]

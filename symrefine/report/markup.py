@@ -1,0 +1,109 @@
+"""HTML from plain text and numbers: escaped, and with nothing in it that acts on a reader's screen."""
+
+import json
+import unicodedata
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+# What shows nothing of its own but acts on text: control and format characters (those that turn the direction of
+# writing among them), halves of pairs, private ones, separators of lines and paragraphs.
+_ACTING = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
+# Digits that are kept, as in the JSON report: what lies beyond differs between processors.
+_DIGITS = 12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Page:
+    """What fills the template.
+
+    Attributes:
+        title: of the window, as HTML.
+        sections: from top to bottom, as HTML; empty ones are left out.
+        data: what the script draws from.
+        turns: whether there is a model to turn.
+    """
+
+    title: str
+    sections: tuple[str, ...]
+    data: Mapping[str, Any] = field(default_factory=dict)
+    turns: bool = False
+
+
+def plain(text: str) -> str:
+    """Text with every character that acts instead of showing written as its number, and escaped for HTML."""
+    return escape("".join(_written(c) if unicodedata.category(c) in _ACTING else c for c in text))
+
+
+def _written(character: str) -> str:
+    code = ord(character)
+    return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+
+
+def island(data: Mapping[str, Any]) -> str:
+    """JSON that can stand in a script element, whatever texts it holds: no `<`, no `&`, ASCII alone."""
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def rounded(values: ArrayLike, scale: float = 1.0) -> Any:
+    """Numbers as nested lists, to twelve digits, 0 where they are nothing beside `scale`."""
+    array = np.asarray(values, dtype=np.float64)
+    kept = np.where(np.abs(array) <= 10.0**-_DIGITS * scale, 0.0, array)
+    return np.vectorize(lambda v: float(f"{v:.{_DIGITS}g}"), otypes=[float])(kept).tolist()
+
+
+def prose(text: str) -> str:
+    """Plain text in which no line ends between a number and its percent sign."""
+    return plain(text).replace(" %", "\N{NO-BREAK SPACE}%")
+
+
+def sentence(text: str) -> str:
+    """A message as a sentence."""
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
+
+
+def section(title: str, told: str, body: str) -> str:
+    """A headline, a paragraph of plain text, and HTML."""
+    return f"<section><h2>{plain(title)}</h2><p>{prose(told)}</p>{body}</section>"
+
+
+def table(heads: Iterable[str], rows: Sequence[Sequence[str]], *, caption: str) -> str:
+    """A table in a box of its own that scrolls; heads are plain text, cells are HTML."""
+    head = "".join(f'<th scope="col">{plain(h)}</th>' for h in heads)
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
+    named = f'<caption class="unseen">{plain(caption)}</caption>'
+    inner = f"<table>{named}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    return f'<div class="wide" tabindex="0" role="region" aria-label="{plain(caption)}">{inner}</div>'
+
+
+def facts(pairs: Iterable[tuple[str, str]]) -> str:
+    """Names with values, side by side."""
+    items = "".join(f"<div><dt>{plain(name)}</dt><dd>{plain(value)}</dd></div>" for name, value in pairs)
+    return f"<dl>{items}</dl>"
+
+
+def head(source: str, title: str, beside: str, summary: str) -> str:
+    """What the page is about, the answer in large letters, what it means, and one sentence."""
+    return (
+        f'<header><p class="over">Symmetry of {plain(source)}</p>'
+        f"<h1>{plain(title)} <span>{plain(beside)}</span></h1>"
+        f'<p class="lead">{prose(summary)}</p></header>'
+    )
+
+
+def copy_button(index: int, name: str) -> str:
+    """A button that copies the matrix of an element; hidden until the script that does it runs."""
+    label = plain(f"Copy the matrix of {name} as JSON")
+    return (
+        f'<button type="button" class="copy needs-script" hidden data-copy="{index}" aria-label="{label}">copy</button>'
+    )
+
+
+def code(text: str) -> str:
+    """Plain text as code."""
+    return f"<code>{plain(text)}</code>"

@@ -1,0 +1,240 @@
+"""The page of an object in space."""
+
+import base64
+import math
+import shlex
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from itertools import groupby
+
+from symrefine.detection.result import Detection
+from symrefine.ntuples.rank import SIGNIFICANT
+from symrefine.picture.draw import picture_png
+from symrefine.picture.measures import rms_series, series, turn_series_deg
+from symrefine.picture.scene import make_scene
+from symrefine.picture.words import (
+    TUPLES,
+    body_name,
+    coordinates,
+    count,
+    direction,
+    fit,
+    headline,
+    meaning,
+    percent,
+    scanned,
+    symbol,
+    verdicts_told,
+)
+from symrefine.report.charts import bar_chart, decision_chart, line_chart
+from symrefine.report.elements import Element, drawn, space_elements
+from symrefine.report.listing import Group, Heads, Row, listing, stage
+from symrefine.report.markup import Page, facts, head, plain, section, sentence
+from symrefine.report.model import DEEPEST, model
+from symrefine.shape import Shape
+from symrefine.surface.misses import LIMITS
+
+
+def page(detection: Detection, shape: Shape) -> Page:
+    """What the page says of an object in space, and the model that turns."""
+    scene = make_scene(detection, shape)
+    elements = space_elements(detection, scene)
+    made = model(detection, shape, scene, elements)
+    picture = picture_png(detection, shape, title=False)
+    return Page(
+        title=f"{plain(symbol(detection.point_group))} · {plain(shape.source)}",
+        sections=(
+            _head(detection, shape),
+            stage(_fallback(detection, picture), _hint(detection, elements, made.told), _list(detection, elements)),
+            _facts(detection, shape),
+            _decision(detection),
+            _convergence(detection),
+            _tuples(detection),
+            reproduce(shape, detection.tolerance),
+        ),
+        data={"kind": "space", "object": made.data, "elements": drawn(elements, detection, scene)},
+        turns=True,
+    )
+
+
+def _head(d: Detection, shape: Shape) -> str:
+    title, below = symbol(d.point_group), meaning(d.group)
+    summary = fit(d) or f"Nothing holds at a tolerance of {percent(d.tolerance)} of the diagonal."
+    if d.undetermined:
+        title, below, summary = "Undetermined", "", sentence(d.undetermined)
+    elif d.at_least:
+        title = f"At least {title}"
+    return head(shape.source, title, below, summary)
+
+
+def _fallback(d: Detection, picture: bytes) -> str:
+    """The picture, for where no model can turn."""
+    data = base64.b64encode(picture).decode("ascii")
+    alt = plain(f"The shape with what was found. {headline(d)}")
+    return f'<img class="still" width="1200" height="900" src="data:image/png;base64,{data}" alt="{alt}">'
+
+
+def _hint(d: Detection, elements: Sequence[Element], left_out: str) -> str:
+    deepest = percent(DEEPEST * d.tolerance)
+    told = (
+        "Choose a plane or an axis, here or in the list, to see where it takes the object, coloured by how far that "
+        f"image misses it: from grey, not at all, to red, {deepest} of the diagonal and more."
+    )
+    strays = "Dark pink: outliers, no part of it." if len(d.outliers) and not d.at_least else ""
+    return " ".join(said for said in (told if elements else "", verdicts_told(d), strays, left_out) if said)
+
+
+def _facts(d: Detection, shape: Shape) -> str:
+    kind = f"{len(shape.points):,} points"
+    if shape.faces is not None:
+        kind = f"{len(shape.faces):,} triangles, {shape.measure}"
+    pairs = [
+        ("Input", kind),
+        ("Centre", coordinates(d.center, d.diagonal)),
+        ("Diagonal", f"{d.diagonal:.5g}"),
+        ("Tolerance", percent(d.tolerance)),
+        ("Confidence", "none" if d.undetermined else f"{d.confidence:.2f}"),
+    ]
+    if said := scanned(d):
+        pairs.append(("Scan", said))
+    return facts(pairs)
+
+
+def _list(d: Detection, elements: Sequence[Element]) -> str:
+    """What was found by kind, then the near misses."""
+    rows = [
+        Row(
+            index=k,
+            name=e.row.name,
+            colour=e.row.colour,
+            kind=_kind(e),
+            vector="" if e.kind == "inversion" else direction(e.direction),
+            place=_place(e),
+            misses=e.row.residual,
+            share=e.row.residual.p95 / (LIMITS[1] * d.tolerance),
+            score=e.row.score,
+            copies=e.matrix(d.diagonal) is not None,
+        )
+        for k, e in enumerate(elements)
+    ]
+    groups = [
+        Group(title=title([elements[k] for k in chosen]), rows=[rows[k] for k in chosen], missed=False)
+        for kinds, title in _TITLES.items()
+        if (chosen := [k for k, e in enumerate(elements) if e.kind in kinds and not e.missed])
+    ]
+    near = [row for e, row in zip(elements, rows, strict=True) if e.missed]
+    if near:
+        groups.append(Group(title=count(len(near), "near miss", "near misses"), rows=near, missed=True))
+    nothing = "Nothing is decided, so nothing is listed." if d.undetermined else "No candidate came close."
+    heads = Heads(vector="normal or direction", body=body_name(d.surface.cloud.body), matrix="4 × 4")
+    return listing(groups, heads, nothing)
+
+
+def _kind(element: Element) -> str:
+    """What a row says of its kind where its group does not."""
+    return "" if element.kind in ("plane", "axis") and not element.missed else element.row.kind
+
+
+def _place(element: Element) -> str:
+    return "about the centre" if element.kind == "inversion" else element.place
+
+
+def _axes_title(elements: Sequence[Element]) -> str:
+    """`Three axes of order 2`, `13 axes: 3 of order 4, 4 of order 3, 6 of order 2`."""
+    by_order = [(_order_text(order), len(list(same))) for order, same in groupby(elements, key=lambda e: e.order)]
+    axes = count(len(elements), "axis", "axes")
+    if len(by_order) == 1:
+        return f"{axes} {by_order[0][0]}"
+    return f"{axes}: {', '.join(f'{number} {order}' for order, number in by_order)}"
+
+
+def _order_text(order: float) -> str:
+    """What an axis of an order is, after the word."""
+    return "of revolution" if math.isinf(order) else f"of order {round(order)}"
+
+
+def _others_title(elements: Sequence[Element]) -> str:
+    turned = sum(e.kind == "improper" for e in elements)
+    told = [count(turned, "rotoreflection axis", "rotoreflection axes")] if turned else []
+    return " and ".join([*told, *(["the inversion"] if len(elements) > turned else [])])
+
+
+# The lines of the list, each with the kinds of elements it opens to.
+_TITLES: dict[tuple[str, ...], Callable[[Sequence[Element]], str]] = {
+    ("plane",): lambda elements: count(len(elements), "mirror plane"),
+    ("axis",): _axes_title,
+    ("improper", "inversion"): _others_title,
+}
+
+
+def _decision(d: Detection) -> str:
+    if not d.alternatives and not d.staircase:
+        return ""
+    told = "How likely each group is to be what the object was meant to have"
+    if any(a.forgiven for a in d.alternatives):
+        told += ", the miss of its worst element that would have to be forgiven"
+    if d.staircase:
+        told += ", and the tolerances (in % of the diagonal) at which it is the answer: an exact symmetry stands at all"
+    steps = [(s.tolerance, "undetermined" if s.undetermined else s.point_group) for s in d.staircase]
+    own = [] if d.undetermined else [(d.point_group, d.confidence, 0.0)]
+    others = [(a.point_group, a.probability, a.forgiven) for a in d.alternatives]
+    chart = decision_chart(d.point_group, [*own, *others], steps, d.tolerance)
+    return section("What it may be" if d.undetermined else "What else it may be", f"{told}.", chart)
+
+
+def _convergence(d: Detection) -> str:
+    if len(d.history) < 2:
+        return ""
+    turns, misses = turn_series_deg(d.history), rms_series(d.history, 100 * d.scale / d.diagonal)
+    told = (
+        f"All elements were refined together, in {count(d.iterations, 'iteration')}: one frame turns and shifts until "
+        "the points agree with their images."
+    )
+    if 1 < len(turns) < d.iterations:
+        told += f" The last {len(turns)} are shown; the others refined its parts."
+    if len(turns) == 1:
+        last = "It" if d.iterations == 1 else "The last of them"
+        angle = f"{turns[0]:.2g}" if turns[0] >= 1e-4 else "less than 0.0001"
+        told += f" {last} turned the frame by {angle} degrees."
+        return section("How the refinement converged", told, "")
+    charts = (
+        _chart("Turn of the frame [degrees]", turns, "°", "turn", log=True),
+        _chart("RMS residual [% of the diagonal]", misses, " %", "miss"),
+        _chart("Pairs in agreement", series(d.history, "inliers"), "", "pairs"),
+    )
+    return section("How the refinement converged", told, f'<div class="charts">{"".join(charts)}</div>')
+
+
+def _chart(title: str, values: Sequence[float], unit: str, name: str, *, log: bool = False) -> str:
+    chart = line_chart(title, values, first=1, unit=unit, name=name, log=log)
+    return f"<figure><figcaption>{plain(title)}</figcaption>{chart}</figure>"
+
+
+def _tuples(d: Detection) -> str:
+    rows = [
+        (f"σ{'₁₂₃'[k]}", float(s), f"size {v:.2g}, {s:.1f} times its noise", s > SIGNIFICANT)
+        for k, (s, v) in enumerate(zip(d.tuples.significance, d.tuples.singular_values, strict=True))
+    ]
+    told = (
+        f"{len(d.vectors.vectors)} vectors made of moments (n-tuples) turn with the shape, so a symmetry leaves all of "
+        f"them in place. Here they {TUPLES[d.tuples.kind]}. The bars are their singular values over the noise "
+        "that sampling leaves."
+    )
+    chart = bar_chart("Singular values of the n-tuples over their noise", rows, SIGNIFICANT, "significant from here")
+    return section("What the moments said first", told, chart)
+
+
+def reproduce(shape: Shape, tolerance: float | None, call: str = "symrefine.detect") -> str:
+    """The command, and the call in Python, that give this result again."""
+    command = f"symrefine detect {shlex.quote(shape.source)}"
+    if tolerance is not None:
+        command += f" --tolerance {tolerance:g}"
+    if shape.measure == "solid":
+        command += " --measure solid"
+    python = f"{call}(shape)" if tolerance is None else f"{call}(shape, tolerance={tolerance:g})"
+    lines = [python] if shape.source == "array" else [command, f"# or in Python: {python}"]
+    told = (
+        f"symrefine {version('symrefine')}. The result is a function of the input, the tolerance and the seed of the "
+        "samples (--seed, 0 unless given) alone."
+    )
+    return section("Reproduce", told, "<pre>" + "\n".join(plain(line) for line in lines) + "</pre>")
