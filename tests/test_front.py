@@ -247,6 +247,9 @@ def test_an_answer_saves_itself_by_its_suffix(found, tmp_path):
     with pytest.raises(InputError, match=r"cannot be written as \.rrd"):
         found["detection_nd"].save(tmp_path / "box.rrd")
     assert sorted(p.suffix for p in tmp_path.iterdir()) == sorted(beginnings)
+    for case in ("detection2d", "detection_nd"):
+        found[case].save(tmp_path / f"{case}.html")
+        assert b'src="data:image/png' in found[case]._repr_html_().encode()
 
 
 def test_a_figure_and_a_card(found):

@@ -324,13 +324,13 @@ def test_detect_prints_round_and_undetermined(tmp_path: Path, capsys: pytest.Cap
     assert "undetermined: " in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("option", ["--bop", "--recording", "--report"])
+@pytest.mark.parametrize("option", ["--bop", "--recording"])
 def test_detect_refuses_what_is_for_space(arrow: Path, option: str, capsys: pytest.CaptureFixture[str]) -> None:
-    target = arrow.with_name({"--bop": "b.json", "--recording": "b.rrd", "--report": "b.html"}[option])
+    target = arrow.with_name({"--bop": "b.json", "--recording": "b.rrd"}[option])
     assert invoke(["detect", str(arrow), option, str(target)]) == 2
     told = capsys.readouterr()
     assert told.err.count("\n") == 1
-    assert f"{option} {target}: is for objects in space; {arrow} lies in the plane, use --json" in told.err
+    assert f"{option} {target}: is for objects in space; {arrow} lies in the plane; use --report" in told.err
     assert not target.exists()
 
 

@@ -140,7 +140,7 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert record["incomplete"] is None
     assert off_deg(np.array(record["hyperplanes"][0]["normal"]), turn[:, 0]) < 1e-2
     assert invoke(["detect", str(path), "--bop", str(tmp_path / "b.json")]) == 2
-    assert f"is for objects in space; {path} has 4 coordinates, use --json" in capsys.readouterr().err
+    assert f"is for objects in space; {path} has 4 coordinates; use --report" in capsys.readouterr().err
     np.save(path, rng.normal(size=(40, 9)))
     assert invoke(["detect", str(path)]) == 2
     assert "9 coordinates; detect_nd takes points of 2 to 8 coordinates" in capsys.readouterr().err

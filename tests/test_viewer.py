@@ -1,7 +1,10 @@
 """Recordings: what they hold, that equal input gives equal content, and what opening refuses."""
 
+import socket
 import subprocess
 import sys
+import time
+import urllib.request
 from pathlib import Path
 from typing import Any
 
@@ -111,13 +114,27 @@ def test_misses_cool_down(tilted: Case) -> None:
     assert heat[-1] <= heat[0]
 
 
+def answers(address: str) -> bool:
+    host, _, port = address.removeprefix("http://").partition("?")[0].partition(":")
+    with socket.socket() as link:
+        return link.connect_ex((host, int(port))) == 0
+
+
 def test_a_recording_is_served_until_it_is_interrupted(tilted: Case) -> None:
+    served: list[str] = []
+
     def interrupt(address: str) -> None:
-        assert address.startswith("http://127.0.0.1:")
+        served.append(address)
+        with urllib.request.urlopen(address.partition("?")[0], timeout=20) as page:
+            assert page.status == 200
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         serve_recording(tilted[2], interrupt)
+    assert served[0].startswith("http://127.0.0.1:")
+    deadline = time.monotonic() + 20.0
+    while answers(served[0]):
+        assert time.monotonic() < deadline, "the server outlives the command"
     with pytest.raises(InputError, match="no such file"):
         serve_recording(tilted[2].parent / "none.rrd", interrupt)
 

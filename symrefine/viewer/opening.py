@@ -1,10 +1,13 @@
 """Opening recordings in the viewer."""
 
+import os
 import re
+import signal
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from symrefine.errors import InputError, SymrefineError
@@ -55,7 +58,13 @@ def serve_recording(path: Path | str, tell: Callable[[str], None]) -> None:
     command = [*_rerun(), "--serve-web", "--bind", "127.0.0.1", *ports, str(path)]
     said: list[str] = []
     with subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+        start_new_session=True,
     ) as server:
         assert server.stdout is not None
         try:
@@ -64,8 +73,17 @@ def serve_recording(path: Path | str, tell: Callable[[str], None]) -> None:
                 if address := re.search(r"connect at (http://\S+)", said[-1]):
                     tell(address[1])
         finally:
-            server.terminate()
+            _end(server)
     raise SymrefineError(f"the server ended: {_reason(''.join(said))}")
+
+
+def _end(server: "subprocess.Popen[str]") -> None:
+    """End a server with the process that it started, which would outlive it."""
+    if hasattr(os, "killpg"):
+        with suppress(ProcessLookupError):
+            os.killpg(server.pid, signal.SIGTERM)
+    else:
+        server.terminate()
 
 
 def check_recording(path: Path) -> None:
