@@ -6,6 +6,7 @@ import shlex
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from itertools import groupby
+from pathlib import Path
 
 from symrefine.detection.result import Detection
 from symrefine.ntuples.rank import SIGNIFICANT
@@ -232,7 +233,8 @@ def reproduce(shape: Shape, tolerance: float | None, call: str = "symrefine.dete
     if shape.measure == "solid":
         command += " --measure solid"
     python = f"{call}(shape)" if tolerance is None else f"{call}(shape, tolerance={tolerance:g})"
-    lines = [python] if shape.source == "array" else [command, f"# or in Python: {python}"]
+    # What came as an object has the name of its kind, and no suffix.
+    lines = [command, f"# or in Python: {python}"] if Path(shape.source).suffix else [python]
     told = (
         f"symrefine {version('symrefine')}. The result is a function of the input, the tolerance and the seed of the "
         "samples (--seed, 0 unless given) alone."
