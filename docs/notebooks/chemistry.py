@@ -5,19 +5,10 @@
 # the tolerance is all that decides how far a structure may be from its ideal.
 
 # %%
-import os
-import subprocess
-import sys
-import tempfile
-from pathlib import Path
-
 import matplotlib.pyplot as plt
 import numpy as np
 
 import symrefine
-
-folder = tempfile.TemporaryDirectory()  # files are written there
-os.chdir(folder.name)
 
 # %% [markdown]
 # ## Staggered ferrocene
@@ -46,6 +37,8 @@ for axis in found.axes:
     kind = f"S{axis.order}" if axis.improper else f"C{axis.order}"
     print(f"  {kind:4s}", axis.axis.direction.round(3))
 assert found.point_group == "D5d"
+found.plot()
+plt.show()
 
 # %% [markdown]
 # Labels are classes that no operation mixes. Make one carbon a nitrogen, and most of the symmetry is gone:
@@ -102,12 +95,10 @@ for step in answer.staircase:
 
 # %%
 noisy = positions + 0.05 * noise
-lines = [f"{e} {x:.6f} {y:.6f} {z:.6f}" for e, (x, y, z) in zip(elements, noisy, strict=True)]
-Path("noisy.xyz").write_text("\n".join([str(len(lines)), "ferrocene with noise", *lines, ""]))
-command = [sys.executable, "-m", *"symrefine symmetrize noisy.xyz -o exact.npy --tolerance 0.04".split()]
-print(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+made = symrefine.symmetrize(symrefine.Shape(noisy, labels=labels), tolerance=0.04)
+print(f"{made.group.name} made exact, by {made.method}")
 
-exact = symrefine.load("exact.npy").points
+exact = made.shape.points
 moved = np.linalg.norm(exact - noisy, axis=1)
 print(f"atoms moved by {moved.mean():.3f} angstroms in the mean, {moved.max():.3f} at most")
 again = symrefine.detect(exact, labels=labels)

@@ -9,8 +9,6 @@
 # %%
 import json
 import os
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
@@ -81,6 +79,8 @@ for axis in found.axes:
     seen = axis.coverage
     print(f"axis of order {axis.order}: {seen.supported:.0%} supported, {seen.contradicted:.1%} contradicted,", end=" ")
     print(f"{seen.unseen:.0%} with an image where nobody looked")
+found.plot()
+plt.show()
 
 # %% [markdown]
 # The truth is known here, because we placed the bolt.
@@ -117,17 +117,13 @@ plt.show()
 # %% [markdown]
 # ## For pose estimation: BOP
 #
-# The BOP benchmark keeps symmetries in `models_info.json`, in millimetres and in the frame of the model file. The model
-# is in metres, so one unit is 1000 mm. Mirrors are left out: no rigid motion does what they do.
+# The BOP benchmark keeps symmetries in `models_info.json`, in millimetres and in the frame of the model. The mesh,
+# taken as trimesh holds it, is in metres, so one unit is 1000 mm. Mirrors are left out: no rigid motion does
+# what they do.
 
 # %%
-bolt.export("bolt.ply")
-command = [
-    sys.executable,
-    "-m",
-    *"symrefine export bolt.ply --to bop --out models_info.json --id 1 --scale 1000".split(),
-]
-print(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+package = symrefine.export(bolt, "bop", "models_info.json", scale=1000.0)
+print(*package.notes, sep="\n")
 
 entry = json.loads(Path("models_info.json").read_text())["1"]
 print("diameter", round(entry["diameter"], 2), "mm,", len(entry["symmetries_discrete"]), "discrete symmetries")
@@ -146,8 +142,8 @@ approach = np.cross(axis, [0.0, 0.0, 1.0])
 approach /= np.linalg.norm(approach)
 grasp = np.column_stack([np.cross(approach, axis), axis, approach])  # closing, along the axis, approach
 
-rotations = [g for g in found.group.operations() if np.linalg.det(g) > 0]
-grasps = np.array([g @ grasp for g in rotations])
+operations = found.operations()  # [N, 4, 4]
+grasps = np.asarray(operations)[operations.determinants > 0, :3, :3] @ grasp
 hand = np.diag([1.0, -1.0, -1.0])  # looking down
 turns = np.degrees(np.arccos(np.clip((np.einsum("nij,ij->n", grasps, hand) - 1) / 2, -1, 1)))
 print(f"{len(grasps)} grasps around", centre.round(4), "- turns of the hand in degrees:", turns.round(0))
