@@ -155,19 +155,20 @@ def report(parts: Sequence[Part], *, full: bool) -> str:
 
 
 def main_table(verdicts: Sequence["Verdict"]) -> str:
-    """The claims that the configs call main: the paper's figure, ours, and those of others."""
+    """The claims that the configs call main, and others that ours misses: the paper's figure, ours, those of others."""
     from symrefine.study.summary import EMPTY, short
     from symrefine.study.tables import grid
 
     lines = []
     for verdict in verdicts:
         claim = verdict.claim
-        if not claim.main or not verdict.ours.values:
+        if not (claim.main or verdict.met is False) or not verdict.ours.values:
             continue
         unit = f" {claim.unit}" if claim.unit else ""
         others = [f"{name} {p.text}{unit if p.text != EMPTY else ''}" for name, p in verdict.peers.items()]
         paper = claim.paper if isinstance(claim.paper, str) else short(claim.paper) + unit
-        lines.append([claim.claim, paper, f"**{verdict.ours.text}{unit}**", "<br>".join(others)])
+        missed = f"<br>missed: {claim.expect.said} expected" if verdict.met is False else ""
+        lines.append([claim.claim, paper, f"**{verdict.ours.text}{unit}**{missed}", "<br>".join(others)])
     return grid(["", "paper", "symrefine", "others, same data, same judge"], lines)
 
 

@@ -51,9 +51,9 @@ _OF_ONE = ("bop", "recording", "report", "picture")
 HELP = "find the planes, axes and point group of a mesh, cloud or picture"
 DESCRIPTION = (
     "Find the mirror planes, rotation axes and point group of the mesh or point cloud in PATH (.ply .stl .obj .off "
-    ".3mf .step .glb .gltf .pcd .las .laz .e57 .xyz .csv .txt .npy .npz), of a molecule (.xyz .mol .sdf .pdb .cif) or "
-    "of a volume (.nii .nrrd .mrc .map), or the mirror lines and turns of a picture (.png .jpg .jpeg .bmp) or of "
-    "points with two coordinates (.csv .txt .npy .npz), or the hyperplanes of symmetry of points with 4 to 8 "
+    ".3mf .dae .step .glb .gltf .pcd .las .laz .e57 .xyz .csv .txt .npy .npz), of a molecule (.xyz .mol .sdf .pdb "
+    ".cif) or of a volume (.nii .nrrd .mrc .map), or the mirror lines and turns of a picture (.png .jpg .jpeg .bmp) "
+    "or of points with two coordinates (.csv .txt .npy .npz), or the hyperplanes of symmetry of points with 4 to 8 "
     "coordinates; each file may be packed (.gz). With --intrinsics PATH is a depth image. Prints a table; lengths are "
     "in the units of the file, misses in percent of the bounding-box diagonal. Several files, or a pattern in quotes, "
     "give a line each; one that cannot be used is told on its line, the others go on, and the exit status is 2."

@@ -10,8 +10,8 @@ numbers. gemmi 0.7 takes 6.x34 of a PDB file for 6. laspy 2.7 returns fewer poin
 STL, 3MF, molecules and uncompressed PCD are read here, line by line or straight from the bytes; glTF by trimesh, LAS by
 laspy and compressed PCD by open3d, after a check of what they would leave out; the syntax of CIF by gemmi, E57 by
 pye57, volumes by nibabel, mrcfile and pynrrd, pictures by Pillow. cascadio 0.1 leaves out faces of a STEP file that
-lack a reference, and hangs on a NaN: it works in a process of its own, and what it says there is heard. COLLADA is not
-read: pycollada 0.9 rounds to float32 and stops at what is no number.
+lack a reference, and hangs on a NaN: it works in a process of its own, and what it says there is heard. pycollada 0.9
+rounds to float32, stops at what is no number and leaves out what it does not know: COLLADA is checked first, too.
 """
 
 from collections.abc import Callable
@@ -23,6 +23,7 @@ from typing import Any, Literal
 from symrefine.errors import InputError, about
 from symrefine.files import file_bytes
 from symrefine.load.cif import read_cif
+from symrefine.load.collada import read_dae
 from symrefine.load.content import Content, Threshold, Wanted, check_distinct, check_finite
 from symrefine.load.depth import load_depth
 from symrefine.load.gltf import read_glb, read_gltf
@@ -69,6 +70,7 @@ _OPTIONS = {
 _MESHES_AND_CLOUDS = {
     ".3mf": _Format(lambda data, *_: read_3mf(data)),
     ".csv": _Format(lambda data, _, wanted: read_table(data, wanted.fields)),
+    ".dae": _Format(lambda data, *_: read_dae(data)),
     ".e57": _Format(lambda data, path, _: read_e57(data, path)),
     ".glb": _Format(lambda data, path, _: read_glb(data, path)),
     ".gltf": _Format(lambda data, path, _: read_gltf(data, path)),
