@@ -74,7 +74,7 @@ def _check_tree(root: "Element") -> None:
 
 
 def _check_numbers(element: "Element", told: str, place: str) -> None:
-    """Refuse other than so many finite numbers: pycollada stops at what is none, trimesh leaves out what is not finite."""
+    """Refuse all but so many finite numbers: pycollada stops at what is none, trimesh leaves out the others."""
     words = (element.text or "").split()
     if told != str(len(words)):
         raise InputError(f"{place}: declares {shorten(told)} numbers, {len(words)} follow")
