@@ -262,9 +262,7 @@ def _writers(args: argparse.Namespace, shape: "Shape", detection: "Detection") -
     for option, name in {"--bop": args.bop, "--recording": args.recording}.items():
         if name is not None and shape.dim != 3:
             where = "lies in the plane" if shape.dim == 2 else f"has {shape.dim} coordinates"
-            raise InputError(
-                f"{option} {name}: is for objects in space; {shape.source} {where}, use --json or --report"
-            )
+            raise InputError(f"{option} {name}: is for objects in space; {shape.source} {where}; use --report")
     if args.bop is not None:
         from symrefine.export.bop import bop_entry, bop_text
 
