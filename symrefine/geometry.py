@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symrefine.errors import InputError
+from symrefine.units import LARGEST_TOLERANCE as LARGEST_TOLERANCE
 
 Array = NDArray[np.floating[Any]]
 Mask = NDArray[np.bool_]
-# Beyond a fifth of the diagonal everything is symmetric.
-LARGEST_TOLERANCE = 0.2
 
 
 def check_tolerance(tolerance: Any) -> None:

@@ -8,7 +8,7 @@ from symrefine.geometry import LARGEST_TOLERANCE, Array, tight_diagonal
 from symrefine.plane.outline import smallest_diagonal
 from symrefine.shape import Shape
 from symrefine.surface.sampling import sampling
-from symrefine.units import METRES, OF_FILE, read_length, unit_of_format
+from symrefine.units import METRES, OF_FILE, read_length
 
 
 def relative_tolerance(
@@ -42,7 +42,7 @@ def relative_tolerance(
 
 def _unit(asked: str, shape: Shape, units: str | None) -> str:
     """The unit that the points of a shape are in."""
-    found = units or unit_of_format(shape.source, labelled=shape.labels is not None)
+    found = units or shape.unit
     if found is None:
         raise InputError(
             f"{shape.source}: --tolerance {asked}: the file does not say its unit; give it as --units mm (or "

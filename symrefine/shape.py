@@ -29,6 +29,8 @@ class Shape:
         viewpoint: [3] or [N, 3] place of the camera that saw the points of a cloud, or each of them; 64 places at most.
             Beside the outline of what it saw it saw that there is nothing: not for what the edge of a picture cuts off.
         measure: "points" for a cloud; "surface" (if None) or "solid" for a mesh: what carries the mass.
+        unit: of its lengths, one of `symrefine.units.METRES`, where the source says so.
+        elements: whether the labels are atomic numbers.
         source: where the data came from, for messages.
 
     Raises:
@@ -44,6 +46,8 @@ class Shape:
     labels: Index | None = None
     viewpoint: Array | None = None
     measure: Measure = None  # type: ignore[assignment]  # never None once made
+    unit: str | None = None
+    elements: bool = False
     source: str = "array"
 
     def __post_init__(self) -> None:
@@ -55,12 +59,15 @@ class Shape:
             object.__setattr__(self, "normals", _normals(self.normals, points, self.source))
         if self.faces is not None:
             object.__setattr__(self, "faces", _faces(self.faces, points, self.source))
+        for name in ("weights", "normals", "viewpoint"):
+            if self.faces is not None and getattr(self, name) is not None:
+                raise InputError(
+                    f"{self.source}: {name} is for clouds; a mesh has faces, which weigh what they measure"
+                )
         if self.labels is not None:
             count, what = (len(points), "point") if self.faces is None else (len(self.faces), "face")
             object.__setattr__(self, "labels", _labels(self.labels, count, what, self.source))
         if self.viewpoint is not None:
-            if self.faces is not None:
-                raise InputError(f"{self.source}: a viewpoint is for clouds, not for meshes")
             object.__setattr__(self, "viewpoint", _viewpoint(self.viewpoint, points.shape, self.source))
         object.__setattr__(self, "measure", _measure(self.measure, self.faces, self.source))
         if np.ptp(points, axis=0).max() == 0.0:

@@ -1,22 +1,20 @@
-"""Units of length: how they are written, how long they are, and which formats say theirs."""
+"""Units of length: how they are written, how long they are."""
 
 import math
 import re
 from collections.abc import Mapping
-from pathlib import Path
 
 from symrefine.errors import InputError, meant
 
+# The tolerance unless another is asked for, and the largest, as fractions of the diagonal: beyond a fifth everything is
+# symmetric.
+TOLERANCE, LARGEST_TOLERANCE = 0.02, 0.2
 # Metres in each.
 METRES: Mapping[str, float] = {
     "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "A": 1e-10, "in": 0.0254,
 }  # fmt: skip
 # What a length in units of the file is written with, whatever these are.
 OF_FILE = "u"
-# Formats that say in what they are; of .xyz only chemical ones do.
-FIXED: Mapping[str, str] = {
-    ".cif": "A", ".glb": "m", ".gltf": "m", ".mol": "A", ".pdb": "A", ".sdf": "A",
-}  # fmt: skip
 # Things that people scan, model and grasp measure 5 mm to 5 m: as numbers, millimetres and metres do not overlap.
 EVERYDAY_M = (5e-3, 5.0)
 _LENGTH = re.compile(r"([-+0-9.eE]*[0-9.])\s*([^\W\d_]+)")
@@ -43,18 +41,6 @@ def read_length(text: str) -> tuple[float, str]:
             f"{text!r}: unit {unit} is not known; {known}, or u for units of the file{meant(unit, METRES)}"
         )
     return value, unit
-
-
-def unit_of_format(source: str, *, labelled: bool) -> str | None:
-    """The unit that a format fixes, None where it says none.
-
-    Args:
-        source: path of the file.
-        labelled: whether the points have elements or other classes, as those of chemical .xyz do.
-    """
-    path = Path(source)
-    suffix = (path.with_suffix("") if path.suffix.lower() == ".gz" else path).suffix.lower()
-    return "A" if suffix == ".xyz" and labelled else FIXED.get(suffix)
 
 
 def unit_of_size(size: float) -> str | None:

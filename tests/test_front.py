@@ -38,7 +38,7 @@ def schema(name: str) -> dict:
 def of_trimesh():
     trimesh = pytest.importorskip("trimesh")
     mesh = trimesh.Trimesh(CORNERS, TRIANGLES, process=False)
-    return [mesh, trimesh.PointCloud(POINTS), trimesh.Scene([mesh])]
+    return [mesh, trimesh.PointCloud(POINTS), trimesh.Scene([mesh]), trimesh.Scene([trimesh.PointCloud(POINTS)])]
 
 
 def of_open3d():
@@ -110,6 +110,9 @@ WRONG = {
     "a masked array": (np.ma.masked_array(POINTS), "masked array"),
     "a mesh of masked points": ((np.ma.masked_array(CORNERS), TRIANGLES), "masked array"),
     "faces out of range": ((CORNERS, TRIANGLES + 1), "refers to vertex 8; there are 8 vertices"),
+    "a corner that is no number": ((CORNERS, [[0, 1, 3.9], [0, 3, 2], [4, 6, 7, 5]]), "a corner of a face is 3.9"),
+    "vertices in the plane": ((CORNERS[:, :2], TRIANGLES), "vertices have 2 coordinates"),
+    "points beyond numbers": (POINTS * 1e200, "coordinates must be finite and at most"),
     "no faces": ((CORNERS, np.zeros((0, 3), int)), r"faces have shape \(0, 3\)"),
     "faces of numbers": ((CORNERS, TRIANGLES * 1.0), "of float64; expected whole numbers"),
     "a file that is not there": ("nowhere.ply", "nowhere.ply: no such file"),
@@ -127,10 +130,78 @@ def test_what_is_no_object_is_refused_in_one_line(given, message):
 def test_what_an_object_brings_is_not_given_twice():
     with pytest.raises(InputError, match="normals: belong to the Shape"):
         symrefine.detect(symrefine.Shape(POINTS), normals=POINTS + 1.0)
-    with pytest.raises(InputError, match="weights are for clouds"):
+    with pytest.raises(InputError, match="weights is for clouds"):
         symrefine.detect((CORNERS, TRIANGLES), weights=np.ones(8))
-    with pytest.raises(InputError, match="brings its own labels"):
+    with pytest.raises(InputError, match=r"^ase Atoms: brings its own labels"):
         symrefine.detect(molecule("ase"), labels=[1, 2, 3])
+
+
+def test_a_mesh_of_a_file_takes_what_a_mesh_of_arrays_takes(tmp_path):
+    path = tmp_path / "box.off"
+    rows = [" ".join(map(str, row)) for row in (*CORNERS.tolist(), *([3, *t] for t in TRIANGLES.tolist()))]
+    path.write_text("\n".join(["OFF", "8 12 0", *rows, ""]))
+    for given in (path, (CORNERS, TRIANGLES)):
+        with pytest.raises(InputError, match="weights is for clouds"):
+            symrefine.detect(given, weights=np.ones(8))
+
+
+def test_numbers_of_numpy_are_options_too():
+    found = symrefine.detect(POINTS[:400], tolerance=np.float32(0.02), seed=np.int64(1))
+    assert json.loads(found.to_json())["options"]["seed"] == 1
+
+
+REFUSED = {
+    "a seed below 0": ({"seed": -1}, "seed is -1; expected a whole number from 0"),
+    "a seed that is no whole number": ({"seed": 1.5}, "seed is 1.5"),
+    "a tolerance that is none": ({"tolerance": 0.3}, "tolerance is 0.3"),
+    "another word for outliers": ({"outliers": "some"}, "outliers"),
+}
+
+
+@pytest.mark.parametrize(("options", "message"), REFUSED.values(), ids=REFUSED)
+def test_options_that_are_none_are_refused(options, message):
+    with pytest.raises(InputError, match=message):
+        symrefine.detect(POINTS[:400], **options)
+
+
+@pytest.mark.parametrize("option", [{"outliers": "none"}, {"ladder": (0.01,)}, {"labels": np.zeros(40, int)}])
+def test_options_for_space_are_refused_in_the_plane(option):
+    with pytest.raises(InputError, match="for objects in space, leave them out"):
+        symrefine.detect(RNG.random((40, 2)), **option)
+
+
+def test_the_group_at_other_tolerances_is_told_as_on_the_command_line(found):
+    assert len(symrefine.detect(CORNERS).staircase) > 3
+    assert [s.tolerance for s in found["detection"].staircase] == [0.01, 0.04]
+
+
+def test_what_was_found_is_of_an_object_in_space(found, tmp_path):
+    with pytest.raises(InputError, match="found is of type PlanarDetection"):
+        symrefine.symmetrize(POINTS, found["detection2d"])
+    with pytest.raises(InputError, match="found is of type SubspaceDetection"):
+        symrefine.export(POINTS, "npz", tmp_path / "x.npz", found=found["detection_nd"])
+    assert not list(tmp_path.iterdir())
+
+
+EXPORTS = {
+    "mirrors for BOP": (("bop", "m.json", {"improper": True}), "improper does not apply to 'bop'"),
+    "another suffix": (("npz", "x.dat", {}), "expected a name that ends in .npz"),
+    "no turns": (("npz", "x.npz", {"steps": 0}), "steps is 0"),
+}
+
+
+@pytest.mark.parametrize(("asked", "message"), EXPORTS.values(), ids=EXPORTS)
+def test_exports_that_make_no_sense_leave_nothing(found, tmp_path, asked, message):
+    to, name, options = asked
+    with pytest.raises(InputError, match=message):
+        symrefine.export(POINTS, to, tmp_path / name, found=found["detection"], **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_report_is_refused_before_the_work(monkeypatch, tmp_path):
+    monkeypatch.setattr("symrefine.front.verbs.detect", lambda *_: pytest.fail("detected first"))
+    with pytest.raises(InputError, match="expected a name that ends in"):
+        symrefine.report(POINTS, tmp_path / "x.txt")
 
 
 def test_labels_of_faces_break_what_they_tell_apart():

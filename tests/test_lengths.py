@@ -1,5 +1,6 @@
 """Tolerances in units of length: what they are of the diagonal, and what is refused."""
 
+import gzip
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,8 +15,9 @@ from symrefine.cli import invoke
 from symrefine.errors import InputError
 from symrefine.geometry import random_orthogonal
 from symrefine.lengths import object_diagonal, relative_tolerance
+from symrefine.load import load
 from symrefine.shape import Shape
-from symrefine.units import METRES, read_length, unit_of_format
+from symrefine.units import METRES, read_length
 
 BOX = np.array([[x, y, z] for x in (-3, 3) for y in (-2, 2) for z in (-1, 1)], dtype=float)
 WATER = "3\nwater\nO 0 0 0.117\nH 0 0.757 -0.469\nH 0 -0.757 -0.469\n"
@@ -54,10 +56,15 @@ def test_a_unit_that_is_not_known_is_answered() -> None:
     assert read_length("2Å") == (2.0, "A")
 
 
-def test_formats_that_say_their_unit() -> None:
-    named = {"a.pdb": "A", "a.PDB.gz": "A", "b/a.glb": "m", "a.ply": None, "a.xyz": None, "array": None}
-    assert {name: unit_of_format(name, labelled=False) for name in named} == named
-    assert unit_of_format("a.xyz", labelled=True) == "A"
+def test_formats_that_say_their_unit(tmp_path: Path) -> None:
+    atoms, points = "3\n\nO 0 0 0\nH 0 0.8 0.6\nH 0 -0.8 0.6\n", "0 0 0\n1 0 0\n0 1 0\n0 0 2\n"
+    for text, unit in ((atoms, "A"), (points, None)):
+        path = tmp_path / "a.xyz"
+        path.write_text(text)
+        packed = tmp_path / "a.xyz.gz"
+        packed.write_bytes(gzip.compress(text.encode()))
+        assert [load(file).unit for file in (path, packed)] == [unit, unit]
+        assert load(path).elements is (unit == "A")
 
 
 def test_the_same_length_is_the_same_fraction_in_every_unit() -> None:

@@ -46,6 +46,8 @@ BAD = {
         {"points": POINTS[:, :2], "faces": [[0, 1, 2]], "measure": "surface"},
         "3-space.*2 coordinates",
     ),
+    "weights of a mesh": ({"faces": FACES, "weights": np.ones(4)}, "weights is for clouds"),
+    "normals of a mesh": ({"faces": FACES, "normals": np.ones((4, 3))}, "normals is for clouds"),
     "mesh measured by its points": ({"faces": FACES, "measure": "points"}, "measure is 'points'.*'surface' or 'solid'"),
     "cloud with a measure": ({"measure": "solid"}, "measure is 'solid'.*a cloud"),
 }
@@ -91,14 +93,14 @@ def test_normals_become_unit_vectors_and_keep_their_sign():
 
 def test_nothing_is_shared_with_the_caller_and_nothing_can_be_written():
     points, weights, normals, faces = POINTS.copy(), np.ones(4), np.ones((4, 3)), np.array(FACES)
-    shape = Shape(points=points, weights=weights, normals=normals, faces=faces, measure="surface")
+    shape, mesh = Shape(points=points, weights=weights, normals=normals), Shape(points, faces)
     for array in (points, weights, normals, faces):
         array[0] = 3
     np.testing.assert_array_equal(shape.points, POINTS)
     np.testing.assert_array_equal(shape.weights, np.ones(4))
     np.testing.assert_allclose(shape.normals, 1 / np.sqrt(3))
-    np.testing.assert_array_equal(shape.faces, FACES)
-    for array in (shape.points, shape.weights, shape.normals, shape.faces):
+    np.testing.assert_array_equal(mesh.faces, FACES)
+    for array in (shape.points, shape.weights, shape.normals, mesh.points, mesh.faces):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
     with pytest.raises(FrozenInstanceError):

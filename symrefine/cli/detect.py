@@ -202,7 +202,6 @@ def examine(
     The detection is a `PlanarDetection`, a `Detection` or a `SubspaceDetection`, as the points have two, three or more
     coordinates.
     """
-    from symrefine.detection.story import LADDER
     from symrefine.front.verbs import detect
     from symrefine.lengths import relative_tolerance
     from symrefine.load import IMAGES, suffix_of
@@ -216,10 +215,10 @@ def examine(
         shape,
         outliers=outliers,
         tolerance=relative_tolerance(options["tolerance"], shape, units=options.get("units"), outliers=outliers),
-        ladder=LADDER if shape.dim == 3 else (),
         seed=options["seed"],
     )
-    return shape, found, found.to_dict(options=options, load_s=clock.seconds["load"])
+    found = replace(found, options=options)
+    return shape, found, found.to_dict(load_s=clock.seconds["load"])
 
 
 def read_scan(path: str, options: dict[str, Any], **picture: Any) -> "Shape":

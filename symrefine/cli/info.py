@@ -10,7 +10,7 @@ from symrefine.cli.inputs import loaded
 from symrefine.cli.outputs import check_outputs, json_writer, tell, write_all
 from symrefine.cli.signs import waiting
 from symrefine.cli.values import add_class_options, add_depth_options, add_path, add_viewpoint, reading_options
-from symrefine.units import EVERYDAY_M, unit_of_format, unit_of_size
+from symrefine.units import EVERYDAY_M, unit_of_size
 
 if TYPE_CHECKING:
     from symrefine.shape import Shape
@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _record(args: argparse.Namespace, shape: "Shape", found: "Survey") -> dict[str, Any]:
     from symrefine.export.records import number, numbers
-    from symrefine.load import IMAGES
+    from symrefine.load import IMAGES, suffix_of
     from symrefine.survey import doubts
 
     size = float((found.high - found.low).max())
@@ -60,7 +60,7 @@ def _record(args: argparse.Namespace, shape: "Shape", found: "Survey") -> dict[s
         "schema": SCHEMA,
         "source": shape.source,
         "options": reading_options(args),
-        "kind": "picture" if shape.dim == 2 and Path(shape.source).suffix.lower() in IMAGES else found.kind,
+        "kind": "picture" if shape.dim == 2 and suffix_of(Path(shape.source)) in IMAGES else found.kind,
         "dimension": shape.dim,
         "points": found.points,
         "repeated": found.repeated,
@@ -89,8 +89,8 @@ def _units(shape: "Shape", size: float) -> dict[str, Any]:
     """The unit that the format says or the size suggests, and why; None where neither does."""
     if shape.dim != 3:
         return {"unit": None, "why": "only of objects in space"}
-    if unit := unit_of_format(shape.source, labelled=shape.labels is not None):
-        return {"unit": unit, "why": "the format says so"}
+    if shape.unit is not None:
+        return {"unit": shape.unit, "why": "the format says so"}
     low, high = EVERYDAY_M
     if unit := unit_of_size(size):
         return {"unit": unit, "why": f"a guess: in it the size is between {1000 * low:g} mm and {high:g} m"}

@@ -5,10 +5,7 @@ import math
 from typing import Any, Literal
 
 from symrefine.errors import InputError
-from symrefine.units import METRES, read_length
-
-# The same as `verify.TOLERANCE` and the range that `detect` takes, which are too heavy to import for `--help`.
-TOLERANCE, LARGEST_TOLERANCE = 0.02, 0.2
+from symrefine.units import LARGEST_TOLERANCE, METRES, TOLERANCE, read_length
 
 
 def add_detection_options(parser: argparse.ArgumentParser, counts_as: str = "symmetric") -> None:
@@ -129,7 +126,7 @@ def add_frame_option(parser: argparse.ArgumentParser) -> None:
 def tolerance(text: str) -> float | str:
     """A fraction of the diagonal, or a length with its unit as it was written."""
     value = _float(text)
-    if math.isnan(value) and text[-1:].isalpha() and text[:1].isdigit():
+    if math.isnan(value) and text[-1:].isalpha() and any(letter.isdigit() for letter in text):
         try:
             read_length(text)
         except InputError as error:

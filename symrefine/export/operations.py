@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from symrefine.errors import InputError
 from symrefine.export.models import npz_bytes
 from symrefine.geometry import Array
 from symrefine.groups import PointGroup
@@ -14,7 +15,12 @@ def motions(group: PointGroup, center: Array, *, improper: bool = False, steps: 
     """Operations [N, 4, 4] about a centre, the identity first, then the other rotations, then reflections if asked for.
 
     A continuous axis is given by `steps` turns, a sphere by the 60 rotations of an icosahedron.
+
+    Raises:
+        InputError: fewer than one step.
     """
+    if steps < 1:
+        raise InputError(f"steps is {steps}; expected at least 1 turn for a continuous axis")
     kept = group if improper else group.proper_subgroup()
     matrices = (kept if kept.is_finite else kept.sampled(steps)).operations()
     found = np.tile(np.eye(4), (len(matrices), 1, 1))

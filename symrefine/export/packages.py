@@ -58,9 +58,13 @@ def package_of(
     """
     if to not in get_args(Format):
         raise InputError(f"to is {to!r}; expected one of {list(get_args(Format))}")
+    if improper and to != "npz":
+        raise InputError(f"improper does not apply to {to!r}; it is for 'npz'")
     if to == "bop":
         made = bop_package(out, detection, shape, number=number, scale=scale)
     elif to == "npz":
+        if out.suffix.lower() != ".npz":
+            raise InputError(f"{out}: expected a name that ends in .npz")
         made = npz_package(out, detection, shape, improper=improper, steps=steps)
     elif to == "canonical":
         made = canonical_package(out, detection, shape, transform=transform or place_of_transform(out))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from symrefine.errors import InputError
-from symrefine.files import json_text, whole
+from symrefine.files import check_target, json_text, whole
 from symrefine.front import lines
 from symrefine.geometry import Array
 from symrefine.shape import Shape
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Options = Mapping[str, Any]
+# What answers are written as.
+KINDS = ("json", "html", "png", "rrd")
 # Width and height of a picture, in pixels.
 SIZE = (1200, 900)
 
@@ -70,11 +72,7 @@ class Answer:
             InputError: another suffix, a kind of file that there is not for this kind of object, or no room.
         """
         path = Path(path)
-        write = {"json": self._write_json, "html": self._write_html, "png": self._write_png, "rrd": self._write_rrd}
-        kind = path.suffix.lower().removeprefix(".")
-        if kind not in write:
-            raise InputError(f"{path}: expected a name that ends in .{', .'.join(write)}")
-        write[kind](path)
+        getattr(self, f"_write_{check_kind(path)}")(path)
 
     def _write_json(self, path: Path) -> None:
         with whole(path) as draft:
@@ -100,7 +98,7 @@ class Found(Answer):
     shape: Shape
 
     def operations(self) -> Operations:
-        """Operations of the group as homogeneous matrices in the units and the frame of the input."""
+        """Operations, or what generates them, as homogeneous matrices in the units and the frame of the input."""
         raise NotImplementedError
 
     def plot(self, axes: "Axes | None" = None) -> "Axes":
@@ -133,6 +131,19 @@ class Found(Answer):
         from symrefine.report import draw
 
         draw(self, self.shape, path)  # type: ignore[arg-type]
+
+
+def check_kind(path: Path) -> str:
+    """What kind of file an answer is to be written as: json, html, png or rrd.
+
+    Raises:
+        InputError: another suffix, or a place that cannot be written.
+    """
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in KINDS:
+        raise InputError(f"{path}: expected a name that ends in .{', .'.join(KINDS)}")
+    check_target(path)
+    return kind
 
 
 def _lacks(answer: Answer, path: Path) -> InputError:

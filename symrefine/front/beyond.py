@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from symrefine.errors import InputError
 from symrefine.front.answers import Found, Operations, Options
 from symrefine.geometry import householder
 from symrefine.ndim import SubspaceDetection as BareSubspaceDetection
@@ -32,6 +33,12 @@ class SubspaceDetection(Found, BareSubspaceDetection):
         return subspace_record(self, self.shape, options=options or self.options, load_s=load_s)
 
     def operations(self) -> Operations:
-        """The identity and the reflections that are listed [N, n+1, n+1]; they generate the rest."""
+        """The identity and the reflections that are listed [N, n+1, n+1]; they generate the rest.
+
+        Raises:
+            InputError: nothing is decided.
+        """
+        if self.undetermined:
+            raise InputError(f"{self.shape.source}: no operations: {self.undetermined}")
         mirrors = [householder(h.plane.normal) for h in self.hyperplanes]
         return Operations.about(np.array([np.eye(len(self.center)), *mirrors]), self.center)

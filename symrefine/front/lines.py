@@ -17,7 +17,7 @@ LABEL, TOLD = 12, 4
 
 
 def summary(record: Record) -> list[str]:
-    """Six lines: the answer, the object, mirrors, turns, what else it may be, how it was found."""
+    """Six lines: the answer, its mirrors and turns, what else it may be, near misses, and what was asked."""
     told = {
         "mirrors": _mirrors(record),
         "turns": _turns(record),
@@ -34,7 +34,8 @@ def answer(record: Record) -> str:
         return f"undetermined: {record['undetermined']}"
     if "hyperplanes" in record:
         order = record["reflection_group_order"]
-        return f"{len(record['hyperplanes'])} hyperplanes" + (f", a group of order {order}" if order else "")
+        least = "at least " if record["incomplete"] else ""
+        return f"{least}{len(record['hyperplanes'])} hyperplanes" + (f", a group of order {order}" if order else "")
     least = "at least " if record.get("at_least") else ""
     return f"{least}{symbol(record['point_group'])}, confidence {record['confidence']:.3f}"
 
@@ -47,7 +48,9 @@ def mirrors(record: Record) -> Sequence[Record]:
 def _mirrors(record: Record) -> str:
     found = mirrors(record)
     worst = max((m["residual"]["p95"] for m in found if "residual" in m), default=None)
-    return f"{len(found)}" + ("" if worst is None else f", 95 % of the surface within {percent(worst)} of the diagonal")
+    return f"{len(found)}" + (
+        "" if worst is None else f", 95 % of the surface within {percent(max(worst, 1e-5))} of the diagonal"
+    )
 
 
 def _turns(record: Record) -> str:
@@ -81,7 +84,8 @@ def _asked(record: Record) -> str:
     tolerance = record.get("tolerance", record["options"].get("tolerance"))
     sample = f", {record['outliers']['count']:,} outliers" if record.get("outliers", {}).get("count") else ""
     took = sum(record["timings"].values())
-    return f"tolerance {percent(tolerance)} of the diagonal{sample}; {took:.2g} s" if tolerance else f"{took:.2g} s"
+    whole = "diagonal" if "diagonal" in record else "diameter"
+    return f"tolerance {percent(tolerance)} of the {whole}{sample}; {took:.2g} s"
 
 
 def alignment_summary(found: "Alignment", source: Shape, target: Shape) -> list[str]:

@@ -1,13 +1,15 @@
 """What can be asked of any object: `detect`, `align`, `symmetrize`, `complete`, `export`, `report`."""
 
 from collections.abc import Sequence
+from operator import index
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from numpy.typing import ArrayLike
 
 from symrefine.errors import InputError
-from symrefine.front.answers import Found
+from symrefine.front.answers import Found, check_kind
+from symrefine.geometry import check_tolerance
 from symrefine.load.objects import shape_of
 from symrefine.surface.misses import TOLERANCE
 
@@ -34,7 +36,7 @@ def detect(
     viewpoint: ArrayLike | None = None,
     outliers: "Outliers" = "auto",
     tolerance: float = TOLERANCE,
-    ladder: Sequence[float] = (),
+    ladder: Sequence[float] | None = None,
     seed: int = 0,
 ) -> "Detected":
     """The symmetry of an object: point group, mirrors and turns, how sure it is, and what it misses each of them by.
@@ -49,7 +51,7 @@ def detect(
         viewpoint: [3] or [N, 3] place of the camera that saw the points, or each of them.
         outliers: "auto": points of a cloud that belong to no surface are set apart; "none": all points count.
         tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal.
-        ladder: other tolerances to tell the group at.
+        ladder: other tolerances to tell the group at, in space; those of the command line if None.
         seed: of the random choices (samples of a mesh, subsets of a cloud).
 
     Returns:
@@ -61,18 +63,24 @@ def detect(
         DegenerateShapeError: the points do not spread.
     """
     shape = shape_of(shape, weights=weights, normals=normals, labels=labels, viewpoint=viewpoint)
-    options = {"tolerance": tolerance, "seed": seed}
+    tolerance, seed = _number(tolerance), _seed(seed)
+    options: dict[str, Any] = {"tolerance": tolerance, "seed": seed}
     if shape.dim == 3:
         from symrefine.detection import story
         from symrefine.front.space import Detection
 
-        found = story.detect(shape, outliers=outliers, ladder=ladder, **options)  # type: ignore[arg-type]
+        steps = story.LADDER if ladder is None else tuple(ladder)
+        found = story.detect(shape, outliers=outliers, ladder=steps, tolerance=tolerance, seed=seed)
         return Detection.of(found, shape=shape, options=options | {"outliers": outliers})
-    for name, given in (("labels are", shape.labels), ("steps of a ladder are", ladder or None)):
-        if given is not None:
-            raise InputError(
-                f"{shape.source}: points have {shape.dim} coordinates; {name} for objects in space, leave them out"
-            )
+    given = {
+        "labels are": shape.labels is not None,
+        "a ladder is": ladder is not None,
+        "outliers are": outliers != "auto",
+    }
+    for name in (name for name, is_given in given.items() if is_given):
+        raise InputError(
+            f"{shape.source}: points have {shape.dim} coordinates; {name} for objects in space, leave them out"
+        )
     if shape.dim == 2:
         from symrefine.front.planar import PlanarDetection
         from symrefine.plane import detect_planar
@@ -129,8 +137,11 @@ def align(
     from symrefine.front.aligned import Alignment
 
     moved, met = shape_of(source, name="source"), shape_of(target, name="target")
-    options = {"tolerance": tolerance, "scale": scale, "seed": seed}
-    found = story.align(moved, met, polish=polish, allow_reflection=allow_reflection, **options)  # type: ignore[arg-type]
+    tolerance, seed = _number(tolerance), _seed(seed)
+    found = story.align(
+        moved, met, scale=scale, polish=polish, allow_reflection=allow_reflection, tolerance=tolerance, seed=seed
+    )
+    options = {"tolerance": tolerance, "scale": bool(scale), "seed": seed}
     told = options | {"measure": None, "rotations_only": not allow_reflection}
     return Alignment.of(found, source=moved, target=met, options=told)
 
@@ -159,7 +170,7 @@ def symmetrize(
     from symrefine.symmetrize import placed_subgroup, symmetrize
 
     shape = shape_of(shape)
-    found = detect_in_space(shape, tolerance=tolerance, seed=seed) if found is None else found
+    found = detect_in_space(shape, tolerance=tolerance, seed=seed) if found is None else _in_space(found)
     if found.undetermined:
         raise InputError(f"{shape.source}: no symmetry to make exact: {found.undetermined}")
     if found.point_group == "C1":
@@ -232,10 +243,12 @@ def export(
     from symrefine.export.packages import package_of, write_package
 
     shape, out = shape_of(shape), Path(out)
-    found = detect_in_space(shape) if found is None else found
+    found = detect_in_space(shape) if found is None else _in_space(found)
     place = None if transform is None else Path(transform)
-    numbers: Any = {"number": number, "scale": scale, "improper": improper, "steps": steps or STEPS}
-    package = package_of(to, out, found, shape, transform=place, **numbers)
+    turns = STEPS if steps is None else steps
+    package = package_of(
+        to, out, found, shape, number=number, scale=scale, improper=improper, steps=turns, transform=place
+    )
     write_package(package, to, out)
     return package
 
@@ -250,9 +263,35 @@ def report(given: Any, path: str | Path) -> "Detected":
     Raises:
         InputError: what `detect` and `Detection.save` refuse.
     """
+    check_kind(Path(path))
     found: Any = given if isinstance(given, Found) else detect(given)
     found.save(path)
     return found
+
+
+def _in_space(found: Any) -> "Detection":
+    """What was found before, if it is of an object in space."""
+    from symrefine.front.space import Detection
+
+    if not isinstance(found, Detection):
+        raise InputError(f"found is of type {type(found).__name__}; expected what symrefine.detect found in space")
+    return found
+
+
+def _number(tolerance: Any) -> float:
+    check_tolerance(tolerance)
+    return float(tolerance)
+
+
+def _seed(seed: Any) -> int:
+    """A seed that numpy takes and JSON can hold."""
+    try:
+        whole = index(seed)
+    except TypeError:
+        whole = -1
+    if whole < 0:
+        raise InputError(f"seed is {seed!r}; expected a whole number from 0")
+    return whole
 
 
 def _nearest_miss(found: "Detection") -> str:

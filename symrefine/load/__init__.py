@@ -54,10 +54,11 @@ Reader = Callable[[bytes, Path, Wanted], Content]
 
 @dataclass(frozen=True, slots=True)
 class _Format:
-    """How to read files of one suffix, and which groups of options they take: `fields`, `frame`, `grey`, `measure`."""
+    """How to read files of one suffix, and which groups of options they take, and the unit that all have."""
 
     read: Reader
     takes: tuple[str, ...] = ("fields",)
+    unit: str | None = None
 
 
 # What to say where a file takes none of a group.
@@ -71,9 +72,9 @@ _MESHES_AND_CLOUDS = {
     ".3mf": _Format(lambda data, *_: read_3mf(data)),
     ".csv": _Format(lambda data, _, wanted: read_table(data, wanted.fields)),
     ".dae": _Format(lambda data, *_: read_dae(data)),
-    ".e57": _Format(lambda data, path, _: read_e57(data, path)),
-    ".glb": _Format(lambda data, path, _: read_glb(data, path)),
-    ".gltf": _Format(lambda data, path, _: read_gltf(data, path)),
+    ".e57": _Format(lambda data, path, _: read_e57(data, path), unit="m"),
+    ".glb": _Format(lambda data, path, _: read_glb(data, path), unit="m"),
+    ".gltf": _Format(lambda data, path, _: read_gltf(data, path), unit="m"),
     ".las": _Format(lambda data, *_: read_las(data)),
     ".laz": _Format(lambda data, *_: read_las(data)),
     ".npy": _Format(lambda data, *_: read_npy(data)),
@@ -82,21 +83,21 @@ _MESHES_AND_CLOUDS = {
     ".off": _Format(lambda data, *_: read_off(data)),
     ".pcd": _Format(lambda data, path, _: read_pcd(data, path)),
     ".ply": _Format(lambda data, *_: read_ply(data)),
-    ".step": _Format(lambda data, path, _: read_step(data, path)),
+    ".step": _Format(lambda data, path, _: read_step(data, path), unit="m"),
     ".stl": _Format(lambda data, *_: read_stl(data)),
-    ".stp": _Format(lambda data, path, _: read_step(data, path)),
+    ".stp": _Format(lambda data, path, _: read_step(data, path), unit="m"),
     ".txt": _Format(lambda data, _, wanted: read_table(data, wanted.fields)),
     ".xyz": _Format(lambda data, _, wanted: read_xyz(data, wanted.frame), ("fields", "frame")),
 }
 _MOLECULES = {
-    ".cif": _Format(lambda data, _, wanted: read_cif(data, wanted.frame, wanted.fields), ("fields", "frame")),
-    ".mol": _Format(lambda data, _, wanted: read_molfile(data, wanted.frame), ("fields", "frame")),
-    ".pdb": _Format(lambda data, _, wanted: read_pdb(data, wanted.frame, wanted.fields), ("fields", "frame")),
-    ".sdf": _Format(lambda data, _, wanted: read_molfile(data, wanted.frame), ("fields", "frame")),
+    ".cif": _Format(lambda data, _, wanted: read_cif(data, wanted.frame, wanted.fields), ("fields", "frame"), "A"),
+    ".mol": _Format(lambda data, _, wanted: read_molfile(data, wanted.frame), ("fields", "frame"), "A"),
+    ".pdb": _Format(lambda data, _, wanted: read_pdb(data, wanted.frame, wanted.fields), ("fields", "frame"), "A"),
+    ".sdf": _Format(lambda data, _, wanted: read_molfile(data, wanted.frame), ("fields", "frame"), "A"),
 }
 _VOLUMES = {
-    ".map": _Format(lambda data, _, wanted: read_mrc(data, wanted), ("frame", "grey", "measure")),
-    ".mrc": _Format(lambda data, _, wanted: read_mrc(data, wanted), ("frame", "grey", "measure")),
+    ".map": _Format(lambda data, _, wanted: read_mrc(data, wanted), ("frame", "grey", "measure"), "A"),
+    ".mrc": _Format(lambda data, _, wanted: read_mrc(data, wanted), ("frame", "grey", "measure"), "A"),
     ".nii": _Format(lambda data, _, wanted: read_nifti(data, wanted), ("frame", "grey", "measure")),
     ".nrrd": _Format(lambda data, _, wanted: read_nrrd(data, wanted), ("frame", "grey", "measure")),
 }
@@ -169,9 +170,13 @@ def load(
         content = _content(file, wanted)
         check_finite(content)
         check_distinct(content)
-        left = None if "measure" in _FORMATS[suffix_of(file)].takes else measure
-        arrays = _arrays(content, left, labels, weights, source)
-    return Shape(source=source, **arrays)
+        kind = _FORMATS[suffix_of(file)]
+        arrays = _arrays(content, None if "measure" in kind.takes else measure, labels, weights, source)
+    # Labels that count unasked are elements, and lengths between them angstroms.
+    elements = labels is None and content.labels is not None
+    return Shape(
+        source=source, unit=content.unit or kind.unit or ("A" if elements else None), elements=elements, **arrays
+    )
 
 
 def _content(file: Path, wanted: Wanted) -> Content:

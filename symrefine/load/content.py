@@ -80,6 +80,7 @@ class Content:
         face_lines: the same for the faces.
         first_index: number the format gives its first vertex (1 in OBJ), for messages.
         viewpoint: [3] or [N, 3] where the sensor stood, in the frame of the points, or None.
+        unit: of its lengths, where the file says so, one of `symrefine.units.METRES`.
         split: the format repeats a vertex for each face or each attribute (STL, glTF).
     """
 
@@ -94,6 +95,7 @@ class Content:
     face_lines: Sequence[int] | None = None
     first_index: int = 0
     viewpoint: Array | None = None
+    unit: str | None = None
     split: bool = False
 
     def name(self, kind: Literal["point", "face"], row: int) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from operator import index
 from os import PathLike
 from typing import Any
 
@@ -12,6 +13,7 @@ from symrefine.errors import InputError, about
 from symrefine.load import load
 from symrefine.load.content import Content, Polygons, Values, as_float64, check_distinct, check_finite, polygons
 from symrefine.load.mesh import mesh_arrays
+from symrefine.load.scene import flattened
 from symrefine.shape import Shape
 
 _EXPECTED = (
@@ -61,16 +63,32 @@ def shape_of(
             check_distinct(content)
             if content.faces is not None:
                 return _mesh(content, content.faces, told, source)
-            bare = Shape(content.points, normals=content.normals, labels=content.labels, source=source)
-            return _completed(bare, told)
-    return Shape(_array(given, name), **told, source=name)
+    if content is not None:
+        bare = Shape(content.points, normals=content.normals, labels=content.labels, source=source)
+        if content.labels is not None:
+            bare = replace(bare, unit="A", elements=True)
+        return _completed(bare, told)
+    points = _array(given, name)
+    with about(name):
+        _check_size(points)
+    return Shape(points, **told, source=name)
+
+
+def _check_size(points: Any) -> None:
+    """Refuse what `load` refuses of a file: numbers so large that areas overflow. What is no array `Shape` refuses."""
+    try:
+        array = np.asarray(points, dtype=np.float64)
+    except (TypeError, ValueError):
+        return
+    if array.ndim == 2 and array.size and np.isfinite(array).all():
+        check_finite(Content(points=array))
 
 
 def _mesh(content: Content, faces: Polygons, told: dict[str, Any], source: str) -> Shape:
     """The mesh that an object holds, with the classes of its faces where they were told."""
     odd = [key for key in told if key != "labels"]
     if odd:
-        raise InputError(f"{odd[0]} are for clouds; a mesh has faces, which weigh what their areas do")
+        raise InputError(f"{odd[0]} is for clouds; a mesh has faces, leave it out")
     if "labels" in told:
         content = replace(content, face_fields={"labels": _labels(told["labels"], len(faces))})
     return Shape(**mesh_arrays(content, faces, "labels" if told else None, source), source=source)
@@ -127,10 +145,17 @@ def _faces(values: Any) -> Polygons:
     try:
         rows = np.asarray(_array(values, "faces"))
     except ValueError:
-        return polygons([int(corner) for corner in row] for row in values)
+        return polygons([_corner(corner) for corner in row] for row in values)
     if rows.ndim != 2 or not len(rows) or not np.issubdtype(rows.dtype, np.integer):
         raise InputError(f"faces have shape {rows.shape} of {rows.dtype}; expected whole numbers [F, 3], F >= 1")
     return Polygons(corners=rows.astype(np.int64).ravel(), counts=np.full(len(rows), rows.shape[1]))
+
+
+def _corner(value: Any) -> int:
+    try:
+        return index(value)
+    except TypeError:
+        raise InputError(f"a corner of a face is {value!r}; expected a whole number") from None
 
 
 def _offers(given: Any, *names: str) -> bool:
@@ -141,7 +166,10 @@ def _pair(given: Any) -> Content | None:
     """`(vertices, faces)`; two points are no pair, as each of them has but one row."""
     if not isinstance(given, tuple) or len(given) != 2 or not _has_rows(given[1]):
         return None
-    return Content(points=_points(given[0]), faces=_faces(given[1]))
+    points = _points(given[0])
+    if points.shape[1] != 3:
+        raise InputError(f"vertices have {points.shape[1]} coordinates; faces are of objects in space, with 3")
+    return Content(points=points, faces=_faces(given[1]))
 
 
 def _has_rows(values: Any) -> bool:
@@ -194,16 +222,17 @@ def _scene(given: Any) -> Content | None:
     """`Scene` of trimesh: its meshes, each where the scene puts it."""
     if not _offers(given, "geometry", "to_mesh", "graph"):
         return None
-    odd = [name for name, part in given.geometry.items() if not _offers(part, "vertices", "faces")]
-    if odd or not given.geometry:
-        raise InputError(f"holds {f'{odd[0]!r}, which is no mesh' if odd else 'nothing'}; expected a scene of meshes")
-    return _trimesh(given.to_mesh())
+    if not given.geometry:
+        raise InputError("is a scene that holds nothing; expected meshes")
+    return replace(flattened(given), split=False)
 
 
 def _trimesh(given: Any) -> Content | None:
     """`Trimesh` and `PointCloud`, and whatever else calls its points vertices."""
     if not _offers(given, "vertices"):
         return None
+    if _offers(given, "entities"):
+        raise InputError("is a path of lines; expected a mesh or a cloud")
     faces = getattr(given, "faces", None)
     return Content(points=_points(given.vertices), faces=None if faces is None else _faces(faces))
 

@@ -26,6 +26,8 @@ _MODEL = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
 _PATH = "{http://schemas.microsoft.com/3dmanufacturing/production/2015/06}path"
 # Namespaces of extensions that change no surface: materials, parts in several files.
 _HARMLESS = ("/3dmanufacturing/material/", "/3dmanufacturing/production/")
+# Units as 3MF spells them; feet are not told.
+_UNITS = {"micron": "um", "millimeter": "mm", "centimeter": "cm", "inch": "in", "foot": None, "meter": "m"}
 _INDEX = re.compile(r"[0-9]{1,9}")
 # Components may stand in components, each several times: a small file can ask for more triangles than memory holds.
 _LARGEST, _DEEPEST = 2**24, 100
@@ -60,7 +62,11 @@ def read_3mf(data: bytes) -> Content:
     """
     package = _Package(archive(data, ".3mf"))
     part = package.root()
-    uses = [_use(item, part) for item in package.model(part).iterfind(f"{_CORE}build/{_CORE}item")]
+    model = package.model(part)
+    unit = model.get("unit", "millimeter")
+    if unit not in _UNITS:
+        raise InputError(f"{shorten(part)}: unit is {shorten(unit)}; expected one of {' '.join(_UNITS)}")
+    uses = [_use(item, part) for item in model.iterfind(f"{_CORE}build/{_CORE}item")]
     if not uses:
         raise InputError("builds nothing: its <build> has no <item>")
     size = sum(package.size(use.key) for use in uses)
@@ -75,6 +81,7 @@ def read_3mf(data: bytes) -> Content:
     return Content(
         points=np.concatenate([points for points, _ in meshes]),
         faces=Polygons(corners=joined.ravel(), counts=np.full(len(joined), 3)),
+        unit=_UNITS[unit],
     )
 
 

@@ -4,8 +4,8 @@ import bz2
 import io
 import math
 import warnings
-import zlib
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,8 @@ _TYPES = {
     "f8": ("double",),
 }
 
+_NIFTI_UNITS = {"meter": "m", "mm": "mm", "micron": "um"}
+
 
 def read_nifti(data: bytes, wanted: Wanted) -> Content:
     """A volume of a NIfTI file, by its affine map, in millimetres as a rule; of a series one is chosen.
@@ -48,6 +50,7 @@ def read_nifti(data: bytes, wanted: Wanted) -> Content:
             shape, dtype = image.shape, np.dtype(image.get_data_dtype())
             start = int(image.dataobj.offset)
             affine = np.array(image.affine, dtype=np.float64)
+            unit = _NIFTI_UNITS.get(image.header.get_xyzt_units()[0])
     except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
         raise InputError(f"not a whole NIfTI file: {shorten(str(error), 80)}") from None
     if dtype.kind not in "iuf":
@@ -61,7 +64,8 @@ def read_nifti(data: bytes, wanted: Wanted) -> Content:
             values = np.asarray(image.dataobj[(..., *series[number])], dtype=np.float32)
     except Exception as error:  # noqa: BLE001 (as above)
         raise InputError(f"not a whole NIfTI file: {shorten(str(error), 80)}") from None
-    return volume_content(Volume(values=values, axes=affine[:3, :3], origin=affine[:3, 3]), wanted)
+    content = volume_content(Volume(values=values, axes=affine[:3, :3], origin=affine[:3, 3]), wanted)
+    return replace(content, unit=unit)
 
 
 def _heads(data: bytes) -> tuple[int, int]:
@@ -181,8 +185,9 @@ def _unpacked(body: bytes, encoding: str, size: int) -> bytes:
         return unpacked(body)
     if encoding in ("bzip2", "bz2"):
         try:
-            return bz2.BZ2Decompressor().decompress(body, size + 1)
-        except (OSError, zlib.error, EOFError) as error:
+            with bz2.open(io.BytesIO(body)) as file:
+                return file.read(size + 1)
+        except (OSError, EOFError) as error:
             raise InputError(f"the data are damaged: {shorten(str(error), 80)}") from None
     raise InputError(f"encoding is {shorten(encoding)}; expected raw, gzip or bzip2")
 

@@ -1,7 +1,6 @@
 """Points that stand for themselves as balls, and as sticks what seems to be bonded."""
 
 from dataclasses import dataclass
-from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -70,7 +69,7 @@ def _looks(shape: Shape) -> tuple[Array | None, Array]:
     labels = shape.labels
     if labels is None:
         return None, np.tile(np.array(OBJECT) / 255.0, (len(shape.points), 1))
-    if PurePath(shape.source).suffix.lower() == ".xyz" and all(is_element(int(k)) for k in np.unique(labels)):
+    if shape.elements and all(is_element(int(k)) for k in np.unique(labels)):
         radii = np.array([radius(int(k)) for k in labels])
         return radii * _unit_of_length(shape.points, radii), np.array([colour(int(k)) for k in labels]) / 255.0
     rank = np.unique(labels, return_inverse=True)[1].reshape(-1)

@@ -51,7 +51,7 @@ def page(detection: PlanarDetection, shape: Shape) -> Page:
             _facts(d, shape),
             _decision(d),
             _doublets(d),
-            reproduce(shape, d.tolerance, "symrefine.plane.detect_planar"),
+            reproduce(d, shape),
         ),
         data={"kind": "plane", "elements": _drawn(d, scene)},
     )

@@ -35,7 +35,7 @@ def page(detection: SubspaceDetection, shape: Shape) -> Page:
             _hyperplanes("Hyperplanes of symmetry", d.hyperplanes, 0, d.diameter),
             _hyperplanes("Candidates turned down", d.rejected, len(d.hyperplanes), d.diameter),
             _tuples(d),
-            reproduce(shape, None, "symrefine.ndim.detect_nd"),
+            reproduce(d, shape),
         ),
         data={"kind": "projected", "elements": [{"matrix": _matrix(h, d)} for h in every]},
     )

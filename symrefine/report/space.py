@@ -3,10 +3,11 @@
 import base64
 import math
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 from symrefine.detection.result import Detection
 from symrefine.ntuples.rank import SIGNIFICANT
@@ -35,6 +36,10 @@ from symrefine.report.model import DEEPEST, model
 from symrefine.shape import Shape
 from symrefine.surface.misses import LIMITS
 
+# Values of options that are as if they were not given, and options that `symrefine.detect` has too.
+_UNSAID = {"seed": 0, "outliers": "auto"}
+_IN_PYTHON = ("tolerance", "seed", "outliers")
+
 
 def page(detection: Detection, shape: Shape) -> Page:
     """What the page says of an object in space, and the model that turns."""
@@ -51,7 +56,7 @@ def page(detection: Detection, shape: Shape) -> Page:
             _decision(detection),
             _convergence(detection),
             _tuples(detection),
-            reproduce(shape, detection.tolerance),
+            reproduce(detection, shape),
         ),
         data={"kind": "space", "object": made.data, "elements": drawn(elements, detection, scene)},
         turns=True,
@@ -225,18 +230,22 @@ def _tuples(d: Detection) -> str:
     return section("What the moments said first", told, chart)
 
 
-def reproduce(shape: Shape, tolerance: float | None, call: str = "symrefine.detect") -> str:
-    """The command, and the call in Python, that give this result again."""
-    command = f"symrefine detect {shlex.quote(shape.source)}"
-    if tolerance is not None:
-        command += f" --tolerance {tolerance:g}"
-    if shape.measure == "solid":
-        command += " --measure solid"
-    python = f"{call}(shape)" if tolerance is None else f"{call}(shape, tolerance={tolerance:g})"
-    # What came as an object has the name of its kind, and no suffix.
-    lines = [command, f"# or in Python: {python}"] if Path(shape.source).suffix else [python]
-    told = (
-        f"symrefine {version('symrefine')}. The result is a function of the input, the tolerance and the seed of the "
-        "samples (--seed, 0 unless given) alone."
-    )
+def reproduce(found: Any, shape: Shape) -> str:
+    """The command, and the call in Python, that give this result again: with the options that it was asked with."""
+    options: Mapping[str, Any] = getattr(found, "options", {"tolerance": getattr(found, "tolerance", None)})
+    asked = {
+        k: v for k, v in options.items() if v is not None and v is not False and (k not in _UNSAID or v != _UNSAID[k])
+    }
+    python = ", ".join(["shape", *(f"{name}={asked[name]!r}" for name in _IN_PYTHON if name in asked)])
+    lines = [f"symrefine.detect({python})"]
+    if Path(shape.source).suffix:  # what came as an object has the name of its kind, and no suffix
+        words = ["symrefine", "detect", shape.source, *(word for name in asked for word in _option(name, asked[name]))]
+        lines = [shlex.join(words), f"# or in Python: {lines[0]}"]
+    told = f"symrefine {version('symrefine')}. The result is a function of the input and these options alone."
     return section("Reproduce", told, "<pre>" + "\n".join(plain(line) for line in lines) + "</pre>")
+
+
+def _option(name: str, value: Any) -> list[str]:
+    """An option of the command line with its value: lists between commas, what is only said or not without one."""
+    told = ",".join(f"{v:g}" for v in value) if isinstance(value, list | tuple) else str(value)
+    return [f"--{name.replace('_', '-')}", *([] if value is True else [told])]

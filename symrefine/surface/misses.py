@@ -14,6 +14,7 @@ import numpy as np
 from symrefine.geometry import Array, Isometry
 from symrefine.shape import Index
 from symrefine.surface.skin import LocalPlanes
+from symrefine.units import TOLERANCE as TOLERANCE
 
 # An operation holds at tolerance t (2 % by default) if the mean miss stays below the first of these multiples of t, and
 # if no larger shares of the surface miss by more than the others: a detail of 3 % by 1.15 t, one of 0.6 % by anything.
@@ -26,7 +27,6 @@ ATOM_LIMITS = (0.9, 1.3, 1.6)
 # Standard deviations by which what samples show of noise may be off: with one, true elements need 0.4 of the tolerance
 # at 1 % noise; three hide details of 2 % of the surface at 8,000 points.
 SURE = 2.0
-TOLERANCE = 0.02
 # Discs around a point that are looked at: at edges the nearest centre need not be that of the nearest disc.
 DISCS = 4
 # Spacing in the halves of a volume over that of the whole.

@@ -109,10 +109,10 @@ def sampling(
     kept: Index = np.arange(len(points))
     taken: list[Index] = []
     lone: list[Index] = []
+    if len(points) <= AROUND or points.std() == 0.0:
+        return Sampling(kept=kept, even=kept, strays=kept[:0])
     some = _some(points, rng)
     spread = points[some].std()
-    if spread == 0.0 or len(points) <= AROUND:
-        return Sampling(kept=kept, even=kept, strays=kept[:0])
     points = (points - points[some].mean(axis=0)) / spread
     around = Surroundings.of(points[some])
     if fills_volume(around.points, around.tree, np.random.default_rng(0)):

@@ -507,8 +507,11 @@
     }
 
     canvas.addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
+    canvas.addEventListener("pointercancel", () => { pressed = null; });
     canvas.addEventListener("pointerup", (event) => {
-      if (!pressed || Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > 5) return;
+      const from = pressed;
+      pressed = null;
+      if (!from || Math.hypot(event.clientX - from[0], event.clientY - from[1]) > 5) return;
       pick(under(event));
     });
     canvas.addEventListener("pointermove", (event) => {
@@ -526,6 +529,7 @@
     canvas.addEventListener("blur", () => { controls.enableZoom = false; });
     canvas.addEventListener("pointerdown", () => canvas.focus({ preventScroll: true }));
     canvas.addEventListener("keydown", (event) => {
+      if (event.ctrlKey || event.metaKey || event.altKey) return; // the browser's own
       const turns = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
       const nearer = { "+": 0.9, "=": 0.9, "-": 1 / 0.9 }[event.key];
       if (!turns && !nearer) return;
