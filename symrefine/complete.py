@@ -1,6 +1,6 @@
 """Completion: a scan and its images under the symmetry found, where nobody looked."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,8 @@ class Completion:
         detection: the symmetry that it rests on.
     """
 
-    points: Array
-    inferred: NDArray[np.bool_]
+    points: Array = field(repr=False)
+    inferred: NDArray[np.bool_] = field(repr=False)
     contradicted: int
     detection: Detection
 

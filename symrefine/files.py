@@ -23,7 +23,11 @@ def check_target(path: Path) -> None:
     Raises:
         InputError: a directory, no such parent directory, or no permission.
     """
-    if path.is_dir():
+    try:
+        is_folder = path.is_dir()
+    except (OSError, ValueError) as error:
+        raise InputError(f"{str(path)[:60]!a}: is no name of a file: {error}") from None
+    if is_folder:
         raise InputError(f"{path}: is a directory; expected a file to write")
     if not path.parent.is_dir():
         raise InputError(f"{path}: cannot be written: there is no directory {path.parent}")
@@ -146,6 +150,8 @@ def file_bytes(file: Path) -> bytes:
         data = file.read_bytes()
     except FileNotFoundError:
         raise InputError("no such file") from None
+    except ValueError as error:  # a name that no system takes
+        raise InputError(f"is no name of a file: {error}") from None
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}") from None
     if not data:

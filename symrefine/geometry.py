@@ -6,6 +6,7 @@ direction u ~ -u; `T_a_b` maps b to a.
 
 from dataclasses import dataclass, fields
 from functools import lru_cache
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ def check_tolerance(tolerance: Any) -> None:
     Raises:
         InputError: not a number in (0, 0.2].
     """
-    if isinstance(tolerance, (str, bytes)) or not 0.0 < tolerance <= LARGEST_TOLERANCE:
+    if not isinstance(tolerance, Real) or not 0.0 < float(tolerance) <= LARGEST_TOLERANCE:
         raise InputError(f"tolerance is {tolerance!r}; expected a fraction of the diagonal in (0, {LARGEST_TOLERANCE}]")
 
 

@@ -13,6 +13,8 @@ Measure = Literal["points", "surface", "solid"]
 Index = NDArray[np.integer[Any]]
 # Views of an object that are told apart.
 CAMERAS = 64
+# Squares of such lengths are still numbers.
+FARTHEST = 1e60
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,8 +118,9 @@ def _measure(measure: str | None, faces: Index | None, source: str) -> str:
 def _numbers(values: ArrayLike, name: str, source: str) -> Array:
     try:
         array = _unmasked(values, name, source)
-        if np.iscomplexobj(array):
-            raise InputError(f"{source}: {name} are complex; expected real numbers")
+        if array.dtype.kind not in "iuf":
+            kind = "complex" if np.iscomplexobj(array) else f"of type {array.dtype}"
+            raise InputError(f"{source}: {name} are not numbers in rows of one length: they are {kind}")
         return array.astype(np.float64)
     except InputError:
         raise
@@ -159,8 +162,8 @@ def _viewpoint(values: ArrayLike, shape: tuple[int, ...], source: str) -> Array:
     array = _numbers(values, "viewpoints", source)
     if array.shape not in (shape, shape[1:]) or shape[1] != 3:
         raise InputError(f"{source}: viewpoint has shape {array.shape}; expected (3,), or {shape}, one for each point")
-    if not np.isfinite(array).all():
-        raise InputError(f"{source}: viewpoints hold NaN or infinity")
+    if not (np.abs(array) <= FARTHEST).all():
+        raise InputError(f"{source}: viewpoints hold NaN, infinity, or more than {FARTHEST:g}")
     places = len(np.unique(array.reshape(-1, 3), axis=0))
     if places > CAMERAS:
         raise InputError(f"{source}: {places} different viewpoints; expected at most {CAMERAS}, one for each view")

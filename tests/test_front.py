@@ -113,6 +113,10 @@ WRONG = {
     "a corner that is no number": ((CORNERS, [[0, 1, 3.9], [0, 3, 2], [4, 6, 7, 5]]), "a corner of a face is 3.9"),
     "vertices in the plane": ((CORNERS[:, :2], TRIANGLES), "vertices have 2 coordinates"),
     "points beyond numbers": (POINTS * 1e200, "coordinates must be finite and at most"),
+    "whether, not where": (POINTS > 1.0, "they are of type bool"),
+    "numbers too large": ([[10**400, 0, 0], [1, 1, 1]], "they are of type object"),
+    "a path of nothing": ("a\0b.ply", "is no name of a file"),
+    "a path too long": ("a" * 5000 + ".ply", "is no name of a file"),
     "no faces": ((CORNERS, np.zeros((0, 3), int)), r"faces have shape \(0, 3\)"),
     "faces of numbers": ((CORNERS, TRIANGLES * 1.0), "of float64; expected whole numbers"),
     "a file that is not there": ("nowhere.ply", "nowhere.ply: no such file"),
@@ -125,6 +129,31 @@ def test_what_is_no_object_is_refused_in_one_line(given, message):
     with pytest.raises(InputError, match=message) as caught:
         symrefine.detect(given)
     assert "\n" not in str(caught.value)
+
+
+def test_pictures_and_tables_are_no_points_by_chance():
+    image = pytest.importorskip("PIL.Image").fromarray(np.zeros((20, 3), np.uint8))
+    with pytest.raises(InputError, match="is a picture; save it"):
+        symrefine.detect(image)
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame(POINTS, columns=["x", "y", "z"])
+    assert symrefine.detect(table).point_group == "D2h"
+    with pytest.raises(InputError, match="has the columns x y z label; give those of the coordinates"):
+        symrefine.detect(table.assign(label=1))
+
+
+def test_an_answer_undetermined_at_its_tolerance_tells_others_truly():
+    fine, plain = (symrefine.detect(POINTS, tolerance=t, ladder=(0.02, 0.04)) for t in (0.0005, 0.02))
+    assert fine.undetermined
+    assert [s.point_group for s in fine.staircase] == [s.point_group for s in plain.staircase] == ["D2h", "D2h"]
+    assert not fine.alternatives
+
+
+def test_operations_cannot_be_written_to(found):
+    operations = found["detection"].operations()
+    with pytest.raises(ValueError, match="read-only"):
+        operations[0] = 0.0
+    assert operations[0].determinants == 1.0
 
 
 def test_what_an_object_brings_is_not_given_twice():

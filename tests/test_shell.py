@@ -113,7 +113,8 @@ def test_the_json_of_several_files_is_an_array(run: Run, folder: Path) -> None:
 def test_what_is_of_one_file_is_refused_for_several(run: Run, folder: Path, option: str) -> None:
     before = sorted(folder.iterdir())
     right = "symrefine batch DIR --bop" if option == "--bop" else "`detect` for each"
-    assert_refused(run("detect", "box.xyz", "row.csv", option, "f.png"), f"{option} f.png: is for one file", right)
+    name = "f.png" if option == "--picture" else "f.html"
+    assert_refused(run("detect", "box.xyz", "row.csv", option, name), f"{option} {name}: is for one file", right)
     assert_refused(run("detect", "box.xyz", "row.csv", "--json", "row.csv"), "same file as the input")
     assert sorted(folder.iterdir()) == before
 
@@ -362,3 +363,19 @@ def test_a_reader_that_leaves_is_no_error(line: str) -> None:
     assert done.returncode == (0 if line.endswith("--help") else 141), "argparse takes no notice"
     signs = re.compile(rb"symrefine: (note: |\w+: [\w ]+, \d+ s)")  # a slow machine is told of what takes long
     assert not [row for row in done.stderr.splitlines() if not signs.match(row)]
+
+
+def test_a_report_does_not_take_the_place_of_an_object() -> None:
+    Path("a.ply").write_text("an object")
+    for option in ("--json", "--report", "--recording", "--bop"):
+        command = [sys.executable, "-m", "symrefine", "detect", option, "a.ply", "box.xyz"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+        assert "has the suffix of an object; expected a name such as" in done.stderr
+    assert Path("a.ply").read_text() == "an object"
+
+
+def test_a_camera_may_stand_at_negative_coordinates() -> None:
+    command = [sys.executable, "-m", "symrefine", "detect", "nowhere.ply", "--viewpoint", "-1,0,0"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
+    assert done.stderr == "symrefine: nowhere.ply: no such file\n"

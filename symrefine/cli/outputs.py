@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 STDOUT = "-"
+# Outputs that are no objects, and what they are called as a rule.
+_REPORTS = {"--json": "x.json", "--report": "x.html", "--recording": "x.rrd", "--bop": "models_info.json"}
 # How much is told: "quiet" are errors alone and what stdout was asked to hold, "verbose" tells stages too.
 Loudness = Literal["quiet", "normal", "verbose"]
 loudness: ContextVar[Loudness] = ContextVar("loudness", default="normal")
@@ -39,6 +41,17 @@ def check_outputs(outputs: dict[str, str | None], inputs: list[Path]) -> None:
             if path.resolve() in taken:
                 raise InputError(f"{option} {name}: is the same file as {taken[path.resolve()]}; name another one")
             taken[path.resolve()] = f"that of {option}"
+        _check_name(option, path)
+
+
+def _check_name(option: str, path: Path) -> None:
+    """Refuse to write a report where an object is likely to be: `--json *.ply` names one."""
+    if option not in _REPORTS:
+        return
+    from symrefine.load import SUFFIXES, suffix_of
+
+    if suffix_of(path) in SUFFIXES:
+        raise InputError(f"{option} {path}: has the suffix of an object; expected a name such as {_REPORTS[option]}")
 
 
 def check_beside(option: str, name: str | None, details: dict[str, object]) -> None:

@@ -64,12 +64,24 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     Raises:
         InputError: unknown commands, options or values.
     """
+    argv = _joined(argv)
     args, rest = grammar().parse_known_args(argv)
     if isinstance(getattr(args, "path", None), list) and not any(word.startswith("-") for word in rest):
         args.path, rest = args.path + rest, []  # argparse takes only files that stand together
     if rest:
         args.parser.unknown(rest[0])
     return args
+
+
+def _joined(argv: Sequence[str]) -> list[str]:
+    """The arguments, places joined to their option: `--viewpoint -1,0,0` would pass for an option of that name."""
+    joined: list[str] = []
+    for word in argv:
+        if joined and joined[-1] == "--viewpoint" and re.match(r"-[0-9.]", word):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
 
 
 def grammar() -> Parser:

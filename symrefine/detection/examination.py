@@ -99,7 +99,9 @@ def _examined(
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed), tolerance)
     with clock("search"):
-        pool = Pool() if doubt(measured, surface, tolerance) else explore(surface, evidence, tolerance)
+        # Where the tolerance asked for is too small to decide anything, the ladder is told from the first that is not.
+        steps = [t for t in sorted({tolerance, *ladder}) if t >= tolerance and not doubt(measured, surface, t)]
+        pool = explore(surface, evidence, steps[0]) if steps else Pool()
         links = chain(surface, pool, BEYOND * max((tolerance, *ladder)))
     return Examined(measured=measured, surface=surface, pool=pool, links=links)
 

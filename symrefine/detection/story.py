@@ -119,11 +119,12 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
     planes = [e for e in chosen.elements if e.operations.kind == "plane"]
     turns = [e for e in chosen.elements if e.operations.kind in ("axis", "improper")]
+    turned_down = [] if reason else _turned_down(found.pool, links, chosen)
     inversion = next((e for e in chosen.elements if e.operations.kind == "inversion"), None)
     return Detection(
         point_group="undetermined" if reason else chosen.group.name,
         confidence=0.0 if reason else decision.probabilities[index],
-        alternatives=tuple(told) if len(links) > 1 else (),
+        alternatives=tuple(told) if len(links) > 1 and not reason else (),
         group=chosen.group,
         center=origin + scale * chosen.placed.center,
         planes=tuple(
@@ -153,7 +154,7 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
         inversion=chosen.group.has_inversion,
         inversion_residual=None if inversion is None else inversion.deviation,
         inversion_confidence=None if inversion is None else sure[id(inversion)],
-        near_misses=tuple(_near_miss(e, origin, scale, tolerance) for e in _turned_down(found.pool, links, chosen)),
+        near_misses=tuple(_near_miss(e, origin, scale, tolerance) for e in turned_down),
         iterations=chosen.iterations,
         tolerance=tolerance,
         diagonal=surface.diagonal * scale,

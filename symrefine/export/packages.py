@@ -30,6 +30,9 @@ class Package:
     files: Mapping[Path, bytes]
     notes: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        return "\n".join([*map(str, self.files), *self.notes])
+
 
 def package_of(
     to: Format,

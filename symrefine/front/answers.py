@@ -34,12 +34,19 @@ class Operations(np.ndarray[Any, np.dtype[np.float64]]):
         found = np.tile(np.eye(dim + 1), (len(matrices), 1, 1))
         found[:, :dim, :dim] = matrices
         found[:, :dim, dim] = center - matrices @ center
-        return found.view(cls)
+        return cls.of(found)
+
+    @classmethod
+    def of(cls, matrices: Array) -> "Operations":
+        """Homogeneous matrices [N, n+1, n+1], which nobody can write to."""
+        found = np.array(matrices, dtype=np.float64).view(cls)
+        found.flags.writeable = False
+        return found
 
     @property
     def determinants(self) -> Array:
         """+1.0 or -1.0 for each [N]."""
-        return np.rint(np.linalg.det(np.asarray(self)[:, :-1, :-1]))
+        return np.asarray(np.rint(np.linalg.det(np.asarray(self)[..., :-1, :-1])))
 
 
 class Answer:

@@ -44,7 +44,7 @@ class Detection(Found, BareDetection):
         from symrefine.export.operations import STEPS, motions
 
         group, center = decided(self, self.shape)
-        return motions(group, center, improper=improper, steps=STEPS if steps is None else steps).view(Operations)
+        return Operations.of(motions(group, center, improper=improper, steps=STEPS if steps is None else steps))
 
     def canonical_transform(self) -> Array:
         """[4, 4] from the input to its canonical pose: the centre at 0, the main axis along z.

@@ -1,6 +1,7 @@
 """What can be asked of any object: `detect`, `align`, `symmetrize`, `complete`, `export`, `report`."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from operator import index
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -202,9 +203,12 @@ def complete(
         InputError: a mesh or atoms, an object without a symmetry, or none that can be decided.
     """
     from symrefine.complete import complete
+    from symrefine.front.space import Detection
 
     shape = shape_of(shape, viewpoint=viewpoint)
-    return complete(shape, found, outliers=outliers, tolerance=tolerance, seed=seed)
+    made = complete(shape, found, outliers=outliers, tolerance=tolerance, seed=seed)
+    options = {"tolerance": tolerance, "seed": seed, "outliers": outliers}
+    return replace(made, detection=found or Detection.of(made.detection, shape=shape, options=options))
 
 
 def export(

@@ -181,7 +181,11 @@ def load(
 
 def _content(file: Path, wanted: Wanted) -> Content:
     suffix = suffix_of(file)
-    if file.is_dir():
+    try:
+        is_folder = file.is_dir()
+    except (OSError, ValueError) as error:
+        raise InputError(f"is no name of a file: {error}") from None
+    if is_folder:
         raise InputError("is a directory; expected a file")
     if suffix not in _FORMATS:
         images = " ".join(sorted(IMAGES))

@@ -78,7 +78,7 @@ def _check_size(points: Any) -> None:
     """Refuse what `load` refuses of a file: numbers so large that areas overflow. What is no array `Shape` refuses."""
     try:
         array = np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return
     if array.ndim == 2 and array.size and np.isfinite(array).all():
         check_finite(Content(points=array))
@@ -121,13 +121,28 @@ def _array(values: Any, name: str) -> Any:
     """
     if np.ma.isMaskedArray(values):
         raise InputError(f"{name}: is a masked array; give the rows that count alone, as an array without a mask")
+    if _offers(values, "getbands") or _offers(values, "flip_vertical"):
+        raise InputError(f"{name}: is a picture; save it, and give the path: its rows would be taken for points")
+    if _offers(values, "columns", "iloc"):
+        values = _frame(values, name)
     if _offers(values, "detach", "cpu"):
-        values = values.detach().cpu().numpy()
+        try:
+            values = values.detach().cpu().numpy()
+        except (TypeError, NotImplementedError, RuntimeError) as error:
+            raise InputError(f"{name}: is no array that numpy can hold: {error}") from None
     elif _offers(values, "cpu", "numpy"):
         values = values.cpu().numpy()
     if not isinstance(values, list | tuple) and np.asarray(values).dtype == object and np.ndim(values) == 0:
         raise InputError(f"{name}: is of type {type(values).__name__}; expected {_EXPECTED}")
     return values
+
+
+def _frame(frame: Any, name: str) -> Any:
+    """The coordinates in a table with titles, if it has nothing besides; any columns where none is called x."""
+    titles = [str(title).lower() for title in frame.columns]
+    if "x" in titles and titles not in (["x", "y"], ["x", "y", "z"]):
+        raise InputError(f"{name}: has the columns {' '.join(titles)}; give those of the coordinates, x y or x y z")
+    return frame.to_numpy()
 
 
 def _points(values: Any) -> Any:
@@ -197,7 +212,7 @@ def _open3d(given: Any) -> Content | None:
         return Content(points=_points(given.vertex.positions), faces=_faces(given.triangle.indices))
     if _offers(given, "vertices", "triangles", "has_triangle_normals"):
         return Content(points=_points(given.vertices), faces=_faces(given.triangles))
-    if _offers(given, "point") and "positions" in given.point:
+    if _offers(getattr(given, "point", None), "positions"):
         normals = _points(given.point.normals) if "normals" in given.point else None
         return Content(points=_points(given.point.positions), normals=normals)
     if _offers(given, "points", "has_normals"):
@@ -209,8 +224,8 @@ def _pyvista(given: Any) -> Content | None:
     """`PolyData`, whose faces stand in one row: the number of corners, then the corners."""
     if not _offers(given, "points", "faces", "n_points", "n_strips"):
         return None
-    if given.n_strips:
-        raise InputError("holds strips of triangles; give `mesh.triangulate()`")
+    if given.n_strips or given.n_lines:
+        raise InputError("holds strips or lines; give `mesh.triangulate()`, or `mesh.points`")
     row, rows, at = np.asarray(given.faces).tolist(), [], 0
     while at < len(row):
         rows.append(row[at + 1 : at + 1 + row[at]])

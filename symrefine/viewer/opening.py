@@ -67,12 +67,14 @@ def serve_recording(path: Path | str, tell: Callable[[str], None]) -> None:
         start_new_session=True,
     ) as server:
         assert server.stdout is not None
+        before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that the server ends with this, too
         try:
             for line in server.stdout:
                 said.append(re.sub(r"\x1b\[[0-9;]*m", "", line))
                 if address := re.search(r"connect at (http://\S+)", said[-1]):
                     tell(address[1])
         finally:
+            signal.signal(signal.SIGTERM, before)
             _end(server)
     raise SymrefineError(f"the server ended: {_reason(''.join(said))}")
 
