@@ -63,9 +63,7 @@ class Shape:
             object.__setattr__(self, "faces", _faces(self.faces, points, self.source))
         for name in ("weights", "normals", "viewpoint"):
             if self.faces is not None and getattr(self, name) is not None:
-                raise InputError(
-                    f"{self.source}: {name} is for clouds; a mesh has faces, which weigh what they measure"
-                )
+                raise InputError(f"{self.source}: {name} is for clouds; a mesh has faces, leave it out")
         if self.labels is not None:
             count, what = (len(points), "point") if self.faces is None else (len(self.faces), "face")
             object.__setattr__(self, "labels", _labels(self.labels, count, what, self.source))

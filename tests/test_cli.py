@@ -225,7 +225,7 @@ def test_the_tolerance_of_the_command_line_is_that_of_detect() -> None:
         ("detect box.ply --bop-scale 1", "--bop-scale: says how to write --bop FILE"),
         ("batch . --bop-scale 1000", "--bop-scale: says how to write --bop FILE"),
         ("detect box.ply --bop -", "only --json writes to stdout"),
-        ("detect box.ply --bop scalene.ply", "no models_info.json"),
+        ("detect box.ply --bop scalene.ply", "has the suffix of an object"),
         ("detect box.ply --json nowhere/a.json", "there is no directory nowhere"),
         ("detect box.ply --json .", "is a directory"),
         ("detect box.ply --json box.ply", "same file as the input"),

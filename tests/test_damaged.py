@@ -282,7 +282,7 @@ def test_what_is_no_viewpoint_is_refused(viewpoint, says):
 
 
 def test_a_mesh_has_no_viewpoint():
-    with pytest.raises(InputError, match="a viewpoint is for clouds"):
+    with pytest.raises(InputError, match="viewpoint is for clouds"):
         replace(BRICK, viewpoint=np.zeros(3))
 
 

@@ -205,7 +205,7 @@ def test_half_of_the_objects_are_held_out_with_their_siblings():
     assert mixes["sparse"] == []
 
 
-@pytest.mark.parametrize("every", [reliability.QUICK_EVERY, 60])
+@pytest.mark.parametrize("every", [reliability.QUICK_EVERY, 50])
 def test_the_plan_goes_through_all_families_and_views(every):
     looks = list(reliability.plan(every, 0))
     assert {c.family for c in looks} >= {"shape", "sibling", "household", "sparse", "blobs"}
