@@ -115,6 +115,15 @@ class Axis:
         object.__setattr__(self, "direction", read_only(unit(self.direction)))
 
 
+def homogeneous(matrices: Array, center: Array) -> Array:
+    """Matrices [N, n+1, n+1] of orthogonal maps [N, n, n] that leave a centre [n] in place."""
+    dim = len(center)
+    found = np.tile(np.eye(dim + 1), (len(matrices), 1, 1))
+    found[:, :dim, :dim] = matrices
+    found[:, :dim, dim] = center - matrices @ center
+    return found
+
+
 def householder(normal: ArrayLike) -> Array:
     """Reflection `I - 2 n n'` [n, n] with determinant -1 across the plane through 0 normal to `normal`."""
     n = np.asarray(normal, dtype=np.float64) / _length(normal, "normal")

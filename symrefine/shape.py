@@ -13,8 +13,8 @@ Measure = Literal["points", "surface", "solid"]
 Index = NDArray[np.integer[Any]]
 # Views of an object that are told apart.
 CAMERAS = 64
-# Squares of such lengths are still numbers.
-FARTHEST = 1e60
+# Squares of areas between such points are still numbers; no unit of length asks for more.
+LARGEST = 1e60
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,8 +160,8 @@ def _viewpoint(values: ArrayLike, shape: tuple[int, ...], source: str) -> Array:
     array = _numbers(values, "viewpoints", source)
     if array.shape not in (shape, shape[1:]) or shape[1] != 3:
         raise InputError(f"{source}: viewpoint has shape {array.shape}; expected (3,), or {shape}, one for each point")
-    if not (np.abs(array) <= FARTHEST).all():
-        raise InputError(f"{source}: viewpoints hold NaN, infinity, or more than {FARTHEST:g}")
+    if not (np.abs(array) <= LARGEST).all():
+        raise InputError(f"{source}: viewpoints hold NaN, infinity, or more than {LARGEST:g}")
     places = len(np.unique(array.reshape(-1, 3), axis=0))
     if places > CAMERAS:
         raise InputError(f"{source}: {places} different viewpoints; expected at most {CAMERAS}, one for each view")

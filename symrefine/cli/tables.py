@@ -9,17 +9,12 @@ from rich.table import Table
 
 from symrefine.errors import one_line
 from symrefine.groups import point_group
-from symrefine.picture.words import TUPLES, evened, kind_name, meaning, taken_out
+from symrefine.picture.words import DOUBLETS, TUPLES, evened, kind_name, meaning, taken_out, turns_name
 
 Record = dict[str, Any]
 
 _RESIDUALS = ("mean", "p95", "max")
 _WORDS = ("kind",)
-_DOUBLETS = {
-    "none": "span the plane: no exact mirror line and no turn",
-    "line": "lie on one line: a mirror line at most",
-    "centre": "all vanish: turns, with or without mirror lines",
-}
 # One of many files; names last, so that none is ever cut or folded, and no row waits for the longest.
 _ROW = "{:<13}  {:>6}  {:>4}  {:>6}  {:>10}  {:>7}  {}"
 ROW_HEAD = _ROW.format("group", "planes", "axes", "p95 %", "confidence", "seconds", "file")
@@ -116,7 +111,7 @@ def _planar_meaning(record: Record) -> str:
     if record["point_group"] in ("C1", "O(2)"):
         return "no symmetry" if record["point_group"] == "C1" else "round"
     lines = _count(len(record["lines"]), "mirror line") if record["lines"] else "no mirror line"
-    return lines + (f", {_turns(rotation['order'])}" if rotation else "")
+    return lines + (f", {turns_name(float(rotation['order']))}" if rotation else "")
 
 
 def otherwise(record: Record) -> str:
@@ -133,7 +128,7 @@ def planar_lines(record: Record) -> Iterator[Table | str]:
     yield f"{record['source']}: {headline(record)}"
     if record["alternatives"]:
         yield f"It may be meant otherwise: {otherwise(record)}."
-    yield f"n-tuples {_DOUBLETS[record['ntuples']['kind']]}"
+    yield f"n-tuples {DOUBLETS[record['ntuples']['kind']]}"
     yield _place(record)
     yield from _apart(*_planar(record))
     if record["ntuples"]["kind"] != "centre":
@@ -149,17 +144,13 @@ def _planar(record: Record) -> Iterator[Table]:
     """Mirror lines with the turns, and near misses, of a detection in the plane."""
     rotation = record["rotation"]
     lines = [((*_mirror(line, record), "mirror"), line) for line in record["lines"]]
-    turns = [(("", "", _turns(rotation["order"])), rotation)] if rotation else []
+    turns = [(("", "", turns_name(float(rotation["order"]))), rotation)] if rotation else []
     yield _elements(("mirror lines: normal", "offset", "kind"), "confidence", lines + turns)
     near = [
-        ((*_mirror(m, record), "mirror") if m["kind"] == "line" else ("", "", _turns(m["order"])), m)
+        ((*_mirror(m, record), "mirror") if m["kind"] == "line" else ("", "", turns_name(float(m["order"]))), m)
         for m in record["near_misses"]
     ]
     yield _elements(("near misses: normal", "offset", "kind"), "x limit", near)
-
-
-def _turns(order: int | str) -> str:
-    return "all turns" if order == "inf" else f"turns of order {order}"
 
 
 def _ratios(record: Record) -> Table:

@@ -4,7 +4,7 @@ import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.export.models import npz_bytes
-from symrefine.geometry import Array
+from symrefine.geometry import Array, homogeneous
 from symrefine.groups import PointGroup
 
 # Turns that stand for a continuous axis: every five degrees, as FoundationPose samples one.
@@ -22,11 +22,7 @@ def motions(group: PointGroup, center: Array, *, improper: bool = False, steps: 
     if steps < 1:
         raise InputError(f"steps is {steps}; expected at least 1 turn for a continuous axis")
     kept = group if improper else group.proper_subgroup()
-    matrices = (kept if kept.is_finite else kept.sampled(steps)).operations()
-    found = np.tile(np.eye(4), (len(matrices), 1, 1))
-    found[:, :3, :3] = matrices
-    found[:, :3, 3] = center - matrices @ center
-    return found
+    return homogeneous((kept if kept.is_finite else kept.sampled(steps)).operations(), center)
 
 
 def motions_limits(group: PointGroup, *, improper: bool, steps: int) -> list[str]:

@@ -25,11 +25,10 @@ class Alignment(Answer, BareAlignment):
     target: Shape
     options: Options
 
-    def to_dict(self, *, options: Options | None = None, load_s: float | None = None) -> dict[str, Any]:
-        """The report of `symrefine align --json`."""
+    def _record(self, options: Options, load_s: float | None) -> dict[str, Any]:
         from symrefine.export.records import alignment_record
 
-        return alignment_record(self, self.source, self.target, options=options or self.options, load_s=load_s)
+        return alignment_record(self, self.source, self.target, options=options, load_s=load_s)
 
     def __repr__(self) -> str:
         return "\n".join(lines.alignment_summary(self, self.source, self.target))

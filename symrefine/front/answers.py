@@ -11,7 +11,7 @@ import numpy as np
 from symrefine.errors import InputError
 from symrefine.files import check_target, json_text, whole
 from symrefine.front import lines
-from symrefine.geometry import Array
+from symrefine.geometry import Array, homogeneous
 from symrefine.shape import Shape
 
 if TYPE_CHECKING:
@@ -30,11 +30,7 @@ class Operations(np.ndarray[Any, np.dtype[np.float64]]):
     @classmethod
     def about(cls, matrices: Array, center: Array) -> "Operations":
         """Operations [N, n, n] about a centre [n]."""
-        dim = len(center)
-        found = np.tile(np.eye(dim + 1), (len(matrices), 1, 1))
-        found[:, :dim, :dim] = matrices
-        found[:, :dim, dim] = center - matrices @ center
-        return cls.of(found)
+        return cls.of(homogeneous(matrices, center))
 
     @classmethod
     def of(cls, matrices: Array) -> "Operations":
@@ -53,6 +49,7 @@ class Answer:
     """What every result can do, whatever it is about."""
 
     __slots__ = ()
+    options: Options
 
     @classmethod
     def of(cls, found: Any, **given: Any) -> Self:
@@ -66,6 +63,9 @@ class Answer:
             options: told instead of those that the answer was asked with.
             load_s: seconds that reading took.
         """
+        return self._record(options or self.options, load_s)
+
+    def _record(self, options: Options, load_s: float | None) -> dict[str, Any]:
         raise NotImplementedError
 
     def to_json(self) -> str:

@@ -26,11 +26,10 @@ class SubspaceDetection(Found, BareSubspaceDetection):
     shape: Shape
     options: Options
 
-    def to_dict(self, *, options: Options | None = None, load_s: float | None = None) -> dict[str, Any]:
-        """The report of `symrefine detect --json` for points of 4 to 8 coordinates."""
+    def _record(self, options: Options, load_s: float | None) -> dict[str, Any]:
         from symrefine.export.records import subspace_record
 
-        return subspace_record(self, self.shape, options=options or self.options, load_s=load_s)
+        return subspace_record(self, self.shape, options=options, load_s=load_s)
 
     def operations(self) -> Operations:
         """The identity and the reflections that are listed [N, n+1, n+1]; they generate the rest.

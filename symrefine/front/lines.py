@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from symrefine.picture.words import percent, symbol
+from symrefine.picture.words import order_name, percent, symbol
 from symrefine.shape import Shape
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def _turns(record: Record) -> str:
 
 
 def _order(axis: Record) -> str:
-    return ("S" if axis.get("improper") else "C") + ("∞" if axis["order"] == "inf" else str(axis["order"]))
+    return order_name(float(axis["order"]), bool(axis.get("improper")))
 
 
 def _otherwise(record: Record) -> str:

@@ -23,11 +23,10 @@ class PlanarDetection(Found, BarePlanarDetection):
     shape: Shape
     options: Options
 
-    def to_dict(self, *, options: Options | None = None, load_s: float | None = None) -> dict[str, Any]:
-        """The report of `symrefine detect --json` for a picture or points in the plane."""
+    def _record(self, options: Options, load_s: float | None) -> dict[str, Any]:
         from symrefine.export.records import planar_record
 
-        return planar_record(self, self.shape, options=options or self.options, load_s=load_s)
+        return planar_record(self, self.shape, options=options, load_s=load_s)
 
     def operations(self) -> Operations:
         """Operations of the group [N, 3, 3] in the units of the input.

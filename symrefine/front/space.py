@@ -24,11 +24,10 @@ class Detection(Found, BareDetection):
     shape: Shape
     options: Options
 
-    def to_dict(self, *, options: Options | None = None, load_s: float | None = None) -> dict[str, Any]:
-        """The report of `symrefine detect --json`."""
+    def _record(self, options: Options, load_s: float | None) -> dict[str, Any]:
         from symrefine.export.records import detection_record
 
-        return detection_record(self, self.shape, options=options or self.options, load_s=load_s)
+        return detection_record(self, self.shape, options=options, load_s=load_s)
 
     def operations(self, *, improper: bool = True, steps: int | None = None) -> Operations:
         """Operations of the group [N, 4, 4] in the units and the frame of the input, determinants with them.

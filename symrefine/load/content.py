@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
-from symrefine.shape import Index
+from symrefine.shape import LARGEST, Index
 
 # Values of any kind, one for each point or face: numbers, texts, or the three of a colour.
 Values = NDArray[Any]
 
-# Squares of areas of such triangles are still numbers; no unit of length asks for more.
-LARGEST = 1e60
 # Squares of areas of smaller triangles are 0.
 SMALLEST = 1e-60
 

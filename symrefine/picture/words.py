@@ -45,6 +45,12 @@ TUPLES = {
     "axis": "lie on one line, within their noise: where to look first",
     "vanish": "all vanish, within their noise: every direction is looked at",
 }
+# What the rank of the doublets allows in the plane.
+DOUBLETS = {
+    "none": "span the plane: no exact mirror line and no turn",
+    "line": "lie on one line: a mirror line at most",
+    "centre": "all vanish: turns, with or without mirror lines",
+}
 _KINDS = {"plane": "mirror plane", "axis": "rotation", "improper": "rotoreflection", "inversion": "inversion"}
 
 

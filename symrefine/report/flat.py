@@ -12,6 +12,7 @@ from symrefine.geometry import Array, Isometry, Plane, toward_positive
 from symrefine.picture.flat import FlatScene, Stroke, flat_scene, placed_cells, shares
 from symrefine.picture.palette import AXIS, MISS, plane_colour
 from symrefine.picture.words import (
+    DOUBLETS,
     coordinates,
     count,
     direction,
@@ -33,11 +34,6 @@ from symrefine.surface.misses import LIMITS, Deviation
 
 # Half the side of the drawing in its own units.
 HALF = 500.0
-_DOUBLETS = {
-    "none": "span the plane: no exact mirror line and no turn",
-    "line": "lie on one line: a mirror line at most",
-    "centre": "all vanish: turns, with or without mirror lines",
-}
 
 
 def page(detection: PlanarDetection, shape: Shape) -> Page:
@@ -267,6 +263,6 @@ def _doublets(d: PlanarDetection) -> str:
         )
         for v in d.doublets.vectors
     ]
-    told = f"Vectors made of moments (doublets) turn with the shape. Here they {_DOUBLETS[d.doublets.kind]}."
+    told = f"Vectors made of moments (doublets) turn with the shape. Here they {DOUBLETS[d.doublets.kind]}."
     heads = ("orders", "σ₁", "σ₂", "ratio")
     return section("What the moments said first", told, table(heads, rows, caption="Singular values of the doublets"))

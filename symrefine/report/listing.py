@@ -126,7 +126,7 @@ def _row(row: Row) -> str:
         f"{row.score:.2f}",
         copy_button(row.index, row.name) if row.copies else "",
     )
-    return f'<tr data-row="{row.index}">' + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+    return "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
 
 
 def _name(row: Row) -> str:

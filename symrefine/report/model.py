@@ -62,7 +62,6 @@ def model(detection: Detection, shape: Shape, scene: Scene, elements: Sequence[E
         "frame": np.round(scene.stage.frame, 9).tolist(),
         "outline": _outline(scene),
         "view": np.round(scene.stage.frame @ back / np.linalg.norm(back), 6).tolist(),
-        "middle": np.round(camera.target / detection.diagonal, 6).tolist(),
         "limit": DEEPEST * detection.tolerance,
         "steps": MISSES,
         "unseen": UNSEEN,
