@@ -12,7 +12,7 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array, Isometry
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
-from symrefine.surface.neighbourhoods import kd_tree
+from symrefine.surface.tree import Tree
 
 # Turns that stand for those of a surface of revolution.
 ROUND = 36
@@ -93,12 +93,12 @@ def verdicts(found: Detection, points: Array) -> Verdicts:
     motions = [Isometry.about(center, m) for m in every if not np.allclose(m, np.eye(3))]
     misses = surface.misses(motions)
     unseen = np.isnan(surface.seen(misses, motions))
-    owner = surface.cloud.tree.query(local)[1] if surface.cloud.labels is None else np.arange(len(local))
+    owner = surface.cloud.tree.nearest(local)[1] if surface.cloud.labels is None else np.arange(len(local))
     images: Array = np.empty((0, 3))
     for motion, hidden in zip(motions, unseen, strict=True):
         new = motion.apply(local[hidden[owner]])
         if len(images) and len(new):  # where another image lies already, one is enough
-            new = new[kd_tree(images).query(new)[0] > 2.0 * surface.cloud.spacing]
+            new = new[Tree(images).nearest(new)[0] > 2.0 * surface.cloud.spacing]
         images = np.concatenate([images, new])
     against = np.asarray((~unseen & (misses > surface.far)).any(axis=0))
     return Verdicts(contradicted=against[owner], inferred=found.origin + found.scale * images)

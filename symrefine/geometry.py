@@ -152,8 +152,8 @@ def frame_with_z(direction: ArrayLike) -> Array:
     """Right-handed orthonormal rows (p0, p1, u) with u along `direction`; p0 and p1 span the plane normal to it."""
     u = np.asarray(direction, dtype=np.float64) / _length(direction, "direction")
     helper = np.eye(3)[int(np.argmin(np.abs(u)))]
-    p0 = unit(np.cross(helper, u))
-    return np.stack([p0, np.cross(u, p0), u])
+    p0 = unit(cross_matrix(helper) @ u)
+    return np.stack([p0, cross_matrix(u) @ p0, u])
 
 
 def random_orthogonal(rng: np.random.Generator, dim: int = 3, det: int = 1) -> Array:

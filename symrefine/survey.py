@@ -13,8 +13,9 @@ from symrefine.lengths import heavy, object_diagonal
 from symrefine.moments.moments import shape_moments
 from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.shape import Index, Shape
-from symrefine.surface.neighbourhoods import connected_parts, fills_volume, kd_tree
+from symrefine.surface.neighbourhoods import connected_parts, fills_volume
 from symrefine.surface.sampling import count_parts, sampling
+from symrefine.surface.tree import Tree
 
 # Points below which the answer for a cloud is often `undetermined` (see README, boundary cases).
 SPARSE = 2000
@@ -178,7 +179,7 @@ def _cloud(points: Array) -> Cloud:
         clumps=tuple(len(clump) for clump in found.clumps),
         parts=count_parts(kept, np.random.default_rng(0)),
         even=found.shares is None,
-        volume=fills_volume(kept, kd_tree(kept), np.random.default_rng(0)),
+        volume=fills_volume(kept, Tree(kept), np.random.default_rng(0)),
     )
 
 

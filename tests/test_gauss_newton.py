@@ -133,7 +133,7 @@ def test_the_start_is_not_touched_and_the_solution_is_read_only():
 
 
 def many(residual, jacobian):
-    def linearise(x):
+    def linearise(x, _):
         r, J = (np.array([f(row) for row in x]) for f in (residual, jacobian))
         return Linearisations(
             costs=(r**2).sum(axis=1), gradients=np.einsum("kri,kr->ki", J, r), hessians=J.transpose(0, 2, 1) @ J

@@ -1,10 +1,12 @@
 """Local planes against the surfaces they stand for, and correspondences against brute force."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 from scipy.stats import norm
 
 from experiments.objects.shapes import bottle, box, join, mug, sample, table
@@ -21,6 +23,7 @@ from symrefine.surface.neighbourhoods import (
     smallest_eigenvectors,
 )
 from symrefine.surface.skin import isolated_points, local_planes
+from symrefine.surface.tree import Tree, side_by_side
 
 BOX = join([box((0, 0, 0), (1, 0.7, 0.4))])
 
@@ -55,10 +58,10 @@ def test_planes_of_neighbourhoods_are_those_of_their_points(size):
     flat = rng.uniform(-1, 1, (8000, 3)) * [1.0, 1.0, 0.0]
     points = flat + 0.02 * rng.standard_normal(flat.shape)
     queries = points[np.abs(points[:, :2]).max(axis=1) < 0.7][:200]
-    tree = cKDTree(points)
+    tree = Tree(points)
     sums = Neighbourhoods.of(points, tree, size).around(queries)
     mean, normals, values = fit_planes(sums)
-    near = points[tree.query(queries, k=size)[1]]
+    near = points[tree.query(queries, size)[1]]
     own = near.mean(axis=1)
     if size == CELLS:
         np.testing.assert_allclose(mean, own, atol=1e-12)
@@ -72,14 +75,26 @@ def test_planes_of_neighbourhoods_are_those_of_their_points(size):
     np.testing.assert_allclose(given[2][:, 0], sums[:, 4] / sums[:, 0] - mean[:, 0] ** 2, atol=1e-12)
 
 
-def test_smallest_eigenvectors():
-    a = np.random.default_rng(1).standard_normal((50, 3, 3))
-    matrices = a @ a.transpose(0, 2, 1)
+@pytest.mark.parametrize(
+    "widths",
+    [(0.3, 0.7, 1.0), (1e-9, 0.8, 1.0), (0.0, 1.0, 1.0), (1e-3, 1e-3, 1.0), (0.0, 0.0, 1.0), (1.0,) * 3, (0.0,) * 3],
+    ids=["general", "flat", "plane", "wire", "line", "ball", "point"],
+)
+@pytest.mark.parametrize("scale", [1e-12, 1.0, 1e12])
+def test_smallest_eigenvectors(widths, scale):
+    """Against `eigh`, in general and where values are the same; vectors that are not unique have to be some of them."""
+    rng = np.random.default_rng(1)
+    frames = np.stack([np.eye(3), *(random_orthogonal(rng) for _ in range(50))])
+    matrices = scale**2 * np.einsum("nai,a,naj->nij", frames, np.square(widths), frames)
     values, vectors = smallest_eigenvectors(matrices)
-    assert np.all(np.diff(values, axis=1) >= 0)
-    np.testing.assert_allclose(
-        np.einsum("nij,nj->ni", matrices, vectors), values[:, :1] * vectors, atol=1e-12 * np.abs(matrices).max()
-    )
+    largest = max(float(np.square(scale * np.array(widths)).max()), 1e-300)
+    np.testing.assert_allclose(values, np.clip(np.linalg.eigvalsh(matrices), 0.0, None), atol=1e-8 * largest)
+    np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), 1.0, rtol=1e-12)
+    rest = np.einsum("nij,nj->ni", matrices, vectors) - values[:, :1] * vectors
+    assert np.abs(rest).max() <= 1e-8 * largest
+    if widths[0] < 0.9 * widths[1]:  # one value that stands alone is known to rounding
+        np.testing.assert_allclose(values[:, 0], (scale * widths[0]) ** 2, atol=1e-14 * largest)
+        assert np.abs(np.abs(np.einsum("ni,ni->n", vectors, frames[:, 0])) - 1.0).max() < 1e-12
 
 
 def test_planes_of_a_noisy_sheet_lie_in_it():
@@ -128,7 +143,7 @@ def test_neighbourhoods_grow_with_the_noise(shape):
     sizes = []
     for noise in (0.0, 0.005, 0.02):
         points = cloud_of(shape, 8000, noise, 6)
-        sizes.append(choose_neighbours(points, cKDTree(points), np.random.default_rng(6)))
+        sizes.append(choose_neighbours(points, Tree(points), np.random.default_rng(6)))
     assert sizes[0] == 12
     assert sizes[1] >= 24
     assert sizes[2] >= 48
@@ -137,7 +152,7 @@ def test_neighbourhoods_grow_with_the_noise(shape):
 def test_neighbourhoods_do_not_depend_on_the_pose():
     points = cloud_of(table(), 8000, 0.005, 7)
     turned = points @ random_orthogonal(np.random.default_rng(7), 3, -1).T
-    a, b = (choose_neighbours(p, cKDTree(p), np.random.default_rng(8)) for p in (points, turned))
+    a, b = (choose_neighbours(p, Tree(p), np.random.default_rng(8)) for p in (points, turned))
     assert a == b
 
 
@@ -345,7 +360,7 @@ def test_the_smallest_neighbourhood_that_looks_like_a_plane_is_large_enough():
     """Larger ones would look flatter still, under noise of a tenth of the spacing."""
     rng = np.random.default_rng(22)
     points = sheet(rng, 6000, 0.0025)
-    assert choose_neighbours(points, cKDTree(points), rng) == 12
+    assert choose_neighbours(points, Tree(points), rng) == 12
 
 
 def test_given_normals_say_across_what_the_thickness_is():
@@ -385,7 +400,7 @@ def test_points_of_a_volume_are_told_from_those_of_a_surface(make, filled):
     """Under noise of a spacing and more only wide neighbourhoods tell."""
     for seed in (1, 2):
         points = normalised(make(np.random.default_rng(seed)))
-        assert fills_volume(points, cKDTree(points), np.random.default_rng(seed)) == filled
+        assert fills_volume(points, Tree(points), np.random.default_rng(seed)) == filled
 
 
 # Classes and weights
@@ -433,7 +448,60 @@ def test_the_robust_scale_is_three_standard_deviations_of_gaussian_noise():
 def test_cells_of_points_that_coincide_are_counted_once():
     """Of a cloud where each point stands three times, some cells are empty; no point is lost or counted twice."""
     points = np.repeat(np.random.default_rng(3).standard_normal((700, 3)), 3, axis=0)
-    found = Neighbourhoods.of(points, cKDTree(points), 4 * CELLS)
+    found = Neighbourhoods.of(points, Tree(points), 4 * CELLS)
     assert len(found.sums) == len(points) // 4
     np.testing.assert_allclose(found.sums.sum(axis=0)[:4], [len(points), *points.sum(axis=0)], atol=1e-9)
     assert (found.sums[:, 0] == 0).any()
+
+
+# Nearest neighbours
+
+
+@pytest.mark.parametrize("dim", [1, 3, 4])
+@pytest.mark.parametrize("count", [3, 400])
+def test_neighbours_are_those_of_brute_force(dim, count):
+    rng = np.random.default_rng(5)
+    points, queries = rng.standard_normal((count, dim)), rng.standard_normal((60, dim))
+    away = np.sort(np.linalg.norm(queries[:, None] - points, axis=2), axis=1)
+    distance, near = Tree(points).query(queries, 2, skip=1)
+    np.testing.assert_allclose(distance, away[:, 1:3])
+    np.testing.assert_allclose(np.linalg.norm(queries[:, None] - points[near], axis=2), distance)
+    first, index = Tree(points).nearest(queries)
+    np.testing.assert_allclose(first, away[:, 0])
+    np.testing.assert_allclose(np.linalg.norm(queries - points[index], axis=1), first)
+
+
+def test_neighbours_that_there_are_not_are_infinitely_far():
+    points = np.random.default_rng(6).standard_normal((5, 3))
+    distance, near = Tree(points).query(points[:2], 4, skip=3)
+    assert np.isfinite(distance[:, :2]).all()
+    assert np.isinf(distance[:, 2:]).all()
+    assert (near[:, 2:] == len(points)).all()
+    distance, near = Tree(points).query(points, 2, bound=1e-9)
+    assert (distance[:, 0] == 0.0).all()
+    assert np.isinf(distance[:, 1]).all()
+    np.testing.assert_array_equal(near, [[k, len(points)] for k in range(5)])
+    assert Tree(points).nearest(np.empty((0, 3)))[0].shape == (0,)
+
+
+def test_points_side_by_side_are_near_one_another():
+    points = np.random.default_rng(7).random((4000, 3))
+    order = side_by_side(points)
+    np.testing.assert_array_equal(np.sort(order), np.arange(4000))
+    steps = [np.linalg.norm(np.diff(points[o], axis=0), axis=1).mean() for o in (order, slice(None))]
+    assert steps[0] < 0.3 * steps[1]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are not forked here")
+def test_processes_forked_afterwards_find_neighbours_too():
+    """GNU's OpenMP would hang there, had it made threads before."""
+    script = """
+import multiprocessing, numpy as np
+from symrefine.surface.tree import Tree
+points = np.random.default_rng(0).random((20000, 3))
+def total(_): return float(Tree(points).query(points, 4)[0].sum())
+with multiprocessing.get_context("fork").Pool(2) as pool:
+    assert set(pool.map_async(total, [total(0), 1, 2]).get(30)) == {total(0)}
+"""
+    environment = {k: v for k, v in os.environ.items() if k != "OMP_NUM_THREADS"} | {"PYTHONWARNINGS": "ignore"}
+    subprocess.run([sys.executable, "-c", script], check=True, timeout=60, env=environment)

@@ -15,7 +15,7 @@ from symrefine.fit.residual import (
     gram,
     observable_motions,
     residual_function,
-    theta_model,
+    theta_models,
     turn_frame,
 )
 from symrefine.geometry import Isometry, Plane, householder, random_orthogonal, rotation, rotoreflection, unit
@@ -141,8 +141,8 @@ def test_results_belong_to_their_caller():
     assert not np.shares_memory(first.hessian, second.hessian)
 
     small = [np.diag([1.0, 2, 3]), np.diag([5.0, 1, 1])]
-    thetas = [theta_model(g, np.array([0.3])) for g in small]
-    assert thetas[0].hessian[0, 0] != thetas[1].hessian[0, 0]
+    thetas = theta_models(np.array(small), np.full((2, 1), 0.3))
+    assert thetas.hessians[0, 0, 0] != thetas.hessians[1, 0, 0]
     bases = [observable_motions(s, frame, center) for s in (OPERATIONS["mirror"], OPERATIONS["turns"])]
     assert bases[0].shape != bases[1].shape
 
@@ -235,7 +235,7 @@ def axis_planes(frame, point, theta):
 
 
 @pytest.mark.parametrize("theta", [0.0, 1e-7, 0.4, -2.0, np.pi / 2, 3.0])
-def test_theta_model_is_the_cost_of_the_plane_at_that_angle(theta):
+def test_the_theta_model_is_the_cost_of_the_plane_at_that_angle(theta):
     frame, point, rng = placed(8)
     x, y, n, w = pairs(rng)
     big = gram(design_rows(x, y, n), w)
@@ -247,12 +247,13 @@ def test_theta_model_is_the_cost_of_the_plane_at_that_angle(theta):
         return np.sqrt(w) * np.einsum("ij,ij->i", plane.reflect(x) - y, n)
 
     at = np.array([theta])
-    found, J = theta_model(small, at), jacobian(residuals, at)
+    beside = theta_models(np.stack([np.eye(3), small]), np.array([[0.7], at]))  # planes side by side do not mix
+    found, J = [v[1] for v in (beside.costs, beside.gradients, beside.hessians)], jacobian(residuals, at)
     phi = coordinates(Isometry.reflection(axis_planes(frame, point, theta)))
-    assert found.cost == pytest.approx(phi @ big @ phi, rel=1e-10)
-    assert found.cost == pytest.approx(np.sum(residuals(at) ** 2), rel=1e-10)
-    np.testing.assert_allclose(found.gradient, J.T @ residuals(at), rtol=1e-6, atol=1e-6)
-    np.testing.assert_allclose(found.hessian, J.T @ J, rtol=1e-6, atol=1e-6)
+    assert found[0] == pytest.approx(phi @ big @ phi, rel=1e-10)
+    assert found[0] == pytest.approx(np.sum(residuals(at) ** 2), rel=1e-10)
+    np.testing.assert_allclose(found[1], J.T @ residuals(at), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(found[2], J.T @ J, rtol=1e-6, atol=1e-6)
 
 
 def test_the_axis_gram_does_not_depend_on_the_point_along_the_axis():

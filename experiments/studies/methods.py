@@ -7,7 +7,6 @@ sampled ("true", which a scanner does not have) or estimated ones. trimesh gets 
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -18,10 +17,9 @@ from experiments.peers.trimesh_inertia import trimesh_symmetry
 from symrefine.detection.measure import ORDER, PARTS, PLANES, gather, measure
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError
-from symrefine.fit.gauss_newton import minimise
 from symrefine.fit.matching import match, pair_equations
-from symrefine.fit.refine import MAX_OUTER, SETTLED, refine, single_plane
-from symrefine.fit.residual import axis_gram, design_rows, gram, theta_model
+from symrefine.fit.refine import MAX_OUTER, SETTLED, closest_planes, refine, single_plane
+from symrefine.fit.residual import axis_gram, design_rows, gram
 from symrefine.geometry import Array, Isometry, Plane
 from symrefine.groups import from_elements
 from symrefine.moments.moments import shape_moments
@@ -167,16 +165,15 @@ def _thetas(cloud: LocalPlanes, frame: Array, theta: Array) -> Iterator[Array]:
     step = np.inf
     yield theta
     for _ in range(MAX_OUTER):
-        turned = []
-        for angle, normal in zip(theta, _about_third(theta) @ frame, strict=True):
+        grams = []
+        for normal in _about_third(theta) @ frame:
             pairs = match(
                 cloud, Isometry.reflection(Plane(normal=normal, offset=0.0)), min(START_ERROR_RAD, 4.0 * step)
             )
             sources, targets, directions, weights = pair_equations(cloud, pairs)
-            small = axis_gram(gram(design_rows(sources, targets, directions), weights), frame, np.zeros(3))
-            turned.append(float(minimise(partial(theta_model, small), np.array([angle])).x[0]))
-        step = float(np.abs(np.array(turned) - theta).max())
-        theta = np.array(turned)
+            grams.append(axis_gram(gram(design_rows(sources, targets, directions), weights), frame, np.zeros(3)))
+        turned = closest_planes(np.stack(grams), theta)
+        step, theta = float(np.abs(turned - theta).max()), turned
         yield theta
         if step < SETTLED:
             return

@@ -19,6 +19,7 @@ from symrefine.geometry import Array, orthogonal_factor
 from symrefine.moments.action import FLOOR, Action, turned_by
 from symrefine.moments.moments import deviations
 from symrefine.ntuples.rank import SIGNIFICANT
+from symrefine.shape import Index
 
 # Longest step (radians): less than half a period of order 8, the finest that moments see. Maps nearer than this
 # (Frobenius norm) are one.
@@ -78,7 +79,7 @@ def fit(pair: MomentPair, starts: Array) -> Fits:
     """Gauss-Newton from each start [K, n, n]; the determinants stay."""
     root = np.sqrt(pair.weights)
 
-    def linearise(matrices: Array) -> Linearisations:
+    def linearise(matrices: Array, _: Index) -> Linearisations:
         here = pair.moved(matrices)
         r, j = root * (here - pair.target[0]), root * pair.action.tangents(here)
         return Linearisations(

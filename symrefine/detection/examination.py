@@ -14,8 +14,8 @@ from symrefine.detection.measure import Measured, Outliers, doubt, gather, measu
 from symrefine.geometry import Array, check_tolerance
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE, disc_distances
-from symrefine.surface.neighbourhoods import kd_tree
 from symrefine.surface.surface import Surface
+from symrefine.surface.tree import Tree
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -114,10 +114,10 @@ def _belongs(found: Examined, clump: Array, tolerance: float) -> bool:
     """
     surface, moments = found.surface, found.measured.moments
     points, margin = (clump - moments.center) / moments.scale, surface.far * surface.diagonal
-    own, carried = kd_tree(points), []
+    own, carried = Tree(points), []
     for element in found.links[found.decided(tolerance).index].elements:
         moved = np.concatenate([m.apply(points) for m in element.operations.motions(element.center)])
-        off = (disc_distances(surface.cloud, moved) > margin) & (own.query(moved)[0] > margin)
+        off = (disc_distances(surface.cloud, moved) > margin) & (own.nearest(moved)[0] > margin)
         for camera in () if surface.openings is None else surface.openings.cameras:
             off &= camera.sees_through(moved, margin)
         carried.append(off.mean() < 0.5)

@@ -17,11 +17,12 @@ from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
 from symrefine.surface.cameras import Camera, cameras
 from symrefine.surface.misses import TOLERANCE, noise_distances
-from symrefine.surface.neighbourhoods import fills_volume, kd_tree
-from symrefine.surface.openings import openings
+from symrefine.surface.neighbourhoods import fills_volume
+from symrefine.surface.openings import NEIGHBOURS, openings
 from symrefine.surface.sampling import sampling
 from symrefine.surface.skin import FEW, LocalPlanes, Skin, drawn, isolated_points, make_skin
 from symrefine.surface.surface import Surface
+from symrefine.surface.tree import Tree, side_by_side
 
 Outliers = Literal["auto", "none"]
 # Order of the moments, and parts of their jackknife.
@@ -237,7 +238,7 @@ def _surface(
     rng: np.random.Generator,
 ) -> Surface:
     """Local planes (points, where they fill a volume) with what noise alone shows."""
-    tree = None if exact else kd_tree(local)
+    tree = None if exact else Tree(local)
     if tree is not None and normals is None and fills_volume(local, tree, np.random.default_rng(0)):
         return _volume(local, labels, rng)
     uneven = None if exact or np.ptp(weights) == 0.0 else weights
@@ -252,14 +253,16 @@ def _surface(
 
     pick = drawn(len(local), SAMPLES if exact else PLANES, rng, uneven)
     # Neighbours stand together in memory, and any stride takes an even part of the surface.
-    cloud = whole.local_planes(pick[kd_tree(local[pick]).indices], labels)
+    pick = pick[side_by_side(local[pick])]
+    near = whole.near(pick, NEIGHBOURS) if len(local) >= NEIGHBOURS else None
+    cloud = whole.local_planes(pick, labels, near)
     diagonal = tight_diagonal(cloud.points)
     noise = noise_distances(len(local), half, rng)
     surface = Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, tolerance=tolerance)
     # Where noise alone needs all that is allowed, nobody sees what is open.
-    if exact or (surface.floor >= tolerance and not views):
+    if tree is None or (surface.floor >= tolerance and not views):
         return surface
-    return replace(surface, openings=openings(cloud, local, tree, views))
+    return replace(surface, openings=openings(cloud, local, tree, views, near))
 
 
 def _cameras(scan: Shape, moments: Moments) -> tuple[Camera, ...]:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.geometry import Array, ReadOnly
+from symrefine.shape import Index
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,7 +70,7 @@ def minimise(
         longest: steps are cut to this length.
     """
 
-    def alone(x: Array) -> Linearisations:
+    def alone(x: Array, _: Index) -> Linearisations:
         here = linearise(x[0])
         return Linearisations(costs=np.array([here.cost]), gradients=here.gradient[None], hessians=here.hessian[None])
 
@@ -91,7 +92,7 @@ def minimise(
 
 
 def minimise_all(
-    linearise: Callable[[Array], Linearisations],
+    linearise: Callable[[Array, Index], Linearisations],
     starts: Array,
     *,
     move: Callable[[Array, Array], Array] = np.add,
@@ -102,14 +103,14 @@ def minimise_all(
     """`minimise` from K starts [K, ...] at once; each ends where it would alone.
 
     Args:
-        linearise: at x [K, ...].
+        linearise: at x [A, ...] of those [A] of the starts that have not converged.
         starts: [K, ...].
         move: x [K, ...] after steps [K, n].
         max_steps: evaluations after the first.
         tolerance: a start has converged once its step is shorter than this.
         longest: steps are cut to this length.
     """
-    x, first = np.array(starts, dtype=np.float64), linearise(starts)
+    x, first = np.array(starts, dtype=np.float64), linearise(starts, np.arange(len(starts)))
     costs, gradients, hessians = first.costs.copy(), first.gradients.copy(), first.hessians.copy()
     damping, steps = np.zeros(len(x)), np.zeros(len(x), dtype=np.intp)
     converged = np.diagonal(hessians, axis1=1, axis2=2).max(axis=1, initial=0.0) <= 0.0
@@ -121,7 +122,7 @@ def minimise_all(
         length = np.linalg.norm(step, axis=1)
         step *= np.minimum(1.0, longest / np.maximum(length, 1e-300))[:, None]
         trial = move(x[active], step)
-        there = linearise(trial)
+        there = linearise(trial, active)
         better = there.costs <= costs[active]
         taken = active[better]
         x[taken], costs[taken] = trial[better], there.costs[better]

@@ -43,7 +43,7 @@ def match(
     source = np.arange(0, len(cloud.points), stride)
     moved = motion.apply(cloud.points[source])
     reach = _reach(cloud.spacing, uncertainty)
-    distance, target = cloud.nearest(moved, cloud.classes(source), distance_upper_bound=reach)
+    distance, target = cloud.nearest(moved, cloud.classes(source), bound=reach)
     keep = np.isfinite(distance)
     if not cloud.isolated:
         travel = np.linalg.norm(moved - cloud.points[source], axis=1)

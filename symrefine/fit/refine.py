@@ -6,11 +6,10 @@ unknowns, a lone plane three, a full group up to six. Everything is in normalise
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
-from symrefine.fit.gauss_newton import Linearisation, Solution, minimise
+from symrefine.fit.gauss_newton import Linearisation, Solution, minimise, minimise_all
 from symrefine.fit.matching import ROBUST, Pairs, match, pair_equations
 from symrefine.fit.residual import (
     axis_gram,
@@ -18,7 +17,7 @@ from symrefine.fit.residual import (
     frame_model,
     gram,
     observable_motions,
-    theta_model,
+    theta_models,
     turn_frame,
 )
 from symrefine.geometry import Array, Isometry, Plane, ReadOnly, frame_with_z, householder
@@ -135,6 +134,7 @@ def refine(
     """
     state, step = start, np.inf
     last: Array = np.zeros(6)
+    basis = observable_motions(start.standard, start.frame, start.center)
     yield Iterate(
         index=0, state=state, theta_rad=np.zeros(0), step=np.inf, covariance=np.zeros((6, 6)), cost=np.nan, inliers=0,
         pairs=(), inner_steps=0, converged=False,
@@ -144,7 +144,7 @@ def refine(
         pairs = tuple(match(cloud, motion, uncertainty, stride=stride, robust=robust) for motion in state.motions)
         grams = np.stack([_pair_gram(cloud, p) for p in pairs])
         theta = _thetas(grams, state) if state.bundle else np.zeros(0)
-        solution = _solve(grams, state, float(np.median(theta)) if theta.size else 0.0)
+        solution = _solve(grams, state, basis, float(np.median(theta)) if theta.size else 0.0)
         weight = max(sum(float(p.weights.sum()) for p in pairs), 1e-300)
         covariance = (
             cloud.redundancy * solution.cost / weight * np.linalg.pinv(solution.hessian, rcond=1e-9, hermitian=True)
@@ -188,16 +188,19 @@ def _pair_gram(cloud: LocalPlanes, pairs: Pairs) -> Array:
 
 
 def _thetas(grams: Array, state: Framed) -> Array:
-    """Gauss-Newton over theta for every plane through the axis, each on its 3x3 Gram matrix."""
+    """What each plane through the axis alone would turn by, on its 3x3 Gram matrix."""
     angles = np.pi * np.arange(len(grams)) / len(grams)
-    small = [axis_gram(g, state.frame, state.center) for g in grams]
-    found = [minimise(partial(theta_model, g), np.array([a])).x[0] for g, a in zip(small, angles, strict=True)]
-    return np.array(found) - angles
+    return closest_planes(axis_gram(grams, state.frame, state.center), angles) - angles
 
 
-def _solve(grams: Array, state: Framed, theta: float) -> Solution:
-    """Gauss-Newton over the observable motions of the shared frame, from a turn by theta about its third axis."""
-    basis = observable_motions(state.standard, state.frame, state.center)
+def closest_planes(grams3: Array, angles_rad: Array) -> Array:
+    """Angles [b] of planes through an axis after Gauss-Newton over theta, on their Gram matrices [b, 3, 3]."""
+    found = minimise_all(lambda theta, which: theta_models(grams3[which], theta), angles_rad[:, None])
+    return found.x[:, 0]
+
+
+def _solve(grams: Array, state: Framed, basis: Array, theta: float) -> Solution:
+    """Gauss-Newton over a basis [6, q] of the shared frame's motions, from a turn by theta about its third axis."""
 
     def linearise(y: Array) -> Linearisation:
         full = frame_model(grams, state.standard, state.frame, state.center, basis @ y)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from symrefine.fit.gauss_newton import Linearisation
+from symrefine.fit.gauss_newton import Linearisation, Linearisations
 from symrefine.geometry import Array, Isometry
 
 SIZE = 13
@@ -82,12 +82,22 @@ def _flat(array: Array) -> Any:
 _threads = local()
 
 
-def _compiled(build: Callable[[], Any]) -> _Compiled:
-    """The compiled form of a function, one for each thread: its buffers are not to be shared."""
+def _compiled(build: Callable[[int], Any], count: int) -> _Compiled:
+    """The compiled form of a function of so many operations, one for each thread: its buffers are not to be shared."""
     known = _threads.__dict__.setdefault("functions", {})
-    if build not in known:
-        known[build] = _Compiled(build())
-    return known[build]
+    if (build, count) not in known:
+        known[build, count] = _Compiled(build(count))
+    return known[build, count]
+
+
+def _beside(matrices: Array) -> Array:
+    """Matrices [k, m, n] side by side [m, k n], as casadi takes the arguments of k calls."""
+    return matrices.transpose(1, 0, 2).reshape(matrices.shape[1], -1)
+
+
+def _apart(outputs: Array, count: int) -> Array:
+    """The same the other way: [m, k n] to [k, m, n]."""
+    return outputs.reshape(len(outputs), count, -1).transpose(1, 0, 2)
 
 
 def _quadratic(ca: Any, name: str, unknown: Any, phi: Any, parameters: list[Any]) -> Any:
@@ -99,11 +109,11 @@ def _quadratic(ca: Any, name: str, unknown: Any, phi: Any, parameters: list[Any]
     return ca.Function(name, [unknown, *parameters, g], [ca.densify(o) for o in outputs])
 
 
-def _theta_function() -> Any:
+def _theta_function(count: int) -> Any:
     import casadi as ca
 
     theta = ca.SX.sym("theta")
-    return _quadratic(ca, "theta", theta, ca.vertcat(1, ca.cos(2 * theta), ca.sin(2 * theta)), [])
+    return _quadratic(ca, "theta", theta, ca.vertcat(1, ca.cos(2 * theta), ca.sin(2 * theta)), []).map(count)
 
 
 def _frame_symbols(ca: Any) -> tuple[Any, Any, list[Any]]:
@@ -117,18 +127,20 @@ def _frame_symbols(ca: Any) -> tuple[Any, Any, list[Any]]:
     return x, phi, [frame, center, standard]
 
 
-def _frame_function() -> Any:
+def _frame_function(count: int) -> Any:
+    """All that the operations share goes in once, and what they add up to comes out."""
     import casadi as ca
 
     x, phi, parameters = _frame_symbols(ca)
-    return _quadratic(ca, "frame", x, phi, parameters)
+    return _quadratic(ca, "frame", x, phi, parameters).map("frames", "serial", count, [0, 1, 2], [0, 1, 2])
 
 
-def _jacobian_function() -> Any:
+def _jacobian_function(count: int) -> Any:
     import casadi as ca
 
     x, phi, parameters = _frame_symbols(ca)
-    return ca.Function("jacobian", [x, *parameters], [ca.densify(ca.jacobian(phi, x))])
+    function = ca.Function("jacobian", [x, *parameters], [ca.densify(ca.jacobian(phi, x))])
+    return function.map("jacobians", "serial", count, [0, 1, 2], [])
 
 
 def _turn(ca: Any, w: Any) -> Any:
@@ -146,14 +158,12 @@ def turn_frame(frame: Array, w: Array) -> Array:
     return (np.eye(3) + 2 * s * k + 2 * k @ k) @ frame
 
 
-def theta_model(gram3: Array, theta_rad: Array) -> Linearisation:
-    """Cost and derivatives in theta [1] of one plane through a fixed axis, from its 3x3 Gram matrix."""
-    return _linearisation(_compiled(_theta_function)(theta_rad, gram3))
-
-
-def _linearisation(outputs: list[Array]) -> Linearisation:
-    cost, gradient, hessian = outputs
-    return Linearisation(cost=float(cost[0, 0]), gradient=gradient[:, 0], hessian=hessian)
+def theta_models(grams3: Array, thetas_rad: Array) -> Linearisations:
+    """Costs and derivatives in theta [b, 1] of planes through a fixed axis, each from its Gram matrix [b, 3, 3]."""
+    count = len(thetas_rad)
+    found = _compiled(_theta_function, count)(thetas_rad.T, _beside(grams3))
+    costs, gradients, hessians = (_apart(output, count) for output in found)
+    return Linearisations(costs=costs[:, 0, 0], gradients=gradients[:, :, 0], hessians=hessians)
 
 
 def frame_model(grams: Array, standard: Array, frame: Array, center: Array, x: Array) -> Linearisation:
@@ -166,13 +176,9 @@ def frame_model(grams: Array, standard: Array, frame: Array, center: Array, x: A
         center: [3].
         x: small rotation about, and shift along, the frame's axes.
     """
-    function = _compiled(_frame_function)
-    parts = [_linearisation(function(x, frame, center, s, g)) for s, g in zip(standard, grams, strict=True)]
-    return Linearisation(
-        cost=sum(p.cost for p in parts),
-        gradient=np.sum([p.gradient for p in parts], axis=0),
-        hessian=np.sum([p.hessian for p in parts], axis=0),
-    )
+    function = _compiled(_frame_function, len(standard))
+    cost, gradient, hessian = function(x, frame, center, _beside(standard), _beside(grams))
+    return Linearisation(cost=float(cost[0, 0]), gradient=gradient[:, 0], hessian=hessian)
 
 
 def observable_motions(standard: Array, frame: Array, center: Array) -> Array:
@@ -181,14 +187,14 @@ def observable_motions(standard: Array, frame: Array, center: Array) -> Array:
     q = 3 for one plane, 5 for the planes through an axis, 6 for the mirrors of a cube: what is left out (gliding
     along the plane or the axis, turning about a lone normal) no residual can see.
     """
-    jacobian = _compiled(_jacobian_function)
-    stacked = np.concatenate([jacobian(np.zeros(6), frame, center, s)[0] for s in standard])
-    _, values, rows = np.linalg.svd(stacked, full_matrices=False)
+    jacobian = _compiled(_jacobian_function, len(standard))
+    found = jacobian(np.zeros(6), frame, center, _beside(standard))[0]
+    _, values, rows = np.linalg.svd(_apart(found, len(standard)).reshape(-1, 6), full_matrices=False)
     return rows[values > 1e-6 * values[0]].T
 
 
 def axis_gram(gram13: Array, frame: Array, point: Array) -> Array:
-    """Gram matrix [3, 3] in (1, cos 2 theta, sin 2 theta) of the planes through an axis, from the general one."""
+    """Gram matrices [..., 3, 3] in (1, cos 2 theta, sin 2 theta) of planes through an axis, from the general ones."""
     angles = np.array([0.0, np.pi / 3, 2 * np.pi / 3])
     normals = np.stack([-np.sin(angles), np.cos(angles)], axis=1) @ frame[:2]
     mirrors = [np.eye(3) - 2.0 * np.outer(m, m) for m in normals]

@@ -7,7 +7,7 @@ group acts on the object as `F' G F`.
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,9 +39,10 @@ class PointGroup:
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", parse(self.name).name)
         frame = np.asarray(self.frame, dtype=np.float64)
-        if frame.shape != (3, 3) or not np.allclose(frame @ frame.T, np.eye(3), atol=EXACT) or np.linalg.det(frame) < 0:
+        nearest = orthogonal_factor(frame) if frame.shape == (3, 3) and np.isfinite(frame).all() else np.zeros((3, 3))
+        if np.linalg.det(nearest) <= 0.0 or np.abs(nearest - frame).max() > EXACT:
             raise InputError(f"the frame of {self.name} must be a rotation matrix [3, 3], determinant +1")
-        object.__setattr__(self, "frame", read_only(nearest_orthogonal(frame[None])[0]))
+        object.__setattr__(self, "frame", read_only(nearest))
 
     @property
     def symbol(self) -> Symbol:
@@ -118,18 +119,17 @@ class PointGroup:
 
     def sampled(self, fold: int) -> "PointGroup":
         """A finite subgroup: Cinf.. and Dinf.. with `fold` in place of inf, I and Ih for K and Kh."""
-        family, number = self.symbol.family, self.symbol.fold
-        if family in ("K", "Kh"):
-            return PointGroup(name=family.replace("K", "I"), frame=self.frame)
-        name = Symbol(family=family, fold=fold if math.isinf(number) else number).name
-        return PointGroup(name=name, frame=self.frame)
+        return PointGroup(name=_sampled(self.symbol, fold).name, frame=self.frame)
 
     def distance_rad(self, operations: ArrayLike) -> Array:
         """Angle [k] between each orthogonal matrix [k, 3, 3] and the nearest operation of the group."""
-        given = nearest_orthogonal(operations)
+        return self.distance_of(nearest_orthogonal(operations))
+
+    def distance_of(self, operations: Array) -> Array:
+        """The same of matrices that are known to be orthogonal."""
         if self.is_finite:
-            return nearest_operations(given, standard_operations(self.symbol), self.frame)[1]
-        turned = self.frame @ given @ self.frame.T
+            return nearest_operations(operations, standard_operations(self.symbol), self.frame)[1]
+        turned = self.frame @ operations @ self.frame.T
         return np.asarray(np.min([chord_angles(turned, near) for near in self._closest_continuous(turned)], axis=0))
 
     def equivalent(self, directions: ArrayLike) -> Array:
@@ -173,7 +173,15 @@ def is_subgroup(a: PointGroup, b: PointGroup, tolerance_rad: float = EXACT) -> b
     """Whether every operation of `a` is, within `tolerance_rad`, an operation of `b`, both where they stand."""
     if b.is_finite and not a.is_finite:
         return False
-    return bool(b.distance_rad(a.sampled(7).operations()).max() <= tolerance_rad)
+    members = a.frame.T @ standard_operations(_sampled(a.symbol, 7)) @ a.frame
+    return bool(b.distance_of(members).max() <= tolerance_rad)
+
+
+def _sampled(symbol: Symbol, fold: int) -> Symbol:
+    """The finite group that stands for a continuous one; a finite one for itself."""
+    if symbol.family in ("K", "Kh"):
+        return Symbol(family=symbol.family.replace("K", "I"), fold=symbol.fold)
+    return replace(symbol, fold=fold) if math.isinf(symbol.fold) else symbol
 
 
 def _turned(axes: Iterable[OrderedAxis], frame: Array) -> list[OrderedAxis]:

@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from symrefine.geometry import Array, ReadOnly, read_only, unit
+from symrefine.geometry import Array, ReadOnly, frame_with_z, read_only, unit
 from symrefine.moments.harmonics import harmonic_moments, to_polar_axis
 from symrefine.moments.moments import Moments, transformed
 from symrefine.shape import Index
@@ -86,26 +86,25 @@ def local_minima(misses: Array, *, count: int) -> Candidates:
     """The deepest local minima over the sphere, `count` at most, each moved to the vertex of a fitted paraboloid."""
     lowest = np.flatnonzero(misses <= misses[_neighbours()].min(axis=1))
     lowest = lowest[np.argsort(misses[lowest], kind="stable")][:count]
-    directions = np.array([_vertex(misses, int(i)) for i in lowest]).reshape(-1, 3)
-    return Candidates(directions=directions, misses=misses[lowest])
+    return Candidates(directions=_vertices(misses, lowest), misses=misses[lowest])
 
 
-def _vertex(misses: Array, i: int) -> Array:
-    here = half_sphere()[i]
-    ring = half_sphere()[_neighbours()[i]]
-    ring = ring * np.sign(ring @ here)[:, None]
-    helper = np.eye(3)[int(np.argmin(np.abs(here)))]
-    p0 = unit(np.cross(helper, here))
-    p1 = np.cross(here, p0)
-    a, b = np.append(ring @ p0, 0.0), np.append(ring @ p1, 0.0)
-    design = np.stack([np.ones_like(a), a, b, a * a, a * b, b * b], axis=1)
-    fit = np.linalg.lstsq(design, np.append(misses[_neighbours()[i]], misses[i]), rcond=None)[0]
-    hessian = np.array([[2 * fit[3], fit[4]], [fit[4], 2 * fit[5]]])
-    if np.linalg.eigvalsh(hessian)[0] <= 0.0:
-        return here
-    move = -np.linalg.solve(hessian, fit[1:3])
-    move *= min(1.0, 0.06 / max(float(np.linalg.norm(move)), 1e-12))
-    return unit(here + move[0] * p0 + move[1] * p1)
+def _vertices(misses: Array, lowest: Index) -> Array:
+    """Directions [C, 3] of the vertices of paraboloids through the surroundings of some of the directions."""
+    here, ring = half_sphere()[lowest], half_sphere()[_neighbours()[lowest]]
+    frames = np.array([frame_with_z(u) for u in here]).reshape(-1, 3, 3)
+    signs = np.sign(np.einsum("cki,ci->ck", ring, here))
+    a, b = np.einsum("cpi,cki,ck->pck", frames[:, :2], ring, signs)
+    a, b = (np.pad(v, [(0, 0), (0, 1)]) for v in (a, b))  # the direction itself is the origin
+    design = np.stack([np.ones_like(a), a, b, a * a, a * b, b * b], axis=2)
+    values = np.append(misses[_neighbours()[lowest]], misses[lowest][:, None], axis=1)
+    fit = np.einsum("cik,ck->ic", np.linalg.pinv(design), values)
+    hessian = np.stack([2.0 * fit[3], fit[4], fit[4], 2.0 * fit[5]], axis=1).reshape(-1, 2, 2)
+    valley = np.linalg.eigvalsh(hessian)[:, 0] > 0.0
+    hessian[~valley] = np.eye(2)
+    move = -np.linalg.solve(hessian, fit[1:3].T[:, :, None])[:, :, 0]
+    move *= np.where(valley, np.minimum(1.0, 0.06 / np.maximum(np.linalg.norm(move, axis=1), 1e-12)), 0.0)[:, None]
+    return unit(here + np.einsum("cp,cpi->ci", move, frames[:, :2]))
 
 
 def whitened(moments: Moments) -> Moments:

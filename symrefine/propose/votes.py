@@ -12,7 +12,6 @@ import numpy as np
 
 from symrefine.geometry import Array, unit
 from symrefine.shape import Index
-from symrefine.surface.neighbourhoods import kd_tree
 
 # Local planes whose pairs vote, the largest angle between the normals of a pair, and the candidates that are told: of 9
 # planes of a cube one view shows 7, and the last of them is the 50th.
@@ -98,6 +97,8 @@ def unit_rows(vectors: Array) -> Array:
 
 def _densest(directions: Array, feet: Array, worth: Array) -> list[Vote]:
     """The densest spots of votes for planes or lines: unit vectors [K, 3] without a sign, with their feet [K, 3]."""
+    from scipy.spatial import cKDTree
+
     some = worth > 0.0
     directions, feet, worth = directions[some], feet[some], worth[some]
     if not some.any():
@@ -110,7 +111,7 @@ def _densest(directions: Array, feet: Array, worth: Array) -> list[Vote]:
     found: list[Vote] = []
     chord = 2.0 * np.sin(0.5 * AGREE_RAD)
     both = np.concatenate([directions, -directions]) / chord
-    around = kd_tree(np.column_stack([both, np.tile(FEET * feet, (2, 1))]))
+    around = cKDTree(np.column_stack([both, np.tile(FEET * feet, (2, 1))]))
     for cell in np.argsort(-density)[: 8 * TOLD]:
         votes = order[ends[cell] : ends[cell + 1]]
         for _ in range(2):

@@ -16,7 +16,7 @@ from symrefine.picture.surface import Surface, make_surface
 from symrefine.report.elements import Element
 from symrefine.report.mesh import simplified, subdivided
 from symrefine.shape import Index, Shape
-from symrefine.surface.neighbourhoods import kd_tree
+from symrefine.surface.tree import Tree
 
 # Of the page, which is to stay below 3 MB: triangles, points, and misses (vertices times elements) that it carries.
 MOST_TRIANGLES, MOST_POINTS, MOST_MISSES = 40_000, 24_000, 700_000
@@ -161,7 +161,7 @@ def _misses(detection: Detection, points: Array, elements: Sequence[Element]) ->
     looked. Each has the miss of the local plane that is nearest to it, by which the answer was decided."""
     surface, scale = detection.surface, detection.scale
     local = (points - detection.origin) / scale
-    owner = kd_tree(surface.cloud.points).query(local)[1]
+    owner = Tree(surface.cloud.points).nearest(local)[1]
     found = np.zeros((len(elements), len(points)))
     for k, element in enumerate(elements):
         moved = element.motion(element.angle_rad)

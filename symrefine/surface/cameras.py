@@ -5,13 +5,12 @@ point in front of the surface, or beside its outline, would have been seen. A po
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.geometry import Array, unit
-from symrefine.surface.neighbourhoods import kd_tree
+from symrefine.surface.tree import Tree
 
 # Rays around a point that tell how far the camera saw there, and spacings of rays up to which one is around.
 RAYS, WITHIN = 4, 2.0
@@ -29,7 +28,7 @@ class Camera:
     """
 
     eye: Array
-    directions: Any
+    directions: Tree
     ranges: Array
     spacing: float
 
@@ -37,7 +36,7 @@ class Camera:
         """Which of points [N, 3] lie in space that the camera saw to be free, by more than a margin."""
         away = points - self.eye
         distance = np.maximum(np.linalg.norm(away, axis=1), 1e-300)
-        angle, near = self.directions.query(away / distance[:, None], k=[*range(1, min(RAYS, len(self.ranges)) + 1)])
+        angle, near = self.directions.query(away / distance[:, None], min(RAYS, len(self.ranges)))
         around = angle <= WITHIN * self.spacing
         behind = np.where(around, self.ranges[near], np.inf).min(axis=1)
         # Beside the outline is what no ray is near to, even moved by the margin.
@@ -54,6 +53,6 @@ def cameras(points: Array, viewpoints: Array) -> tuple[Camera, ...]:
 def _camera(eye: Array, points: Array) -> Camera:
     ranges = np.linalg.norm(points - eye, axis=1)
     seen = ranges > 0.0
-    directions = kd_tree(unit(points[seen] - eye))
-    spacing = directions.query(directions.data, k=[2])[0] if seen.sum() > 1 else np.zeros(1)
+    directions = Tree(unit(points[seen] - eye))
+    spacing = directions.query(directions.points, 1, skip=1)[0] if seen.sum() > 1 else np.zeros(1)
     return Camera(eye=eye, directions=directions, ranges=ranges[seen], spacing=float(np.median(spacing)))

@@ -121,7 +121,7 @@ def disc_distances(
     """
     skip = int(skip_self)
     count = min(DISCS + skip, len(cloud.points))
-    away, near = cloud.nearest(queries, classes, k=[*range(1 + skip, 1 + count)], distance_upper_bound=bound)
+    away, near = cloud.around(queries, classes, count - skip, skip=skip, bound=bound)
     seen = np.isfinite(away)
     near = np.where(seen, near, 0)
     delta = queries[:, None] - cloud.points[near]

@@ -6,15 +6,15 @@ cameras are known, they say it better: a patch in space that they saw to be free
 """
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from symrefine.geometry import Array, Mask
 from symrefine.shape import Index
 from symrefine.surface.cameras import Camera
-from symrefine.surface.neighbourhoods import FLAT, WIDEST, Neighbourhoods, connected_parts, fit_planes, kd_tree
+from symrefine.surface.neighbourhoods import FLAT, WIDEST, Neighbourhoods, connected_parts, fit_planes
 from symrefine.surface.skin import LocalPlanes
+from symrefine.surface.tree import Tree
 
 # Neighbours that tell a border: the middle of half a disc lies 0.75 of its width off the point, that of a whole disc 0,
 # with a standard deviation of 0.12 for so many. At the edge of a solid it is 0.4, but the neighbourhood is bent there:
@@ -55,7 +55,7 @@ class Openings:
         """Pairs [2, E] of every `stride`-th local planes that are neighbours, both ways."""
         if stride not in self.links:
             points = cloud.points[::stride]
-            _, near = kd_tree(points).query(points, k=[*range(2, LINKS + 2)])
+            _, near = Tree(points).query(points, LINKS, skip=1)
             pairs = np.stack([np.repeat(np.arange(len(points)), LINKS), near.ravel()])
             self.links[stride] = np.concatenate([pairs, pairs[::-1]], axis=1)
         return self.links[stride]
@@ -100,7 +100,9 @@ class Openings:
         return found
 
 
-def openings(cloud: LocalPlanes, points: Array, tree: Any, cameras: tuple[Camera, ...] = ()) -> Openings | None:
+def openings(
+    cloud: LocalPlanes, points: Array, tree: Tree, cameras: tuple[Camera, ...] = (), near: Index | None = None
+) -> Openings | None:
     """What is open of a surface; None if it is closed, or known too coarsely to tell.
 
     Args:
@@ -108,11 +110,12 @@ def openings(cloud: LocalPlanes, points: Array, tree: Any, cameras: tuple[Camera
         points: [N, 3] all that is known of it.
         tree: kd-tree over them.
         cameras: what saw it, where that is known.
+        near: [M, NEIGHBOURS] of the points near each local plane, if they are known already.
     """
     if cameras:
         none = np.zeros(len(cloud.points), dtype=bool)
         return Openings(line=none, border=none, evident=True, cameras=cameras)
-    around = Neighbourhoods.of(points, tree, NEIGHBOURS).around(cloud.points)
+    around = Neighbourhoods.of(points, tree, NEIGHBOURS).around(cloud.points, near)
     mean, normals, variances = fit_planes(around)
     aside = mean - cloud.points
     aside -= np.einsum("ni,ni->n", aside, normals)[:, None] * normals
@@ -127,8 +130,8 @@ def openings(cloud: LocalPlanes, points: Array, tree: Any, cameras: tuple[Camera
     if share < OPEN:
         return None
     line = _lines(cloud, thin & (aside > ASIDE))
-    near = kd_tree(cloud.points[line]).query(cloud.points)[0] < 2.0 * np.median(cloud.reach)
-    return Openings(line=line, border=near, evident=bool(share > EVIDENT))
+    border = Tree(cloud.points[line]).nearest(cloud.points)[0] < 2.0 * np.median(cloud.reach)
+    return Openings(line=line, border=border, evident=bool(share > EVIDENT))
 
 
 def _lines(cloud: LocalPlanes, chosen: Mask) -> Mask:
@@ -136,5 +139,5 @@ def _lines(cloud: LocalPlanes, chosen: Mask) -> Mask:
     found = chosen.copy()
     if chosen.sum() > 2:
         points = cloud.points[chosen]
-        found[chosen] = kd_tree(points).query(points, k=[3])[0][:, 0] < 2.0 * cloud.reach[chosen]
+        found[chosen] = Tree(points).query(points, 1, skip=2)[0][:, 0] < 2.0 * cloud.reach[chosen]
     return found if chosen.sum() > 2 else np.zeros(len(chosen), dtype=bool)

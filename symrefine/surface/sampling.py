@@ -5,7 +5,7 @@ decided here depends on the surroundings of a point alone, so that it breaks no 
 """
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 
@@ -19,10 +19,10 @@ from symrefine.surface.neighbourhoods import (
     choose_neighbours,
     connected_parts,
     fills_volume,
-    fit_planes,
-    kd_tree,
-    sums_of,
+    planes_of,
+    thickness_of,
 )
+from symrefine.surface.tree import Tree
 
 # Points that are asked first, and neighbours that tell of the surroundings of a point.
 ASKED, AROUND = 5000, 16
@@ -69,7 +69,7 @@ class Sampling:
     shares: Array | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Surroundings:
     """Points with what is around each of them, itself left out.
 
@@ -81,21 +81,31 @@ class Surroundings:
     """
 
     points: Array
-    tree: Any
+    tree: Tree
     away: Array
     near: Index
 
     @classmethod
     def of(cls, points: Array) -> "Surroundings":
         """The surroundings of points [N, 3]; N > AROUND."""
-        tree = kd_tree(points)
-        away, near = tree.query(points, k=[*range(2, AROUND + 2)])
+        tree = Tree(points)
+        away, near = tree.query(points, AROUND, skip=1)
         return cls(points=points, tree=tree, away=away, near=near)
 
     @property
     def reach(self) -> Array:
         """Distance [N] of the neighbour in the middle."""
         return np.asarray(self.away[:, AROUND // 2 - 1])
+
+    @cached_property
+    def planes(self) -> tuple[Array, Array, Array]:
+        """Means, normals and variances (across first), all [N, 3], of the neighbours."""
+        return planes_of(self.points, self.near)
+
+    @property
+    def thickness(self) -> Array:
+        """Thickness over length [N] of what is around each point."""
+        return thickness_of(self.planes[2])
 
 
 def sampling(
@@ -175,9 +185,9 @@ def _alone(around: Surroundings) -> Mask:
     sparse = np.flatnonzero(reach > FAR * np.median(reach)) if np.median(reach) > 0.0 else np.empty(0, dtype=np.int64)
     found = np.zeros(len(points), dtype=bool)
     if sparse.size:
-        mean, normals, thick = _planes(around, sparse)
+        mean, normals, _ = (p[sparse] for p in around.planes)
         across = np.abs(np.einsum("ni,ni->n", normals, points[sparse] - mean))
-        loose = (thick > FLAT) | (across > FLAT * around.away[sparse, -1])
+        loose = (around.thickness[sparse] > FLAT) | (across > FLAT * around.away[sparse, -1])
         # As random points are among themselves, or far from what is dense around: thin parts, sampled sparsely, are not
         if not _scattered(points[sparse[loose]], np.ptp(points, axis=0)):
             loose &= reach[sparse] > FAR * reach[around.near[sparse]].min(axis=1)
@@ -185,19 +195,12 @@ def _alone(around: Surroundings) -> Mask:
     return found
 
 
-def _planes(around: Surroundings, some: Index | slice) -> tuple[Array, Array, Array]:
-    """Means and normals, each [K, 3], of what is around some points, and how thick [K] that is over how wide."""
-    near = around.near[some]
-    mean, normals, variances = fit_planes(sums_of(around.points[near.ravel()]).reshape(*near.shape, -1).sum(axis=1))
-    return mean, normals, np.sqrt(variances[:, 0] / np.maximum(variances[:, 2], 1e-300))
-
-
 def _scattered(points: Array, box: Array) -> bool:
     """Whether most of points [N, 3] lie no closer together than random ones in a box of these sides [3] would."""
     neighbours = AROUND // 2
     if len(points) <= neighbours:
         return False
-    away = kd_tree(points).query(points, k=[neighbours + 1])[0]
+    away = Tree(points).query(points, 1, skip=neighbours)[0]
     return bool(4.0 / 3.0 * np.pi * np.median(away) ** 3 * len(points) > CROWDED * np.prod(box))
 
 
@@ -223,7 +226,7 @@ def _parts(around: Surroundings) -> Index:
     """Number of the part that each of some points belongs to: they hang together if each is near the other."""
     count = len(around.points)
     one, other = np.repeat(np.arange(count), AROUND), around.near.ravel()
-    mutual = np.isin(one * count + other, other * count + one)
+    mutual = (around.near[other] == one[:, None]).any(axis=1)
     return connected_parts(one[mutual], other[mutual], count)
 
 
@@ -233,7 +236,7 @@ def filled(points: Array, around: Surroundings, rng: np.random.Generator) -> lis
     Neighbourhoods there look like points at random in a ball: among some of the points, and among all in neighbourhoods
     so large that noise does not make the surface look so too. `around` tells of some of the points.
     """
-    thick = blobness(around.points, around.near)[around.near].mean(axis=1)
+    thick = blobness(around.planes[2], AROUND)[around.near].mean(axis=1)
     within = thick > FILLED
     one, other = np.repeat(np.arange(len(within)), AROUND), around.near.ravel()
     inside = within[one] & within[other]
@@ -241,13 +244,18 @@ def filled(points: Array, around: Surroundings, rng: np.random.Generator) -> lis
     small = [part == k for k in np.flatnonzero(_small(np.bincount(part + 1)[1:], len(part)))]
     if not small:
         return []
-    tree = kd_tree(points)
+    tree = Tree(points)
     size = 2 * choose_neighbours(points, tree, rng)
     enough = 2 * size * len(part) / len(points)  # fewer tell nothing of neighbourhoods so large
     for m in small:
-        if m.sum() < enough or np.median(blobness(points, tree.query(around.points[m], k=size)[1])) < FILLED:
+        if m.sum() < enough or np.median(_blobness(points, tree, around.points[m], size)) < FILLED:
             part[m] = -1
     return _members(points, around, [_grown(m, around) for m in _lone(part)])
+
+
+def _blobness(points: Array, tree: Tree, queries: Array, size: int) -> Array:
+    """`blobness` [Q] of what is around queries [Q, 3] among points [N, 3]."""
+    return blobness(planes_of(points, tree.query(queries, size)[1])[2], size)
 
 
 def _small(sizes: Index, count: int) -> Mask:
@@ -258,13 +266,15 @@ def _small(sizes: Index, count: int) -> Mask:
 def _lone(part: Index) -> list[Mask]:
     """Small parts, given the number of each point's part, that none other is about as large as; -1 is no part."""
     sizes = np.bincount(part + 1)[1:]
-    alike = (sizes >= COUNTERPART * sizes[:, None]) & (sizes <= sizes[:, None] / COUNTERPART)
-    return [part == k for k in np.flatnonzero(_small(sizes, len(part)) & (alike.sum(axis=1) == 1))]
+    small = np.flatnonzero(_small(sizes, len(part)))
+    own = sizes[small, None]
+    alike = (sizes >= COUNTERPART * own) & (sizes <= own / COUNTERPART)
+    return [part == k for k in small[alike.sum(axis=1) == 1]]
 
 
 def _gap(around: Surroundings, some: Mask) -> bool:
     """Whether nine in ten of some points stand farther from all others than from their own neighbours."""
-    between = kd_tree(around.points[~some]).query(around.points[some])[0]
+    between = Tree(around.points[~some]).nearest(around.points[some])[0]
     return bool(np.quantile(between, 0.1) > np.median(around.reach[some]))
 
 
@@ -279,7 +289,7 @@ def _members(points: Array, around: Surroundings, groups: list[Mask]) -> list[In
     """Indices of all points [N, 3] that belong to each of some groups, as the nearest of some points do."""
     if not groups:
         return []
-    nearest = around.tree.query(points)[1]
+    nearest = around.tree.nearest(points)[1]
     return [np.flatnonzero(m[nearest]) for m in groups]
 
 
@@ -291,7 +301,7 @@ def _is_uneven(around: Surroundings) -> bool:
     area = _area(around)
     if not area.all() or np.median(around.away[:, -1]) > WIDEST:
         return False  # points are repeated, or so few that the shape decides how far away their neighbours are
-    flat = _planes(around, slice(None))[2] < FLAT
+    flat = around.thickness < FLAT
     told = [np.ones_like(flat), flat] if flat.sum() > AROUND else [np.ones_like(flat)]
     return all(_trend(around.points[some], np.log(area[some])) > UNEVEN for some in told)
 

@@ -1,8 +1,9 @@
 """Local planes of a cloud, and which of them a mirrored point meets."""
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,8 @@ from symrefine.surface.neighbourhoods import (
     choose_neighbours,
     fit_planes,
     flatness_of,
-    kd_tree,
 )
+from symrefine.surface.tree import Tree
 
 # Up to so many points of a cloud stand for themselves (atoms), not for a surface.
 FEW = 250
@@ -69,7 +70,7 @@ class LocalPlanes(Planes):
     reach: Array
     spacing: float
     redundancy: float
-    tree: Any
+    tree: Tree
     body: Body = "surface"
     labels: Index | None = None
 
@@ -82,9 +83,15 @@ class LocalPlanes(Planes):
         """Classes of some of the points."""
         return None if self.labels is None else self.labels[chosen]
 
-    def nearest(self, queries: Array, classes: Index | None, **options: Any) -> tuple[Array, Index]:
-        """Distances and indices of the points nearest to queries [Q, 3] of the given classes [Q], as the tree says."""
-        return self.tree.query(_with_class(queries, classes), **options)
+    def nearest(self, queries: Array, classes: Index | None, *, bound: float = math.inf) -> tuple[Array, Index]:
+        """Distance and index, both [Q], of the point nearest to each query [Q, 3] of the classes [Q]; see `Tree`."""
+        return self.tree.nearest(_with_class(queries, classes), bound=bound)
+
+    def around(
+        self, queries: Array, classes: Index | None, count: int, *, skip: int = 0, bound: float = math.inf
+    ) -> tuple[Array, Index]:
+        """The same, both [Q, count], of several; see `Tree.query`."""
+        return self.tree.query(_with_class(queries, classes), count, skip=skip, bound=bound)
 
     def shared_by(self, _: int) -> float:
         """How many of the planes each point takes part in, whichever of them are met."""
@@ -110,7 +117,7 @@ class Skin:
     points: Array
     normals: Array | None
     neighbours: int
-    given: Any = None
+    given: Tree | None = None
 
     @property
     def isolated(self) -> bool:
@@ -118,15 +125,15 @@ class Skin:
         return False
 
     @cached_property
-    def tree(self) -> Any:
+    def tree(self) -> Tree:
         """kd-tree over `points`."""
-        return kd_tree(self.points) if self.given is None else self.given
+        return Tree(self.points) if self.given is None else self.given
 
     @cached_property
     def spacing(self) -> float:
         """Median distance from a point to the nearest other one."""
         some = self.points[:: max(1, len(self.points) // PROBES)]
-        return float(np.median(self.tree.query(some, k=[2])[0]))
+        return float(np.median(self.tree.query(some, 1, skip=1)[0]))
 
     @cached_property
     def _neighbourhoods(self) -> Neighbourhoods:
@@ -134,36 +141,43 @@ class Skin:
 
     def met_by(self, queries: Array) -> tuple[Array, Planes]:
         """Distance [Q] from each query [Q, 3] to the nearest point, and the planes of the points around the queries."""
-        distance, near = self.tree.query(queries)
+        distance, near = self.tree.nearest(queries)
         return distance, self._planes(queries, near)
 
     def shared_by(self, count: int) -> float:
         """How many of the planes at `count` of the points each point takes part in; at least 1."""
         return max(1.0, self.neighbours * count / len(self.points)) if self.neighbours > 1 else 1.0
 
-    def denoised(self, pick: Index) -> Planes:
-        """Some of the points, each moved onto the plane of its neighbours, and these planes."""
+    def denoised(self, pick: Index, near: Index | None = None) -> Planes:
+        """Some of the points, each moved onto the plane of its neighbours (`near`, if known), and these planes."""
         points = self.points[pick]
-        fitted = self._planes(points, pick)
+        fitted = self._planes(points, pick, near)
         if self.neighbours == 1:
             return fitted
         across = np.einsum("ij,ij->i", fitted.normals, points - fitted.points)
         return replace(fitted, points=points - fitted.normals * across[:, None])
 
-    def _planes(self, queries: Array, nearest: Index) -> Planes:
+    def near(self, pick: Index, most: int) -> Index | None:
+        """The neighbours [M, most] of some of the points, or None where planes are made of other things or more."""
+        return self.tree.query(self.points[pick], most)[1] if 1 < self.neighbours <= most else None
+
+    def _planes(self, queries: Array, nearest: Index, near: Index | None = None) -> Planes:
         normals = None if self.normals is None else self.normals[nearest]
         if self.neighbours == 1 and normals is not None:
             none = np.zeros(len(nearest))
             return Planes(points=self.points[nearest], normals=normals, thickness=none, flatness=none)
-        mean, normals, values = fit_planes(self._neighbourhoods.around(queries), normals)
+        mean, normals, values = fit_planes(self._neighbourhoods.around(queries, near), normals)
         return Planes(points=mean, normals=normals, thickness=np.sqrt(values[:, 0]), flatness=flatness_of(values))
 
-    def local_planes(self, pick: Index, labels: Index | None = None) -> LocalPlanes:
-        """The planes of some of the points as a surface of their own; `labels` [N] are the classes of all points."""
-        planes = self.denoised(pick)
+    def local_planes(self, pick: Index, labels: Index | None = None, near: Index | None = None) -> LocalPlanes:
+        """The planes of some of the points as a surface of their own.
+
+        `labels` [N] are the classes of all points; `near` as of `denoised`.
+        """
+        planes = self.denoised(pick, near)
         classes = None if labels is None else labels[pick]
-        tree = kd_tree(planes.points)
-        distance, _ = tree.query(planes.points, k=min(6, len(pick)))
+        tree = Tree(planes.points)
+        distance, _ = tree.query(planes.points, min(6, len(pick)))
         return LocalPlanes(
             points=planes.points,
             normals=planes.normals,
@@ -172,7 +186,7 @@ class Skin:
             reach=distance[:, -1],
             spacing=float(np.median(distance[:, 1])),
             redundancy=self.shared_by(len(pick)),
-            tree=tree if classes is None else kd_tree(_with_class(planes.points, classes)),
+            tree=tree if classes is None else Tree(_with_class(planes.points, classes)),
             labels=classes,
         )
 
@@ -190,7 +204,7 @@ def local_planes(
     labels: Index | None = None,
     weights: Array | None = None,
     exact: bool = False,
-    tree: Any = None,
+    tree: Tree | None = None,
 ) -> LocalPlanes:
     """Local planes at `count` of the points [N, 3], from neighbourhoods among all of them.
 
@@ -219,7 +233,7 @@ def make_skin(
     normals: Array | None = None,
     exact: bool = False,
     thin: float = 0.0,
-    tree: Any = None,
+    tree: Tree | None = None,
 ) -> Skin:
     """The skin of points [N, 3], with neighbourhoods as large as their noise asks for.
 
@@ -227,15 +241,15 @@ def make_skin(
     """
     if exact and normals is not None:
         return Skin(points=points, normals=normals, neighbours=1, given=tree)
-    tree = kd_tree(points) if tree is None else tree
+    tree = Tree(points) if tree is None else tree
     size = choose_neighbours(points, tree, rng, thin=thin)
     return Skin(points=points, normals=normals, neighbours=size, given=tree)
 
 
 def isolated_points(points: Array, labels: Index | None = None, *, body: Body = "atoms") -> LocalPlanes:
     """Points [M, 3] that meet points: few that stand for themselves ("atoms"), or samples of a "volume"."""
-    tree = kd_tree(points)
-    distance, _ = tree.query(points, k=2)
+    tree = Tree(points)
+    distance, _ = tree.query(points, 2)
     none = np.zeros(len(points))
     return LocalPlanes(
         points=points,
@@ -245,7 +259,7 @@ def isolated_points(points: Array, labels: Index | None = None, *, body: Body = 
         reach=none,
         spacing=float(np.median(distance[:, 1])),
         redundancy=1.0,
-        tree=tree if labels is None else kd_tree(_with_class(points, labels)),
+        tree=tree if labels is None else Tree(_with_class(points, labels)),
         body=body,
         labels=labels,
     )

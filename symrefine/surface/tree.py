@@ -1,0 +1,78 @@
+"""Nearest neighbours: the kd-tree that all of detection asks, about twice as quick as scipy's."""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from symrefine.geometry import Array
+from symrefine.shape import Index
+
+# Points in a leaf: of 6 to 32 the quickest for 1 to 12 neighbours.
+LEAF = 24
+
+
+class Tree:
+    """A kd-tree over points [N, d]."""
+
+    def __init__(self, points: Array) -> None:
+        from pykdtree.kdtree import KDTree
+
+        self.points = np.ascontiguousarray(points, dtype=np.float64)
+        with _one_thread():
+            self._tree: Any = KDTree(self.points, leafsize=LEAF)
+
+    def query(self, queries: Array, count: int, *, skip: int = 0, bound: float = math.inf) -> tuple[Array, Index]:
+        """Distances and indices, both [Q, count], of the points nearest to queries [Q, d], nearest first.
+
+        Args:
+            queries: [Q, d]; those near one another stand best together.
+            count: neighbours that are told.
+            skip: how many nearer ones are left out: 1 for queries that are points of the tree.
+            bound: neighbours so far away, and those that there are not, are told with an infinite distance and index N.
+        """
+        last = skip + count
+        with _one_thread():
+            limit = None if math.isinf(bound) else bound
+            away, near = self._tree.query(np.ascontiguousarray(queries), k=last, distance_upper_bound=limit)
+        away, near = away.reshape(-1, last)[:, skip:], near.reshape(-1, last)[:, skip:].astype(np.int64)
+        if limit is not None or last > len(self.points):
+            missing = near >= len(self.points)
+            away[missing], near[missing] = np.inf, len(self.points)
+        return away, near
+
+    def nearest(self, queries: Array, *, bound: float = math.inf) -> tuple[Array, Index]:
+        """Distance and index, both [Q], of the point nearest to each query; see `query`."""
+        away, near = self.query(queries, 1, bound=bound)
+        return away[:, 0], near[:, 0]
+
+
+@cache
+def _threads() -> tuple[Any, ...]:
+    """What sets how many threads the tree's OpenMP makes."""
+    from threadpoolctl import ThreadpoolController
+
+    return tuple(lib for lib in ThreadpoolController().lib_controllers if lib.user_api == "openmp")
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """No threads of OpenMP within: GNU's hang in every process that is forked after it made some."""
+    before = [(lib, lib.get_num_threads()) for lib in _threads()]
+    for lib, _ in before:
+        lib.set_num_threads(1)
+    try:
+        yield
+    finally:
+        for lib, count in before:
+            lib.set_num_threads(count)
+
+
+def side_by_side(points: Array) -> Index:
+    """Order [N] of points [N, d] in which neighbours stand together."""
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(points, leafsize=LEAF, balanced_tree=False, compact_nodes=False).indices)
