@@ -1,6 +1,7 @@
 """Damaged clouds: strays, clumps, density, open borders, cameras, completion, and the bench that measures them."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from experiments.objects.shapes import bottle, box, join, mug, sample, stool, ta
 from experiments.studies import damaged
 from symrefine.cli import invoke
 from symrefine.complete import complete
-from symrefine.detection.measure import gather, measure
+from symrefine.detection.measure import HIDDEN, gather, measure
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.geometry import Isometry, householder, line_angle_rad, random_orthogonal
@@ -243,6 +244,25 @@ def test_a_camera_sees_through_what_is_in_front_and_beside():
     (camera,) = cameras(grid, np.broadcast_to([0.0, 0.0, 4.0], grid.shape))
     asked = np.array([[0.0, 0, 1], [0, 0, -1], [2.0, 0, 0], [0.3, 0.2, 0.05]])
     assert camera.sees_through(asked, 0.1).tolist() == [True, False, True, False]
+
+
+def test_a_camera_that_cannot_have_seen_the_points_is_told():
+    """Of a whole object others hide half of the points from any place outside; from within a box all are seen."""
+    made = damage.clean(table(), 0.0, np.random.default_rng(40))
+    points, pose = posed(made.points, 41)
+    found = detect(points, viewpoint=pose.of(2.0 * table().diagonal * np.array([0.5, 0.2, 0.8])))
+    assert found.point_group == "undetermined"
+    assert re.search(r"\d\d% of the points cannot have been seen from the viewpoint", found.undetermined)
+    room, pose = posed(sample(BRICK, 8000, 0.0, np.random.default_rng(42)), 43)
+    assert detect(room, viewpoint=pose.of(BRICK.points.mean(axis=0))).undetermined == ""
+
+
+@pytest.mark.parametrize("kind", [k for k in damage.KINDS if k.endswith("views")])
+@pytest.mark.parametrize("count", [1.0, 4.0])
+def test_few_points_of_a_view_seem_hidden(kind, count):
+    made = damage.KINDS[kind][0](table(), count, np.random.default_rng(44))
+    for camera in cameras(made.points, np.broadcast_to(made.viewpoint, made.points.shape)):
+        assert camera.hidden.mean() < 0.5 * HIDDEN
 
 
 @pytest.mark.parametrize("kind", ["views", "rough views"])

@@ -7,13 +7,14 @@ point in front of the surface, or beside its outline, would have been seen. A po
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from symrefine.geometry import Array, unit
+from symrefine.geometry import Array, Mask, unit
 from symrefine.surface.tree import Tree
 
 # Rays around a point that tell how far the camera saw there, and spacings of rays up to which one is around.
 RAYS, WITHIN = 4, 2.0
+# Rays around a point that tell whether others hide it.
+BESIDE = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,7 +33,7 @@ class Camera:
     ranges: Array
     spacing: float
 
-    def sees_through(self, points: Array, margin: float) -> NDArray[np.bool_]:
+    def sees_through(self, points: Array, margin: float) -> Mask:
         """Which of points [N, 3] lie in space that the camera saw to be free, by more than a margin."""
         away = points - self.eye
         distance = np.maximum(np.linalg.norm(away, axis=1), 1e-300)
@@ -42,6 +43,23 @@ class Camera:
         # Beside the outline is what no ray is near to, even moved by the margin.
         beside = angle[:, 0] * distance > np.maximum(margin, WITHIN * self.spacing * distance)
         return np.asarray(np.where(around.any(axis=1), distance < behind - margin, beside))
+
+    @property
+    def hidden(self) -> Mask:
+        """Which of the points [K] it cannot have seen: most rays around end before, by more than they are apart there.
+
+        They stand on all sides, and not on one as where the outline of something nearer passes.
+        """
+        rays = self.directions.points
+        if len(rays) <= BESIDE:
+            return np.zeros(len(rays), dtype=bool)
+        near = self.directions.query(rays, BESIDE, skip=1)[1]
+        front = self.ranges[near] < (self.ranges * (1.0 - WITHIN * self.spacing))[:, None]
+        aside = rays[near] - rays[:, None]
+        weight = front / np.maximum(np.linalg.norm(aside, axis=2), 1e-300)
+        aside = np.einsum("nk,nki->ni", weight, aside)
+        # Of directions on one side the mean is 2 / pi long, of those on all sides nothing is left.
+        return np.asarray((front.mean(axis=1) >= 0.5) & (np.linalg.norm(aside, axis=1) < front.sum(axis=1) / np.pi))
 
 
 def cameras(points: Array, viewpoints: Array) -> tuple[Camera, ...]:

@@ -29,12 +29,15 @@ CELLS = 48
 
 
 def smallest_eigenvectors(covariance: Array) -> tuple[Array, Array]:
-    """Eigenvalues [N, 3] ascending, and the eigenvector [N, 3] of the smallest, of covariance matrices [N, 3, 3].
+    """Eigenvalues [N, d] ascending, and the eigenvector [N, d] of the smallest, of covariance matrices [N, d, d].
 
-    In closed form (Smith, 1961), seven times as fast as `eigh`: the values are the projections of an equilateral
+    In space in closed form (Smith, 1961), seven times as fast as `eigh`: values are the projections of an equilateral
     triangle onto a line, right to what rounds the largest; the vector lies across the rows of what is left without its
     value. Where the smallest two values are the same no two of the rows tell it, and `eigh` does.
     """
+    if covariance.shape[1] != 3:
+        values, vectors = np.linalg.eigh(covariance)
+        return np.clip(values, 0.0, None), vectors[:, :, 0]
     xx, yy, zz, xy, xz, yz = (covariance[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
     middle = (xx + yy + zz) / 3.0
     a, b, c = xx - middle, yy - middle, zz - middle
