@@ -7,7 +7,7 @@ the table that everything else reads.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from symrefine.decide.posterior import EVEN, EVEN_MIRROR
 from symrefine.errors import DegenerateShapeError
 from symrefine.fit.placed import Operations, Placed, common_center, elements
 from symrefine.fit.refine import Iterate, refine
-from symrefine.geometry import Array, Isometry
+from symrefine.geometry import Array, Isometry, frame_with_z
 from symrefine.groups import PointGroup, from_elements, is_subgroup
 from symrefine.propose.votes import AGREE_RAD
 from symrefine.surface.misses import LIMITS, SHARES, Deviation
@@ -132,13 +132,12 @@ def fitted(surface: Surface, start: Placed, *, before: int = 0) -> Hypothesis:
 
 def _placed(surface: Surface, placed: Placed, history: tuple[Iterate, ...], before: int) -> Hypothesis:
     """A group judged where a fit put it."""
-    parts = [(part, part.motions(placed.center)) for part in elements(placed.group)]
-    sources = _moved_each(len(parts))
-    misses = [surface.misses(motions, sources=sources) for _, motions in parts]
-    found, need = _all_judged(surface, parts, misses, placed.center)
+    parts = _Parts.of(placed)
+    misses = surface.misses(parts.motions, sources=parts.sources)
+    found, need = _judged(surface, parts, misses)
     if surface.openings is not None and need > exact_need(surface.floor):
         # What holds without it asks for no belief in anything unseen.
-        partly, partial = _seen_judged(surface, parts, misses, placed)
+        partly, partial = _seen_judged(surface, parts, misses)
         # What is unseen under no element by more than a detail is rather that: a flag, on one side.
         most = max(e.coverage.unseen for e in partly)
         if partial < need and (surface.openings.cameras or most > SHARES[1]):
@@ -146,17 +145,40 @@ def _placed(surface: Surface, placed: Placed, history: tuple[Iterate, ...], befo
     return Hypothesis(placed=placed, elements=found, need=need, history=history, before=before)
 
 
-def _seen_judged(
-    surface: Surface, parts: Sequence[tuple[Operations, tuple[Isometry, ...]]], misses: Sequence[Array], placed: Placed
-) -> tuple[tuple[Element, ...], float]:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Parts:
+    """The elements of a group where it stands, with the operations that stand for them in one row.
+
+    `rows` are those of each element; `sources` is how many local planes each of them moves.
+    """
+
+    placed: Placed
+    operations: tuple[Operations, ...]
+    motions: tuple[Isometry, ...]
+    rows: tuple[slice, ...]
+    sources: int
+
+    @classmethod
+    def of(cls, placed: Placed) -> "_Parts":
+        operations = elements(placed.group)
+        each = [part.motions(placed.center) for part in operations]
+        ends = np.cumsum([0, *map(len, each)]).tolist()
+        return cls(
+            placed=placed,
+            operations=tuple(operations),
+            motions=tuple(motion for motions in each for motion in motions),
+            rows=tuple(slice(*pair) for pair in pairwise(ends)),
+            sources=_moved_each(len(operations)),
+        )
+
+
+def _seen_judged(surface: Surface, parts: _Parts, misses: Array) -> tuple[tuple[Element, ...], float]:
     """The elements of a group by what was seen of them, and what all of them need with the belief in the rest."""
-    sources = _moved_each(len(parts))
-    seen = [surface.seen(m, motions, sources=sources) for m, (_, motions) in zip(misses, parts, strict=True)]
-    found, need = _all_judged(surface, parts, seen, placed.center)
+    found, need = _judged(surface, parts, surface.seen(misses, parts.motions, sources=parts.sources))
     if surface.openings is None or surface.openings.cameras:  # they say what they could not see
         return found, need
     # A lone mirror is forgiven more for being made inexactly, not for what nobody saw of it.
-    whole = surface.tolerance * (EVEN_MIRROR / EVEN if placed.group.name == "Cs" else 1.0)
+    whole = surface.tolerance * (EVEN_MIRROR / EVEN if parts.placed.group.name == "Cs" else 1.0)
     beliefs = [whole * _belief(e) for e in found]
     # More than half of the operations of a group generate it (Lagrange), so that the others follow.
     return (
@@ -179,27 +201,21 @@ def _moved_each(operations: int) -> int:
     return min(max(MOVED_EACH, MOVED // operations), MOVED // 4)
 
 
-def _all_judged(
-    surface: Surface, parts: Sequence[tuple[Operations, tuple[Isometry, ...]]], misses: Sequence[Array], center: Array
-) -> tuple[tuple[Element, ...], float]:
-    """The elements of a group from their misses, and what all of them need."""
-    found = tuple(_judged(surface, *p, m, center, len(parts)) for p, m in zip(parts, misses, strict=True))
+def _judged(surface: Surface, parts: _Parts, misses: Array) -> tuple[tuple[Element, ...], float]:
+    """The elements of a group from the misses [K, N] of its operations, and what all of them need."""
+    needs = surface.needed(misses, parts.motions, len(parts.operations))
+    found = tuple(
+        Element(
+            operations=part,
+            center=parts.placed.center,
+            deviation=Deviation.of(misses[rows]),
+            need=float(needs[rows].max()),
+            coverage=surface.coverage(misses[rows], parts.motions[rows], sources=parts.sources),
+        )
+        for part, rows in zip(parts.operations, parts.rows, strict=True)
+    )
     # A part out of place is met by all operations: together they tell it from noise where none does alone.
     return found, max(surface.needed_by_all(misses), *(e.need for e in found))
-
-
-def _judged(
-    surface: Surface, part: Operations, motions: Sequence[Isometry], misses: Array, center: Array, tests: int
-) -> Element:
-    worst = reduce(Deviation.at_least, map(Deviation.of, misses))
-    need = float(surface.needed(misses, motions, tests).max())
-    return Element(
-        operations=part,
-        center=center,
-        deviation=worst,
-        need=need,
-        coverage=surface.coverage(misses, motions, sources=_moved_each(tests)),
-    )
 
 
 def joined(parts: Sequence[Placed]) -> Placed | None:
@@ -224,11 +240,7 @@ def joined(parts: Sequence[Placed]) -> Placed | None:
 def single(element: Element) -> Hypothesis:
     """An element of a group as a group of its own."""
     part = element.operations
-    group = from_elements(
-        mirrors=[part.direction] if part.kind == "plane" else [],
-        axes=[(part.direction, part.order)] if part.kind == "axis" else [],
-        improper=[(part.direction, part.order)] if part.kind == "improper" else [],
-        inversion=part.kind == "inversion",
-    )
-    placed = Placed(group=group.for_point_set(), center=element.center)
-    return Hypothesis(placed=placed, elements=(element,), need=element.need)
+    number = "inf" if math.isinf(part.order) else f"{part.order:.0f}"
+    name = {"plane": "Cs", "inversion": "Ci", "axis": f"C{number}", "improper": f"S{number}"}[part.kind]
+    group = PointGroup(name=name, frame=frame_with_z(part.direction)).for_point_set()
+    return Hypothesis(placed=Placed(group=group, center=element.center), elements=(element,), need=element.need)

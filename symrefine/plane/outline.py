@@ -41,7 +41,7 @@ class Outlines:
     def judged(self, motions: Sequence[Isometry]) -> tuple[Deviation, tuple[float, ...]]:
         """The miss of several operations together, and what it needs, whatever the noise (see `NOISES`)."""
         found = [s.misses(motions) for s in self.surfaces]
-        worst = reduce(Deviation.at_least, (Deviation.of(d) for misses in found for d in misses))
+        worst = reduce(Deviation.at_least, map(Deviation.of, found))
         pairs = list(zip(self.surfaces, found, strict=True))
         return worst, tuple(max(_needed(s, misses, n) for s, misses in pairs) for n in NOISES)
 

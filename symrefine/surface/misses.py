@@ -46,10 +46,16 @@ class Deviation:
 
     @classmethod
     def of(cls, distances: Array) -> "Deviation":
-        """The distribution of distances [N], in fractions of the diagonal; NaN where nobody looked."""
-        distances = distances[np.isfinite(distances)] if np.isfinite(distances).any() else np.zeros(1)
-        p95, p99 = np.quantile(distances, [0.95, 0.99]).tolist()
-        return cls(mean=float(distances.mean()), p95=p95, p99=p99, max=float(distances.max()))
+        """The distribution of distances [N], in fractions of the diagonal; NaN where nobody looked.
+
+        Of several, [K, N], the largest of each statistic.
+        """
+        rows = np.atleast_2d(distances)
+        if np.isnan(rows).any():
+            seen = [row[np.isfinite(row)] for row in rows]
+            return reduce(cls.at_least, [cls.of(row if row.size else np.zeros(1)) for row in seen])
+        p95, p99 = np.quantile(rows, [0.95, 0.99], axis=1).max(axis=1).tolist()
+        return cls(mean=float(rows.mean(axis=1).max()), p95=p95, p99=p99, max=float(rows.max()))
 
     def at_least(self, other: "Deviation") -> "Deviation":
         """The larger of the two in every statistic."""

@@ -82,7 +82,7 @@ class Surface:
             miss[self.openings.unseen(self.cloud, moved, miss > self.far, stride, self.far * self.diagonal)] = np.nan
         return found
 
-    def coverage(self, misses: Array, motions: Sequence[Isometry], *, sources: int) -> Coverage:
+    def coverage(self, misses: Array, motions: Sequence[Isometry], *, sources: int = 10**9) -> Coverage:
         """What K operations say that miss by so much where it was seen [K, N]: the one that says least."""
         still = self.cloud.points[:: self.stride(sources)]
         travel = [np.linalg.norm(m.apply(still) - still, axis=1) for m in motions]
@@ -113,11 +113,9 @@ class Surface:
         """Covariance of the points [3, 3]."""
         return np.cov(self.cloud.points.T)
 
-    def needed_by_all(self, misses: Sequence[Array]) -> float:
-        """The smallest tolerance at which a surface holds that operations together miss so, each [K, N]."""
-        if self.cloud.body != "surface":
-            return 0.0
-        return float(needs(np.concatenate([m.ravel() for m in misses]), self.noise))
+    def needed_by_all(self, misses: Array) -> float:
+        """The smallest tolerance at which a surface holds that operations together miss so [K, N]."""
+        return float(needs(misses.ravel(), self.noise)) if self.cloud.body == "surface" else 0.0
 
     def needs(self, motions: Sequence[Isometry], *, sources: int = 10**9, bound: float = math.inf) -> Array:
         """The smallest tolerances [K] at which each of K operations holds, as far as it was seen; see `misses`."""
