@@ -127,10 +127,19 @@ class PointGroup:
     def distance_rad(self, operations: ArrayLike) -> Array:
         """Angle [k] between each orthogonal matrix [k, 3, 3] and the nearest operation of the group."""
         given = nearest_orthogonal(operations)
+        return chord_angles(given, self.nearest(given))
+
+    def nearest(self, matrices: Array) -> Array:
+        """The operation [k, 3, 3] nearest to each orthogonal matrix [k, 3, 3], exactly; any one of several."""
+        turned = self.frame @ matrices @ self.frame.T
         if self.is_finite:
-            return nearest_operations(given, standard_operations(self.symbol), self.frame)[1]
-        turned = self.frame @ given @ self.frame.T
-        return np.asarray(np.min([chord_angles(turned, near) for near in self._closest_continuous(turned)], axis=0))
+            operations = standard_operations(self.symbol)
+            found = operations[nearest_operations(turned, operations, np.eye(3))[0]]
+        else:
+            parts = np.array(list(self._closest_continuous(turned)))
+            best = np.argmin([chord_angles(turned, near) for near in parts], axis=0)
+            found = parts[best, np.arange(len(turned))]
+        return np.asarray(self.frame.T @ found @ self.frame)
 
     def equivalent(self, directions: ArrayLike) -> Array:
         """Orbit [j, 3] of one direction [3] or several [m, 3]: all distinct images, merged within 1e-6."""
