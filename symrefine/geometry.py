@@ -50,6 +50,35 @@ class ReadOnly:
                 object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
 
 
+def numbers(values: ArrayLike, name: str) -> Array:
+    """Real numbers as they are given, as float64.
+
+    Raises:
+        InputError: a mask, complex numbers, texts, or rows of different lengths.
+    """
+    try:
+        array = unmasked(values, name)
+        if array.dtype.kind not in "iuf":
+            kind = "complex" if np.iscomplexobj(array) else f"of type {array.dtype}"
+            raise InputError(f"{name} are not numbers in rows of one length: they are {kind}")
+        return array.astype(np.float64)
+    except InputError:
+        raise
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} are not numbers in rows of one length: {error}") from None
+
+
+def unmasked(values: ArrayLike, name: str) -> NDArray[Any]:
+    """Values as they are given.
+
+    Raises:
+        InputError: a masked array.
+    """
+    if np.ma.isMaskedArray(values):
+        raise InputError(f"{name} are a masked array; give the rows that count alone, without a mask")
+    return np.asarray(values)
+
+
 def batches(count: int, each: int) -> Iterator[slice]:
     """Slices that cover `count` items of `each` numbers, few enough in one to be held at once."""
     step = max(1, _AT_ONCE // max(each, 1))

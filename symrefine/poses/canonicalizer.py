@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.errors import InputError
-from symrefine.geometry import Array
+from symrefine.geometry import Array, numbers
 from symrefine.poses.given import Group, symmetry_of
 from symrefine.poses.mean import MeanPose, mean_pose
 from symrefine.poses.symmetry import Symmetry
@@ -108,7 +108,7 @@ class Canonicalizer:
         given = self.symmetry.rigid(poses, "poses")
         if given.ndim != 3 or len(given) == 0:
             raise InputError(f"poses has shape {list(given.shape)}; expected [N, 4, 4], N at least 1")
-        counts = np.ones(len(given)) if weights is None else np.asarray(weights, dtype=np.float64)
+        counts = np.ones(len(given)) if weights is None else numbers(weights, "weights")
         if counts.shape != (len(given),) or not (np.isfinite(counts).all() and counts.min() > 0.0):
             raise InputError(f"weights has shape {list(counts.shape)}; expected {len(given)} positive finite numbers")
         return mean_pose(self.symmetry, given, counts / counts.sum())

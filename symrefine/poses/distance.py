@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.errors import InputError
-from symrefine.geometry import Array, corners, read_only
+from symrefine.geometry import Array, corners, numbers, read_only
 from symrefine.groups.orthogonal import chord_angles
 from symrefine.poses.canonicalizer import Canonicalizer
 from symrefine.poses.given import Group, symmetry_of
@@ -102,7 +102,7 @@ def _projected(symmetry: Symmetry, a: Array, b: Array, vertices: Array, camera: 
 
 
 def _vertices(given: ArrayLike) -> Array:
-    points = np.asarray(given, dtype=np.float64)
+    points = numbers(given, "points")
     if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0 or not np.isfinite(points).all():
         raise InputError(f"points has shape {list(points.shape)}; expected finite vertices [V, 3], V at least 1")
     return points
@@ -110,7 +110,7 @@ def _vertices(given: ArrayLike) -> Array:
 
 def _camera(given: ArrayLike) -> Array:
     """The matrix [3, 3] of a pinhole camera."""
-    camera = np.asarray(given, dtype=np.float64)
+    camera = numbers(given, "intrinsics")
     if camera.shape == (4,):
         fx, fy, cx, cy = camera
         camera = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])

@@ -1,13 +1,13 @@
 """What users hold that says how a body is symmetric: a name, a group, a detection, matrices, an entry of BOP."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.errors import InputError, about
-from symrefine.geometry import Array, frame_with_z, homogeneous, unit
+from symrefine.geometry import Array, Axis, frame_with_z, homogeneous, numbers
 from symrefine.groups import MAX_FOLD, PointGroup, identify, point_group
 from symrefine.groups.orthogonal import chord_angles, determinants
 from symrefine.poses.symmetry import Symmetry, checked_poses
@@ -51,7 +51,7 @@ def symmetry_of(given: Group, center: ArrayLike | None = None) -> Symmetry:
     free = isinstance(given, str | PointGroup) or _shape(given)[-2:] == (3, 3)
     if center is not None and not free:
         raise InputError("center is for a name, a PointGroup or operations [N, 3, 3]; this group has its own")
-    place = np.zeros(3) if center is None else np.asarray(center, dtype=np.float64)
+    place = np.zeros(3) if center is None else numbers(center, "coordinates of the centre")
     if place.shape != (3,) or not np.isfinite(place).all():
         raise InputError(f"center has shape {list(place.shape)}; expected three finite numbers")
     match given:
@@ -70,8 +70,8 @@ def symmetry_of(given: Group, center: ArrayLike | None = None) -> Symmetry:
 def _shape(given: Any) -> tuple[int, ...]:
     """The shape of an array, or of what can become one; none of anything else."""
     try:
-        return np.asarray(given, dtype=np.float64).shape
-    except (TypeError, ValueError):
+        return numbers(given, "").shape
+    except InputError:
         return ()
 
 
@@ -83,7 +83,7 @@ def _of_operations(given: Any, center: Array) -> Symmetry:
             f"group {told}; expected a Schoenflies symbol, a PointGroup, what symrefine.detect found in space, "
             "operations [N, 3, 3] or [N, 4, 4], or the entry of an object in models_info.json"
         )
-    listed = np.asarray(given, dtype=np.float64)
+    listed = numbers(given, "operations")
     return _listed(checked_poses(listed if shape[1:] == (4, 4) else homogeneous(listed, center), "group"), 0.0)
 
 
@@ -125,63 +125,71 @@ def _check_meet(operations: Array, center: Array, diameter: float) -> None:
 def _of_bop(entry: Mapping[str, Any]) -> Symmetry:
     """The group that an entry's discrete and continuous symmetries generate, as `bop_toolkit` multiplies them."""
     if not {"diameter", *_BOP} & entry.keys():
-        raise InputError(f"has the keys {', '.join(map(str, entry))[:60]}; expected the entry of one object")
+        raise InputError(f"has the keys {', '.join(map(str, entry))[:60]!r}; expected the entry of one object")
     discrete = _motions(entry.get(_BOP[0], []))
-    lines = [_line(turning) for turning in entry.get(_BOP[1], [])]
-    diameter = float(entry.get("diameter", 0.0))
-    if not lines:
-        return _listed(discrete, diameter)
-    points, axes = (np.array(column) for column in zip(*lines, strict=True))
-    if np.abs(axes @ axes[0]).min() < np.cos(_TILT_RAD):
-        return _of_sphere(points, axes, diameter)
-    return _of_revolution(points[0], axes[0], discrete, diameter)
+    axes = _axes(entry.get(_BOP[1], []))
+    diameter = numbers(entry.get("diameter", 0.0), "values of diameter")
+    if diameter.shape or not 0.0 <= diameter < np.inf:
+        raise InputError(f"diameter is {entry['diameter']!r:.40}; expected a length")
+    if not axes:
+        return _listed(discrete, float(diameter))
+    if min(abs(axis.direction @ axes[0].direction) for axis in axes) < np.cos(_TILT_RAD):
+        return _of_sphere(axes, float(diameter))
+    return _of_revolution(axes[0], discrete, float(diameter))
 
 
 def _motions(listed: Any) -> Array:
-    try:
-        matrices = np.array(listed, dtype=np.float64).reshape(-1, 4, 4)
-    except (TypeError, ValueError):
-        raise InputError(f"{_BOP[0]} holds something else than lists of 16 numbers") from None
-    motions = checked_poses(matrices, _BOP[0])
+    """Rigid motions [N, 4, 4] of lists of 16 numbers."""
+    values = numbers(listed, _BOP[0])
+    if values.size % 16:
+        raise InputError(f"{_BOP[0]} has shape {list(values.shape)}; expected lists of 16 numbers")
+    motions = checked_poses(values.reshape(-1, 4, 4), _BOP[0])
     if (determinants(motions[:, :3, :3]) < 0.0).any():
         raise InputError(f"{_BOP[0]} holds a matrix of determinant -1; expected rigid motions")
     return motions
 
 
-def _line(turning: Any) -> tuple[Array, Array]:
-    """A point on an axis of revolution, the nearest to the origin, and its direction."""
+def _axes(listed: Any) -> list[Axis]:
+    """Axes of revolution, each through its point nearest to the origin."""
     try:
-        axis, point = (np.array(turning[key], dtype=np.float64).reshape(3) for key in ("axis", "offset"))
-    except (KeyError, TypeError, ValueError):
-        raise InputError(f"{_BOP[1]} holds {turning!r:.60}; expected axis and offset, three numbers each") from None
-    if not (np.isfinite(axis).all() and np.isfinite(point).all() and axis.any()):
-        raise InputError(f"{_BOP[1]} holds an axis that is zero or not finite")
-    direction = unit(axis)
-    return point - (point @ direction) * direction, direction
+        axes = [Axis(point=_triple(given["offset"]), direction=_triple(given["axis"])) for given in listed]
+    except (KeyError, TypeError):
+        raise InputError(f"{_BOP[1]} is {listed!r:.60}; expected a list of axes, each with axis and offset") from None
+    return [Axis(point=a.point - (a.point @ a.direction) * a.direction, direction=a.direction) for a in axes]
 
 
-def _of_sphere(points: Array, axes: Array, diameter: float) -> Symmetry:
-    """Two axes of revolution that meet generate all rotations; their point is the one nearest to all lines."""
-    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
-    center = np.linalg.solve(across.sum(axis=0), (across @ points[:, :, None]).sum(axis=0)[:, 0])
-    if np.linalg.norm(across @ (points - center)[:, :, None], axis=1).max() > max(_MEET_REL * diameter, _ROUNDING):
-        raise InputError(f"{_BOP[1]} holds axes that do not meet in a point")
+def _triple(given: Any) -> Array:
+    values = numbers(given, f"axis and offset of {_BOP[1]}").ravel()
+    if values.shape != (3,) or not np.isfinite(values).all():
+        raise InputError(f"{_BOP[1]} holds {given!r:.60}; expected three finite numbers")
+    return values
+
+
+def _of_sphere(axes: Sequence[Axis], diameter: float) -> Symmetry:
+    """Axes of revolution that meet generate all rotations; their point is the one nearest to all lines."""
+    across = np.array([np.eye(3) - np.outer(axis.direction, axis.direction) for axis in axes])
+    points = np.array([axis.point for axis in axes])
+    center = np.linalg.solve(across.sum(axis=0), np.einsum("kij,kj->i", across, points))
+    apart = np.linalg.norm(np.einsum("kij,kj->ki", across, points - center), axis=1)
+    if apart.max() > max(_MEET_REL * diameter, _ROUNDING):
+        raise InputError(f"{_BOP[1]} holds axes that do not meet in a point: they pass it by {apart.max():.3g}")
     return Symmetry.about(point_group("K"), center)
 
 
-def _of_revolution(point: Array, axis: Array, discrete: Array, diameter: float) -> Symmetry:
+def _of_revolution(axis: Axis, discrete: Array, diameter: float) -> Symmetry:
     """All turns about an axis, and what else is listed: turns about the same, and half turns across it."""
-    images = discrete[:, :3, :3] @ axis
-    over = images @ axis < 0.0
-    tilts = np.arccos(np.clip(np.abs(images @ axis), 0.0, 1.0))
+    images = discrete[:, :3, :3] @ axis.direction
+    cosines = images @ axis.direction
+    tilts = np.arccos(np.clip(np.abs(cosines), 0.0, 1.0))
     if tilts.max(initial=0.0) > _TILT_RAD:
         raise InputError(
             f"{_BOP[0]}[{int(tilts.argmax())}] tilts the axis of revolution by {np.degrees(tilts.max()):.2g} degrees"
         )
-    images_of_origin = discrete[over, :3, 3]
-    halfway = 0.5 * images_of_origin.mean(axis=0) if over.any() else np.zeros(3)
-    center = point + (halfway @ axis) * axis
+    over = cosines < 0.0
+    # A half turn across takes the origin twice as far along the axis as the centre lies.
+    along = 0.5 * float(np.mean(discrete[over, :3, 3] @ axis.direction)) if over.any() else 0.0
+    center = axis.point + along * axis.direction
     if len(discrete):
         _check_meet(discrete, center, diameter)
     name = "Dinf" if over.any() else "Cinf"
-    return Symmetry.about(point_group(name, frame_with_z(axis)), center)
+    return Symmetry.about(point_group(name, frame_with_z(axis.direction)), center)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.errors import InputError
-from symrefine.geometry import Array, ReadOnly, homogeneous
+from symrefine.geometry import Array, ReadOnly, homogeneous, numbers
 from symrefine.groups import PointGroup
 from symrefine.groups.orthogonal import determinants
 
@@ -96,12 +96,9 @@ def checked_poses(given: ArrayLike, name: str) -> Array:
     """Poses [..., 4, 4], orthogonal maps with a shift.
 
     Raises:
-        InputError: another shape, or an entry that is not finite, no orthogonal map, or no homogeneous matrix.
+        InputError: no numbers, another shape, or an entry that is not finite, orthogonal or homogeneous.
     """
-    try:
-        poses = np.asarray(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} is of type {type(given).__name__}; expected numbers of shape [..., 4, 4]") from None
+    poses = numbers(given, f"values of {name}")
     if poses.ndim < 2 or poses.shape[-2:] != (4, 4):
         raise InputError(f"{name} has shape {list(poses.shape)}; expected [..., 4, 4]")
     lost = ~np.isfinite(poses).all(axis=(-2, -1))
