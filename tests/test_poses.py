@@ -274,6 +274,8 @@ def test_entries_of_bop_are_read_as_they_are_written(name):
     reach = found.center - expected.center
     along = body.group.frame[2] if name[0] in "CS" else np.zeros(3)
     assert np.linalg.norm(reach - (reach @ along) * along) < 1.0 or proper.name == "C1"
+    six_digits = json.loads(json.dumps(entry), parse_float=lambda text: float(f"{float(text):.6g}"))
+    assert symmetry_of(six_digits).group.name == proper.name
 
 
 def test_what_was_detected_is_taken_as_exactly_as_the_shape_has_it():
@@ -317,6 +319,9 @@ LINE = {"axis": [0, 0, 1], "offset": [0, 0, 0]}
         ({"symmetries_discrete": [[1, 2, 3]]}, "expected lists of 16 numbers"),
         ({"symmetries_discrete": [np.diag([1.0, 1.0, -1.0, 1.0]).ravel()]}, "determinant -1; expected rigid motions"),
         ({"symmetries_continuous": [{"axis": [0, 0, 1]}]}, "each with axis and offset"),
+        ({"symmetries_continuous": [LINE, {"axis": [0, 0, 1], "offset": [0, 1, 0]}]}, "do not meet"),
+        ({"symmetries_continuous": [LINE, {"axis": [1, 0, 0], "offset": [0, 0, 0]}],
+          "symmetries_discrete": [ELSEWHERE.ravel()]}, "moves the point"),
         ({"symmetries_continuous": None}, "is None; expected a list of axes"),
         ({"symmetries_continuous": [LINE | {"offset": [0, np.nan, 0]}]}, "expected three finite numbers"),
         ({"symmetries_discrete": None}, "are not numbers"),

@@ -128,14 +128,25 @@ def _of_bop(entry: Mapping[str, Any]) -> Symmetry:
         raise InputError(f"has the keys {', '.join(map(str, entry))[:60]!r}; expected the entry of one object")
     discrete = _motions(entry.get(_BOP[0], []))
     axes = _axes(entry.get(_BOP[1], []))
-    diameter = numbers(entry.get("diameter", 0.0), "values of diameter")
-    if diameter.shape or not 0.0 <= diameter < np.inf:
-        raise InputError(f"diameter is {entry['diameter']!r:.40}; expected a length")
+    diameter = _length(entry.get("diameter", 0.0))
     if not axes:
-        return _listed(discrete, float(diameter))
-    if min(abs(axis.direction @ axes[0].direction) for axis in axes) < np.cos(_TILT_RAD):
-        return _of_sphere(axes, float(diameter))
-    return _of_revolution(axes[0], discrete, float(diameter))
+        return _listed(discrete, diameter)
+    alike = all(abs(axis.direction @ axes[0].direction) > np.cos(_TILT_RAD) for axis in axes)
+    group, center = _of_revolution(axes[0], discrete) if alike else _of_sphere(axes)
+    away = max(float(np.linalg.norm(np.cross(center - axis.point, axis.direction))) for axis in axes)
+    if away > max(_MEET_REL * diameter, _ROUNDING):
+        raise InputError(f"{_BOP[1]} holds axes that do not meet in a point: they pass it by {away:.3g}")
+    if len(discrete):
+        _check_meet(discrete, center, diameter)
+    return Symmetry.about(group, center)
+
+
+def _length(given: Any) -> float:
+    """The diameter of an entry."""
+    values = numbers(given, "values of diameter")
+    if values.shape or not 0.0 <= values < np.inf:
+        raise InputError(f"diameter is {given!r:.40}; expected a length")
+    return float(values)
 
 
 def _motions(listed: Any) -> Array:
@@ -165,21 +176,16 @@ def _triple(given: Any) -> Array:
     return values
 
 
-def _of_sphere(axes: Sequence[Axis], diameter: float) -> Symmetry:
+def _of_sphere(axes: Sequence[Axis]) -> tuple[PointGroup, Array]:
     """Axes of revolution that meet generate all rotations; their point is the one nearest to all lines."""
     across = np.array([np.eye(3) - np.outer(axis.direction, axis.direction) for axis in axes])
     points = np.array([axis.point for axis in axes])
-    center = np.linalg.solve(across.sum(axis=0), np.einsum("kij,kj->i", across, points))
-    apart = np.linalg.norm(np.einsum("kij,kj->ki", across, points - center), axis=1)
-    if apart.max() > max(_MEET_REL * diameter, _ROUNDING):
-        raise InputError(f"{_BOP[1]} holds axes that do not meet in a point: they pass it by {apart.max():.3g}")
-    return Symmetry.about(point_group("K"), center)
+    return point_group("K"), np.linalg.solve(across.sum(axis=0), np.einsum("kij,kj->i", across, points))
 
 
-def _of_revolution(axis: Axis, discrete: Array, diameter: float) -> Symmetry:
+def _of_revolution(axis: Axis, discrete: Array) -> tuple[PointGroup, Array]:
     """All turns about an axis, and what else is listed: turns about the same, and half turns across it."""
-    images = discrete[:, :3, :3] @ axis.direction
-    cosines = images @ axis.direction
+    cosines = discrete[:, :3, :3] @ axis.direction @ axis.direction
     tilts = np.arccos(np.clip(np.abs(cosines), 0.0, 1.0))
     if tilts.max(initial=0.0) > _TILT_RAD:
         raise InputError(
@@ -188,8 +194,5 @@ def _of_revolution(axis: Axis, discrete: Array, diameter: float) -> Symmetry:
     over = cosines < 0.0
     # A half turn across takes the origin twice as far along the axis as the centre lies.
     along = 0.5 * float(np.mean(discrete[over, :3, 3] @ axis.direction)) if over.any() else 0.0
-    center = axis.point + along * axis.direction
-    if len(discrete):
-        _check_meet(discrete, center, diameter)
-    name = "Dinf" if over.any() else "Cinf"
-    return Symmetry.about(point_group(name, frame_with_z(axis.direction)), center)
+    group = point_group("Dinf" if over.any() else "Cinf", frame_with_z(axis.direction))
+    return group, axis.point + along * axis.direction
