@@ -95,8 +95,8 @@ class Canonicalizer:
         """The pose [4, 4] nearest to many [N, 4, 4], of each the equivalent that is nearest to it.
 
         It minimises the sum of the squared chords `|R - R_i S_i|` over R and all choices of S_i, and has its centre
-        in the mean of their centres. About a continuous axis the mean of the directions of the axis counts; how far the
-        body is turned about it is that of the first pose.
+        in the mean of their centres. About a continuous axis it is the mean of the directions of the axis that counts;
+        how far the body is turned about it is taken from one of the poses.
 
         Args:
             poses: [N, 4, 4].
