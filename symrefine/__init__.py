@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from symrefine.load import load as load
     from symrefine.load import load_depth as load_depth
     from symrefine.ntuples.derive import derive as derive
+    from symrefine.poses.canonicalizer import Canonicalizer as Canonicalizer
+    from symrefine.poses.distance import symmetric_distance as symmetric_distance
     from symrefine.shape import Shape as Shape
 
     __version__: str
@@ -42,6 +44,8 @@ _HOMES = {
     "symrefine.front.beyond": ("SubspaceDetection",),
     "symrefine.front.aligned": ("Alignment",),
     "symrefine.ntuples.derive": ("derive",),
+    "symrefine.poses.canonicalizer": ("Canonicalizer",),
+    "symrefine.poses.distance": ("symmetric_distance",),
     "symrefine.shape": ("Shape",),
     "symrefine.geometry": ("Plane", "Axis"),
     "symrefine.groups": ("PointGroup", "point_group"),

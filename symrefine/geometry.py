@@ -4,6 +4,7 @@ Conventions: a plane is `n.x = d` with |n| = 1, and (n, d) ~ (-n, -d); an axis i
 direction u ~ -u; `T_a_b` maps b to a.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from numbers import Real
@@ -17,6 +18,9 @@ from symrefine.units import LARGEST_TOLERANCE as LARGEST_TOLERANCE
 
 Array = NDArray[np.floating[Any]]
 Mask = NDArray[np.bool_]
+
+# Numbers that a batch holds at once: 8 MB, what a cache and a small machine have.
+_AT_ONCE = 2**20
 
 
 def check_tolerance(tolerance: Any) -> None:
@@ -44,6 +48,41 @@ class ReadOnly:
         for field in fields(self):
             if field.type == Array:
                 object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
+
+
+def numbers(values: ArrayLike, name: str) -> Array:
+    """Real numbers as they are given, as float64.
+
+    Raises:
+        InputError: a mask, complex numbers, texts, or rows of different lengths.
+    """
+    try:
+        array = unmasked(values, name)
+        if array.dtype.kind not in "iuf":
+            kind = "complex" if np.iscomplexobj(array) else f"of type {array.dtype}"
+            raise InputError(f"{name} are not numbers in rows of one length: they are {kind}")
+        return array.astype(np.float64)
+    except InputError:
+        raise
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} are not numbers in rows of one length: {error}") from None
+
+
+def unmasked(values: ArrayLike, name: str) -> NDArray[Any]:
+    """Values as they are given.
+
+    Raises:
+        InputError: a masked array.
+    """
+    if np.ma.isMaskedArray(values):
+        raise InputError(f"{name} are a masked array; give the rows that count alone, without a mask")
+    return np.asarray(values)
+
+
+def batches(count: int, each: int) -> Iterator[slice]:
+    """Slices that cover `count` items of `each` numbers, few enough in one to be held at once."""
+    step = max(1, _AT_ONCE // max(each, 1))
+    yield from (slice(start, start + step) for start in range(0, count, step))
 
 
 def unit(vector: ArrayLike) -> Array:
@@ -238,6 +277,20 @@ def tight_diagonal(points: Array) -> float:
         if trial < best:
             best, frame = trial, turned
     return best
+
+
+def corners(points: Array) -> Array:
+    """Corners [k, n] of the convex hull of points [N, n], in the space that they span: flat sets have no volume."""
+    from scipy.spatial import ConvexHull
+
+    centred = points - points.mean(axis=0)
+    _, sizes, rows = np.linalg.svd(centred, full_matrices=False)
+    spanned = centred @ rows[sizes > 1e-9 * sizes[0]].T
+    if spanned.shape[1] == 0:
+        return points[:1]
+    if spanned.shape[1] == 1:
+        return points[[int(spanned.argmin()), int(spanned.argmax())]]
+    return np.asarray(points[ConvexHull(spanned).vertices])
 
 
 def _smallest_box(points: Array, frames: Array) -> tuple[float, Array]:

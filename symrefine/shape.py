@@ -6,8 +6,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symrefine.errors import DegenerateShapeError, InputError
-from symrefine.geometry import Array, read_only
+from symrefine.errors import DegenerateShapeError, InputError, about
+from symrefine.geometry import Array, numbers, read_only, unmasked
 
 Measure = Literal["points", "surface", "solid"]
 Index = NDArray[np.integer[Any]]
@@ -114,22 +114,8 @@ def _measure(measure: str | None, faces: Index | None, source: str) -> str:
 
 
 def _numbers(values: ArrayLike, name: str, source: str) -> Array:
-    try:
-        array = _unmasked(values, name, source)
-        if array.dtype.kind not in "iuf":
-            kind = "complex" if np.iscomplexobj(array) else f"of type {array.dtype}"
-            raise InputError(f"{source}: {name} are not numbers in rows of one length: they are {kind}")
-        return array.astype(np.float64)
-    except InputError:
-        raise
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{source}: {name} are not numbers in rows of one length: {error}") from None
-
-
-def _unmasked(values: ArrayLike, name: str, source: str) -> NDArray[Any]:
-    if np.ma.isMaskedArray(values):
-        raise InputError(f"{source}: {name} are a masked array; give the rows that count alone, without a mask")
-    return np.asarray(values)
+    with about(source):
+        return numbers(values, name)
 
 
 def _matrix(values: ArrayLike, name: str, source: str) -> Array:
@@ -169,7 +155,8 @@ def _viewpoint(values: ArrayLike, shape: tuple[int, ...], source: str) -> Array:
 
 
 def _labels(values: ArrayLike, count: int, what: str, source: str) -> Index:
-    array = _unmasked(values, "labels", source)
+    with about(source):
+        array = unmasked(values, "labels")
     if not np.issubdtype(array.dtype, np.integer):
         raise InputError(f"{source}: labels are {array.dtype}; expected integers, one class for each {what}")
     if array.shape != (count,):

@@ -125,6 +125,12 @@ def test_the_first_page_does_what_it_says(tmp_path: Path) -> None:
     assert timeless[0] == timeless[1]
 
 
+def test_the_page_on_poses_does_what_it_says() -> None:
+    program = python_blocks((DOCS / "poses.md").read_text(encoding="utf-8"))
+    assert "symrefine.Canonicalizer" in program
+    exec(program, {})
+
+
 def names(record: object) -> Iterator[str]:
     """Names of all fields of a report, those inside others too, but of `options` and `timings`, which vary."""
     if isinstance(record, dict):

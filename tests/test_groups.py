@@ -354,6 +354,21 @@ def test_distance_to_a_continuous_group_is_the_least_over_its_samples(seed):
         assert np.all(sampled <= exact + 0.6 * 2.0 * np.pi / MAX_FOLD)
 
 
+@pytest.mark.parametrize("name", ["C1", "S4", "D3d", "Oh", "I", *CONTINUOUS])
+@given(seed=SEEDS)
+@settings(max_examples=5, deadline=None)
+def test_the_nearest_operation_belongs_to_the_group_and_none_is_nearer(name, seed):
+    rng = np.random.default_rng(seed)
+    group = point_group(name, random_orthogonal(rng))
+    matrices = np.array([random_orthogonal(rng, det=det) for det in (1, -1, 1, -1, 1, -1)])
+    found = group.nearest(matrices)
+    assert group.distance_rad(found).max() < 1e-9
+    away = np.linalg.norm(found - matrices, axis=(1, 2))
+    others = np.linalg.norm(group.sampled(12).operations()[:, None] - matrices, axis=(2, 3))
+    assert np.all(away <= others + 1e-12)
+    np.testing.assert_allclose(group.nearest(found), found, atol=1e-9)
+
+
 # From noisy operations to the group
 
 

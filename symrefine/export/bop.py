@@ -16,13 +16,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import ConvexHull
 from scipy.spatial.distance import cdist
 
 from symrefine.detection.result import Detection
 from symrefine.errors import InputError
 from symrefine.files import json_text
-from symrefine.geometry import Array, Isometry, frame_with_z, rotation, toward_positive, unit
+from symrefine.geometry import Array, Isometry, corners, frame_with_z, rotation, toward_positive, unit
 from symrefine.groups import PointGroup
 from symrefine.shape import Shape
 from symrefine.symmetrize import exact_place
@@ -138,26 +137,16 @@ def read_models_info(path: Path) -> dict[str, Entry]:
 
 def diameter(points: Array) -> float:
     """Largest distance between two of the points [N, n], exactly; only corners of the convex hull can have it."""
-    corners = _corners(points)
-    radius = np.linalg.norm(corners - corners.mean(axis=0), axis=1)
+    outer = corners(points)
+    radius = np.linalg.norm(outer - outer.mean(axis=0), axis=1)
     order = np.argsort(-radius)
-    corners, radius = corners[order], radius[order]
+    outer, radius = outer[order], radius[order]
     best = 0.0
-    for start in range(0, len(corners), _BLOCK):
+    for start in range(0, len(outer), _BLOCK):
         if 2.0 * radius[start] <= best:
             break
-        best = max(best, float(cdist(corners[start : start + _BLOCK], corners[start:]).max()))
+        best = max(best, float(cdist(outer[start : start + _BLOCK], outer[start:]).max()))
     return best
-
-
-def _corners(points: Array) -> Array:
-    """Corners of the convex hull, in the space that the points span: planar and straight sets have no volume."""
-    centred = points - points.mean(axis=0)
-    _, sizes, rows = np.linalg.svd(centred, full_matrices=False)
-    spanned = centred @ rows[sizes > 1e-9 * sizes[0]].T
-    if spanned.shape[1] == 1:
-        return points[[int(spanned.argmin()), int(spanned.argmax())]]
-    return np.asarray(points[ConvexHull(spanned).vertices])
 
 
 def _no_constant(name: str) -> float:

@@ -7,6 +7,7 @@ from typing import Any
 from symrefine.detection.result import Detection as BareDetection
 from symrefine.front.answers import Found, Operations, Options
 from symrefine.geometry import Array
+from symrefine.groups import PointGroup
 from symrefine.shape import Shape
 
 
@@ -29,6 +30,16 @@ class Detection(Found, BareDetection):
 
         return detection_record(self, self.shape, options=options, load_s=load_s)
 
+    def placed(self) -> tuple[PointGroup, Array]:
+        """The group and the point [3] where its operations meet, as exactly as the shape has them.
+
+        Raises:
+            InputError: nothing is decided.
+        """
+        from symrefine.export.bop import decided
+
+        return decided(self, self.shape)
+
     def operations(self, *, improper: bool = True, steps: int | None = None) -> Operations:
         """Operations of the group [N, 4, 4] in the units and the frame of the input, determinants with them.
 
@@ -39,10 +50,9 @@ class Detection(Found, BareDetection):
         Raises:
             InputError: nothing is decided.
         """
-        from symrefine.export.bop import decided
         from symrefine.export.operations import STEPS, motions
 
-        group, center = decided(self, self.shape)
+        group, center = self.placed()
         return Operations.of(motions(group, center, improper=improper, steps=STEPS if steps is None else steps))
 
     def canonical_transform(self) -> Array:

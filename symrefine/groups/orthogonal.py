@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symrefine.errors import InputError
-from symrefine.geometry import Array
+from symrefine.geometry import Array, batches
 
 Index = NDArray[np.intp]
 # What rounding may leave of a direction, of an angle [rad], or of what vanishes.
@@ -114,7 +114,10 @@ def unique_lines(directions: Array) -> tuple[Array, Index]:
 def nearest_operations(operations: Array, group: Array, frame: Array) -> tuple[Index, Array]:
     """For each operation [k, 3, 3] the nearest `F' G F`, G in `group` [m, 3, 3]: its index [k] and angle away [k]."""
     turned = frame @ operations @ frame.T
-    index = np.argmax(turned.reshape(len(turned), 9) @ group.reshape(len(group), 9).T, axis=1)
+    given, known = turned.reshape(len(turned), 9), group.reshape(len(group), 9).T
+    index = np.empty(len(turned), dtype=np.intp)
+    for batch in batches(len(turned), len(group)):
+        index[batch] = np.argmax(given[batch] @ known, axis=1)
     return index, chord_angles(turned, group[index])
 
 

@@ -123,14 +123,20 @@ class PointGroup:
 
     def distance_rad(self, operations: ArrayLike) -> Array:
         """Angle [k] between each orthogonal matrix [k, 3, 3] and the nearest operation of the group."""
-        return self.distance_of(nearest_orthogonal(operations))
+        given = nearest_orthogonal(operations)
+        return chord_angles(given, self.nearest(given))
 
-    def distance_of(self, operations: Array) -> Array:
-        """The same of matrices that are known to be orthogonal."""
+    def nearest(self, matrices: Array) -> Array:
+        """The operation [k, 3, 3] nearest to each orthogonal matrix [k, 3, 3], exactly; any one of several."""
+        turned = self.frame @ matrices @ self.frame.T
         if self.is_finite:
-            return nearest_operations(operations, standard_operations(self.symbol), self.frame)[1]
-        turned = self.frame @ operations @ self.frame.T
-        return np.asarray(np.min([chord_angles(turned, near) for near in self._closest_continuous(turned)], axis=0))
+            operations = standard_operations(self.symbol)
+            found = operations[nearest_operations(turned, operations, np.eye(3))[0]]
+        else:
+            parts = np.array(list(self._closest_continuous(turned)))
+            best = np.argmin([chord_angles(turned, near) for near in parts], axis=0)
+            found = parts[best, np.arange(len(turned))]
+        return np.asarray(self.frame.T @ found @ self.frame)
 
     def equivalent(self, directions: ArrayLike) -> Array:
         """Orbit [j, 3] of one direction [3] or several [m, 3]: all distinct images, merged within 1e-6."""
@@ -174,7 +180,7 @@ def is_subgroup(a: PointGroup, b: PointGroup, tolerance_rad: float = EXACT) -> b
     if b.is_finite and not a.is_finite:
         return False
     members = a.frame.T @ standard_operations(_sampled(a.symbol, 7)) @ a.frame
-    return bool(b.distance_of(members).max() <= tolerance_rad)
+    return bool(chord_angles(members, b.nearest(members)).max() <= tolerance_rad)
 
 
 def _sampled(symbol: Symbol, fold: int) -> Symbol:
