@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from symrefine.groups import point_group as point_group
     from symrefine.load import load as load
     from symrefine.load import load_depth as load_depth
+    from symrefine.load import load_frames as load_frames
     from symrefine.ntuples.derive import derive as derive
     from symrefine.shape import Shape as Shape
 
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
 # Where each public name comes from.
 _HOMES = {
-    "symrefine.load": ("load", "load_depth"),
+    "symrefine.load": ("load", "load_frames", "load_depth"),
     "symrefine.front.verbs": ("detect", "align", "symmetrize", "complete", "export", "report"),
     "symrefine.front.space": ("Detection",),
     "symrefine.front.planar": ("PlanarDetection",),

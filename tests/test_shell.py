@@ -114,7 +114,7 @@ def test_what_is_of_one_file_is_refused_for_several(run: Run, folder: Path, opti
     before = sorted(folder.iterdir())
     right = "symrefine batch DIR --bop" if option == "--bop" else "`detect` for each"
     name = "f.png" if option == "--picture" else "f.html"
-    assert_refused(run("detect", "box.xyz", "row.csv", option, name), f"{option} {name}: is for one file", right)
+    assert_refused(run("detect", "box.xyz", "row.csv", option, name), f"{option} {name}: is for one object", right)
     assert_refused(run("detect", "box.xyz", "row.csv", "--json", "row.csv"), "same file as the input")
     assert sorted(folder.iterdir()) == before
 

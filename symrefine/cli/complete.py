@@ -4,8 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from symrefine.cli.detect import read_scan
-from symrefine.cli.inputs import loaded
+from symrefine.cli.inputs import loaded, read_scan
 from symrefine.cli.outputs import bytes_writer, check_outputs, json_writer, note, tell, write_all
 from symrefine.cli.signs import waiting
 from symrefine.cli.values import add_depth_options, add_detection_options, add_path, add_scan_options, detection_options
