@@ -38,16 +38,11 @@ def run(args: argparse.Namespace) -> int:
 
 def _record(args: argparse.Namespace) -> dict[str, Any]:
     from symrefine.front.verbs import align
-    from symrefine.lengths import relative_tolerance
     from symrefine.load import load
 
     clock = Clock()
     with clock("load"):
         source, target = (load(path, measure=args.measure) for path in (args.source, args.target))
-    tolerance = relative_tolerance(args.tolerance, target, units=args.units)
-    options = {"scale": args.scale, "seed": args.seed}
-    found = align(source, target, allow_reflection=not args.rotations_only, tolerance=tolerance, **options)
-    chosen = {"tolerance": args.tolerance, **options, "measure": args.measure, "rotations_only": args.rotations_only}
-    chosen |= {"units": args.units} if args.units else {}
-    chosen |= {"relative_tolerance": tolerance} if isinstance(args.tolerance, str) else {}
-    return found.to_dict(options=chosen, load_s=clock.seconds["load"])
+    asked = {"tolerance": args.tolerance, "units": args.units, "scale": args.scale, "seed": args.seed}
+    found = align(source, target, allow_reflection=not args.rotations_only, **asked)
+    return found.to_dict(options={**found.options, "measure": args.measure}, load_s=clock.seconds["load"])

@@ -21,7 +21,6 @@ from symrefine.cli.outputs import (
     print_lines,
     say,
     tell,
-    text_writer,
     write_all,
 )
 from symrefine.cli.signs import Doing, counting
@@ -39,10 +38,9 @@ from symrefine.cli.values import (
 )
 from symrefine.clock import Clock
 from symrefine.errors import InputError
-from symrefine.files import Writer, json_array_text
+from symrefine.files import Writer, json_array_text, text_writer
 
 if TYPE_CHECKING:
-    from symrefine.detection.result import Detection
     from symrefine.shape import Shape
 
 # Exit status of `--strict` where nothing is decided, and where one of several files could not be used.
@@ -166,7 +164,7 @@ def _examined(args: argparse.Namespace, given: Object) -> tuple["Shape", Any, di
 
 def _told(args: argparse.Namespace, given: Iterable[Object], doing: Doing) -> Iterator[dict[str, Any]]:
     """The record of each of several objects, a line as soon as it is done; one that fails does not end the others."""
-    from symrefine.cli.tables import ROW_HEAD, row_line
+    from symrefine.cli.rows import ROW_HEAD, row_line
 
     in_lines = args.json != STDOUT and not is_quiet()
     if in_lines:
@@ -235,22 +233,21 @@ def detected(
 ) -> Any:
     """What `detect` says of the shape in a file, with `detection_options`, and those of a picture."""
     from symrefine.front.verbs import detect
-    from symrefine.lengths import relative_tolerance
     from symrefine.load import IMAGES, suffix_of
 
-    outliers = options.get("outliers", "auto")
     if threshold is not None or invert or (shape.dim == 2 and suffix_of(Path(file)) in IMAGES):
         options = options | {"threshold": threshold, "invert": invert}
     found = detect(
         shape,
-        outliers=outliers,
-        tolerance=relative_tolerance(options["tolerance"], shape, units=options.get("units"), outliers=outliers),
+        outliers=options.get("outliers", "auto"),
+        tolerance=options["tolerance"],
+        units=options.get("units"),
         seed=options["seed"],
     )
     return replace(found, options=options)
 
 
-def _writers(args: argparse.Namespace, shape: "Shape", detection: "Detection") -> dict[str, Writer]:
+def _writers(args: argparse.Namespace, shape: "Shape", detection: Any) -> dict[str, Writer]:
     """Writers of the files that are of one object.
 
     Raises:
@@ -267,16 +264,7 @@ def _writers(args: argparse.Namespace, shape: "Shape", detection: "Detection") -
         entry = bop_entry(detection, shape, scale=args.bop_scale or 1.0)
         number = 1 if args.bop_id is None else args.bop_id
         writers[args.bop] = text_writer(bop_text(Path(args.bop), {number: entry}))
-    if args.recording is not None:
-        from symrefine.viewer import record as write_recording
-
-        writers[args.recording] = partial(write_recording, detection, shape)
-    if args.picture is not None:
-        from symrefine.report import draw
-
-        writers[args.picture] = partial(draw, detection, shape)
-    if args.report is not None:
-        from symrefine.report import write_html
-
-        writers[args.report] = partial(write_html, detection, shape)
+    for name, suffix in ((args.recording, ".rrd"), (args.picture, ".png"), (args.report, ".html")):
+        if name is not None:
+            writers[name] = detection.writer(suffix)
     return writers

@@ -58,7 +58,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _record(args: argparse.Namespace, shape: "Shape", found: "Survey") -> dict[str, Any]:
-    from symrefine.export.records import number, numbers
+    from importlib.metadata import version
+
+    from symrefine.export.numbers import number, numbers
     from symrefine.load import IMAGES, suffix_of
     from symrefine.survey import doubts
 
@@ -66,6 +68,7 @@ def _record(args: argparse.Namespace, shape: "Shape", found: "Survey") -> dict[s
     return {
         "schema": SCHEMA,
         "source": shape.source,
+        "version": version("symrefine"),
         "options": reading_options(args),
         "kind": "picture" if shape.dim == 2 and suffix_of(Path(shape.source)) in IMAGES else found.kind,
         "dimension": shape.dim,

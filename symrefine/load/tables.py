@@ -27,6 +27,8 @@ from symrefine.load.text import (
 )
 
 _FIELDS = ("points", "normals", "weights", "faces")
+# What `complete` writes beside the points, of no matter unless it is asked for, as the property of a .ply.
+_MARK = "inferred"
 _COLOURS = (("red", "green", "blue"), ("r", "g", "b"))
 # First columns that number the rows; pandas writes the last where it has read the first.
 _INDEX = re.compile(r"|index|id|unnamed: 0")
@@ -151,6 +153,7 @@ def read_npz(data: bytes, named: Collection[str] = ()) -> Content:
     """
     arrays = _read_archive(data)
     fields = {name: arrays.pop(name) for name in named if name in arrays and name not in _FIELDS}
+    arrays.pop(_MARK, None)
     unknown = sorted(set(arrays) - set(_FIELDS))
     if unknown or "points" not in arrays:
         raise InputError(
