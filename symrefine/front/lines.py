@@ -43,8 +43,8 @@ def _made(record: Record) -> dict[str, str]:
     """What was made exact, how, how far points moved, and how exact it is."""
     return {
         "found": f"{symbol(record['found'])}, confidence {record['confidence']:.3f}",
-        "points": f"{record['points']:,}, {record['paired']:.1%} of them paired; {METHODS[record['method']]}",
-        "moved": f"by {record['largest']:.3%} of the diagonal at most, {record['rms']:.3%} RMS",
+        "points": f"{record['points']:,}, {percent(record['paired'])} of them paired; {METHODS[record['method']]}",
+        "moved": f"by {percent(record['largest'])} of the diagonal at most, {percent(record['rms'])} RMS",
         "result": f"misses itself by {record['residual']:.1e} of the diagonal",
     }
 
@@ -101,7 +101,7 @@ def _order(axis: Record) -> str:
 
 def _otherwise(record: Record) -> str:
     others = record.get("alternatives", [])
-    told = [f"{symbol(a['point_group'])} {100 * a['probability']:.2g} %" for a in others[:TOLD]]
+    told = [f"{symbol(a['point_group'])} {percent(a['probability'])}" for a in others[:TOLD]]
     return ", ".join(told + ["..."] * (len(others) > TOLD)) or "nothing else"
 
 

@@ -179,7 +179,9 @@ def kind_name(kind: str, order: float = 0.0) -> str:
 
 def percent(fraction: float) -> str:
     """A fraction to two significant digits, in percent."""
-    return f"{100.0 * fraction:.2g} %" if fraction >= 1e-4 or fraction == 0 else "less than 0.01 %"
+    if 0.0 < fraction < 1e-4:
+        return "less than 0.01 %"
+    return f"{100.0 * fraction:.{2 if fraction < 0.995 else 3}g} %"
 
 
 def count(number: int, noun: str, plural: str = "") -> str:
