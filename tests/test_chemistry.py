@@ -445,6 +445,16 @@ def test_more_frames_than_are_kept_at_once_are_refused(
     assert invoke(["detect", str(path), "--frame", "2"]) == 0
 
 
+def test_frames_of_one_file_are_aligned(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.xyz"
+    turned = "3\nwater\nO 0 0 0\nH 0.59 0 0.76\nH 0.59 0 -0.76\n"
+    path.write_text(WATER + turned)
+    status, record = told(["align", path, path, "--source-frame", 0, "--target-frame", 1], capsys)
+    assert (status, record["status"], record["options"]["target_frame"]) == (0, "ok", 1)
+    assert invoke(["align", str(path), str(path), "--source-frame", "0"]) == 2
+    assert f"{path}: holds 2 frames; choose one with frame" in capsys.readouterr().err
+
+
 def test_load_frames_makes_what_is_asked_for(tmp_path: Path) -> None:
     path = tmp_path / "a.xyz"
     path.write_text(WATER + WATER.replace("O 0", "Qq 0") + WATER)

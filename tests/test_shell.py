@@ -365,6 +365,7 @@ def test_a_reader_that_leaves_is_no_error(line: str) -> None:
     assert not [row for row in done.stderr.splitlines() if not signs.match(row)]
 
 
+@pytest.mark.usefixtures("folder")
 def test_a_report_does_not_take_the_place_of_an_object() -> None:
     Path("a.ply").write_text("an object")
     for option in ("--json", "--report", "--recording", "--bop"):
