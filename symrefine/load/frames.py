@@ -1,7 +1,7 @@
 """Files that hold several objects: molecules one after the other, models, a series of volumes."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Generic, TypeVar, overload
 
 from symrefine.errors import InputError
@@ -21,7 +21,7 @@ class Frames(Sequence[T], Generic[T]):
 
     what: str
     size: int
-    make: Callable[[int], T]
+    make: Callable[[int], T] = field(repr=False)
 
     def __len__(self) -> int:
         return self.size
