@@ -14,20 +14,23 @@ if TYPE_CHECKING:
     from symrefine.errors import SymrefineError as SymrefineError
     from symrefine.front.aligned import Alignment as Alignment
     from symrefine.front.beyond import SubspaceDetection as SubspaceDetection
+    from symrefine.front.completed import Completion as Completion
+    from symrefine.front.exact import Symmetrized as Symmetrized
+    from symrefine.front.made import complete as complete
+    from symrefine.front.made import export as export
+    from symrefine.front.made import symmetrize as symmetrize
     from symrefine.front.planar import PlanarDetection as PlanarDetection
     from symrefine.front.space import Detection as Detection
     from symrefine.front.verbs import align as align
-    from symrefine.front.verbs import complete as complete
     from symrefine.front.verbs import detect as detect
-    from symrefine.front.verbs import export as export
     from symrefine.front.verbs import report as report
-    from symrefine.front.verbs import symmetrize as symmetrize
     from symrefine.geometry import Axis as Axis
     from symrefine.geometry import Plane as Plane
     from symrefine.groups import PointGroup as PointGroup
     from symrefine.groups import point_group as point_group
     from symrefine.load import load as load
     from symrefine.load import load_depth as load_depth
+    from symrefine.load import load_frames as load_frames
     from symrefine.ntuples.derive import derive as derive
     from symrefine.poses.canonicalizer import Canonicalizer as Canonicalizer
     from symrefine.poses.distance import symmetric_distance as symmetric_distance
@@ -37,12 +40,15 @@ if TYPE_CHECKING:
 
 # Where each public name comes from.
 _HOMES = {
-    "symrefine.load": ("load", "load_depth"),
-    "symrefine.front.verbs": ("detect", "align", "symmetrize", "complete", "export", "report"),
+    "symrefine.load": ("load", "load_frames", "load_depth"),
+    "symrefine.front.verbs": ("detect", "align", "report"),
+    "symrefine.front.made": ("symmetrize", "complete", "export"),
     "symrefine.front.space": ("Detection",),
     "symrefine.front.planar": ("PlanarDetection",),
     "symrefine.front.beyond": ("SubspaceDetection",),
     "symrefine.front.aligned": ("Alignment",),
+    "symrefine.front.exact": ("Symmetrized",),
+    "symrefine.front.completed": ("Completion",),
     "symrefine.ntuples.derive": ("derive",),
     "symrefine.poses.canonicalizer": ("Canonicalizer",),
     "symrefine.poses.distance": ("symmetric_distance",),

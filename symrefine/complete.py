@@ -68,8 +68,7 @@ def complete(
     Raises:
         InputError: a mesh or atoms, an object without a symmetry, or none that can be decided.
     """
-    if shape.faces is not None or shape.dim != 3 or is_few(shape):
-        raise InputError(f"{shape.source}: completion is for clouds of the surface of an object in space")
+    check_scan(shape)
     found = detect(shape, outliers=outliers, tolerance=tolerance, seed=seed) if found is None else found
     if found.undetermined or found.point_group == "C1":
         why = found.undetermined or "no symmetry was found"
@@ -83,6 +82,16 @@ def complete(
         contradicted=int(said.contradicted.sum()),
         detection=found,
     )
+
+
+def check_scan(shape: Shape) -> None:
+    """Refuse what nobody scanned.
+
+    Raises:
+        InputError: a mesh, atoms, or points that are not of space.
+    """
+    if shape.faces is not None or shape.dim != 3 or is_few(shape):
+        raise InputError(f"{shape.source}: completion is for clouds of the surface of an object in space")
 
 
 def verdicts(found: Detection, points: Array) -> Verdicts:

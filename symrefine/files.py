@@ -95,6 +95,16 @@ def write_all(writers: Mapping[str, Writer]) -> None:
             write(stack.enter_context(replacing(Path(name))))
 
 
+def text_writer(text: str) -> Writer:
+    """A writer of text in UTF-8, lines ending as they are."""
+    return bytes_writer(text.encode("utf-8"))
+
+
+def bytes_writer(data: bytes) -> Writer:
+    """A writer of bytes."""
+    return lambda path: path.write_bytes(data)
+
+
 def json_text(data: Mapping[str, Any]) -> str:
     """Strict JSON in ASCII: a line for each entry, and for each object in a list of objects.
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from symrefine.detection.measure import Outliers, is_few
 from symrefine.errors import InputError
-from symrefine.geometry import LARGEST_TOLERANCE, Array, tight_diagonal
+from symrefine.geometry import LARGEST_TOLERANCE, Array, check_tolerance, tight_diagonal
 from symrefine.plane.outline import smallest_diagonal
 from symrefine.shape import Shape
 from symrefine.surface.sampling import sampling
@@ -22,20 +22,21 @@ def relative_tolerance(
         outliers: whether points that belong to no surface count for the diagonal, as in `detect`.
 
     Raises:
-        InputError: a unit that is not known, of the tolerance or of the shape; units for a tolerance that is none; a
-            tolerance beyond a fifth of the diagonal.
+        InputError: a unit that is not known, of the tolerance or of the shape; units for a tolerance that has none; a
+            tolerance of 0 or less, or beyond a fifth of the diagonal; neither a number nor a length.
     """
     if not isinstance(asked, str):
+        check_tolerance(asked)
         if units is not None:
-            raise InputError(f"--units {units}: says what a tolerance with a unit is; --tolerance {asked:g} has none")
-        return asked
+            raise InputError(f"units are {units!r}, for a tolerance with a unit, such as 0.5mm; {asked:g} has none")
+        return float(asked)
     value, unit = read_length(asked)
     length = value if unit == OF_FILE else value * METRES[unit] / METRES[_unit(asked, shape, units)]
     diagonal = object_diagonal(shape, outliers=outliers)
     if length > LARGEST_TOLERANCE * diagonal:
         raise InputError(
-            f"{shape.source}: --tolerance {asked} is {length / diagonal:.3g} of the diagonal, {diagonal:.4g} in units "
-            f"of the file; expected at most {LARGEST_TOLERANCE} of it"
+            f"{shape.source}: tolerance {asked} is {length / diagonal:.3g} of the diagonal, {diagonal:.4g} in units of "
+            f"the file; expected at most {LARGEST_TOLERANCE} of it"
         )
     return length / diagonal
 
@@ -45,8 +46,8 @@ def _unit(asked: str, shape: Shape, units: str | None) -> str:
     found = units or shape.unit
     if found is None:
         raise InputError(
-            f"{shape.source}: --tolerance {asked}: the file does not say its unit; give it as --units mm (or "
-            f"{' '.join(unit for unit in METRES if unit != 'mm')}), or the tolerance as 0.5u in units of the file"
+            f"{shape.source}: does not say its unit, which tolerance {asked} needs; give it as units (--units), one of "
+            f"{' '.join(METRES)}, or the tolerance as 0.5u in units of the file"
         )
     if found not in METRES:
         raise InputError(f"units are {found!r}; expected one of {' '.join(METRES)}")

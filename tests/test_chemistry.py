@@ -1,15 +1,18 @@
 """Molecules in files of chemists: what ASE writes is read, one frame is chosen, damage is told with its line."""
 
+import io
+import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from symrefine.cli import invoke
+from symrefine.cli import inputs, invoke
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
-from symrefine.load import load
+from symrefine.load import load, load_frames
 from symrefine.shape import Shape
 
 WATER = "3\nwater\nO 0 0 0\nH 0.76 0.59 0\nH -0.76 0.59 0\n"
@@ -77,8 +80,10 @@ def test_frames_are_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert "a frame is chosen of molecules and volumes only: " in refusal(tmp_path, "0,0\n1,1\n", "a.csv", frame=0)
     path = tmp_path / "a.xyz"
     path.write_text(WATER * 2)
-    assert invoke(["detect", str(path)]) == 2
-    assert "choose one with frame (--frame)" in capsys.readouterr().err
+    assert invoke(["info", str(path)]) == 2
+    assert f"{path}: holds 2 frames; choose one with frame (--frame)" in capsys.readouterr().err
+    assert invoke(["info", str(path), "--frame", "1"]) == 0
+    assert "a.xyz: points in 3 dimensions, 3 points" in capsys.readouterr().out
     assert invoke(["detect", str(path), "--frame", "1", "--json", "-"]) == 0
     assert '"frame": 1' in capsys.readouterr().out
     assert detect(load(path, frame=1)).point_group == "C2v"
@@ -383,3 +388,84 @@ def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert "gemmi is needed to read it and is not installed: pip install 'symrefine[chem]'" in refusal(
         tmp_path, CIF, "a.cif"
     )
+
+
+def told(argv: list[object], capsys: pytest.CaptureFixture[str]) -> tuple[int, Any]:
+    """Status of a command line, and the JSON it wrote; seconds and names apart."""
+    status = invoke([*map(str, argv), "--json", "-"])
+    records = json.loads(capsys.readouterr().out)
+    for record in records if isinstance(records, list) else [records]:
+        record.pop("timings", None)
+    return status, records
+
+
+@pytest.mark.parametrize(("name", "text"), [("a.xyz", WATER + WATER.replace("O 0", "S 9")), ("b.sdf", MOL * 2)])
+def test_each_frame_is_an_object_of_its_own(
+    tmp_path: Path, name: str, text: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = text.replace("M  END\n", "M  END\n$$$$\n")
+    path = tmp_path / name
+    path.write_text(text)
+    status, each = told(["detect", path], capsys)
+    alone = [told(["detect", path, "--frame", k], capsys)[1] for k in (0, 1)]
+    assert status == 0
+    assert [record.pop("source") for record in each] == [f"{path}#0", f"{path}#1"]
+    assert {record.pop("source") for record in alone} == {str(path)}
+    assert each == alone
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
+    status, piped = told(["detect", "-", "--format", path.suffix], capsys)
+    assert [record.pop("source") for record in piped] == ["stdin#0", "stdin#1"]
+    assert (status, piped) == (0, alone)
+
+
+def test_a_frame_that_fails_does_not_end_the_others(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, other = tmp_path / "a.xyz", tmp_path / "b.xyz"
+    path.write_text(WATER + WATER.replace("O 0", "Qq 0") + WATER)
+    other.write_text(WATER)
+    assert invoke(["detect", str(path), str(other)]) == 2
+    head, *lines = capsys.readouterr().out.splitlines()
+    assert head.split()[0] == "group"
+    assert [line.split()[0] for line in lines] == ["C2v", "failed:", "C2v", "C2v"]
+    assert [line.split()[-1] for line in (lines[0], *lines[2:])] == [f"{path}#0", f"{path}#2", str(other)]
+    assert f"{path}#1: line 8: 'Qq' is no element" in lines[1]
+    for option, name in (("--report", "a.html"), ("--picture", "a.png"), ("--recording", "a.rrd"), ("--bop", "a.json")):
+        assert invoke(["detect", str(path), option, str(tmp_path / name)]) == 2
+        assert f"is for one object, and {path} holds 3; " in capsys.readouterr().err
+        assert not (tmp_path / name).exists()
+
+
+def test_more_frames_than_are_kept_at_once_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(inputs, "FRAMES", 2)
+    path = tmp_path / "a.xyz"
+    path.write_text(WATER * 3)
+    assert invoke(["detect", str(path)]) == 2
+    assert capsys.readouterr().err == f"symrefine: {path}: holds 3 frames, more than 2; choose one with --frame\n"
+    assert invoke(["detect", str(path), "--frame", "2"]) == 0
+
+
+def test_frames_of_one_file_are_aligned(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.xyz"
+    turned = "3\nwater\nO 0 0 0\nH 0.59 0 0.76\nH 0.59 0 -0.76\n"
+    path.write_text(WATER + turned)
+    status, record = told(["align", path, path, "--source-frame", 0, "--target-frame", 1], capsys)
+    assert (status, record["status"], record["options"]["target_frame"]) == (0, "ok", 1)
+    assert invoke(["align", str(path), str(path), "--source-frame", "0"]) == 2
+    assert f"{path}: holds 2 frames; choose one with frame" in capsys.readouterr().err
+
+
+def test_load_frames_makes_what_is_asked_for(tmp_path: Path) -> None:
+    path = tmp_path / "a.xyz"
+    path.write_text(WATER + WATER.replace("O 0", "Qq 0") + WATER)
+    frames = load_frames(path)
+    assert len(frames) == 3
+    assert [shape.source for shape in (frames[0], frames[-1], *frames[:1])] == [f"{path}#{k}" for k in (0, 2, 0)]
+    assert frames[2].points.tolist() == load(path, frame=2).points.tolist()
+    with pytest.raises(InputError, match=r"a\.xyz#1: line 8"):
+        list(frames)
+    with pytest.raises(IndexError):
+        frames[3]
+    path.write_text(WATER)
+    only = load_frames(path)[0]
+    assert (only.source, only.unit, only.elements) == (str(path), "A", True)

@@ -15,7 +15,8 @@ import pytest
 
 import symrefine
 from symrefine.cli import batch, invoke, values
-from symrefine.cli.tables import ROW_HEAD, detection_lines, headline, row_line
+from symrefine.cli.rows import ROW_HEAD, row_line
+from symrefine.cli.tables import detection_lines, headline
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.files import naming, whole

@@ -15,7 +15,8 @@ from symrefine.detection.result import Alternative, Detection, FoundAxis, FoundP
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.export.bop import bop_entry, bop_limits, bop_text, diameter, read_models_info
-from symrefine.export.records import detection_record, number
+from symrefine.export.numbers import number
+from symrefine.export.records import detection_record
 from symrefine.files import check_target, json_text, replacing
 from symrefine.geometry import Array, Axis, Plane, random_orthogonal, rotation, toward_positive
 from symrefine.groups import PointGroup, point_group

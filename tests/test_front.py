@@ -253,7 +253,15 @@ def answers():
         "detection_nd of samples": symrefine.detect(RNG.standard_normal((2000, 4))),
         "alignment": symrefine.align(POINTS, on_box() @ turn.T),
         "alignment in the plane": symrefine.align(square, square @ [[0.0, 1.0], [1.0, 0.0]]),
+        "symmetrized": symrefine.symmetrize((CORNERS, TRIANGLES)),
+        "symmetrized cloud": symrefine.symmetrize(revolved(), tolerance=0.03),
+        "completed": symrefine.complete(scan()),
     }
+
+
+def scan() -> np.ndarray:
+    """A box of which a part is missing."""
+    return POINTS[POINTS[:, 0] < 0.8]
 
 
 def revolved() -> np.ndarray:
@@ -284,7 +292,7 @@ def test_a_schema_refuses_what_is_no_such_record(found):
 
 
 def test_schemas_are_schemas():
-    for name in ("detection", "detection2d", "detection_nd", "alignment"):
+    for name in ("detection", "detection2d", "detection_nd", "alignment", "symmetrized", "completed", "info"):
         jsonschema.Draft202012Validator.check_schema(schema(name))
 
 
@@ -342,7 +350,7 @@ def test_an_answer_saves_itself_by_its_suffix(found, tmp_path):
     for suffix, beginning in beginnings.items():
         found["detection"].save(tmp_path / f"box{suffix}")
         assert (tmp_path / f"box{suffix}").read_bytes()[: len(beginning)].lower() == beginning.lower()
-    with pytest.raises(InputError, match=r"ends in \.json, \.html, \.png, \.rrd"):
+    with pytest.raises(InputError, match=r"ends in \.json, \.png, \.html, \.rrd"):
         found["detection"].save(tmp_path / "box.txt")
     with pytest.raises(InputError, match=r"cannot be written as \.rrd"):
         found["detection_nd"].save(tmp_path / "box.rrd")
@@ -381,9 +389,55 @@ def test_verbs_take_what_detect_takes_and_what_it_found(tmp_path):
 
 
 def test_completion_takes_a_cloud_and_what_was_found_in_it():
-    scan = POINTS[POINTS[:, 0] < 0.8]
-    found = symrefine.detect(scan)
-    assert len(symrefine.complete(scan, found).points) == len(symrefine.complete(scan).points)
+    made = symrefine.detect(scan())
+    assert len(symrefine.complete(scan(), made).points) == len(symrefine.complete(scan()).points)
+    with pytest.raises(InputError, match="completion is for clouds"):
+        symrefine.complete((CORNERS, TRIANGLES))
+
+
+def test_what_is_made_tells_draws_and_writes_itself(found, tmp_path):
+    exact, full = found["symmetrized"], found["completed"]
+    assert repr(exact).splitlines()[0] == "array: D2h, made exact"
+    assert repr(full).splitlines()[0].startswith("array: at least C2v, confidence")
+    for made, name in ((exact, "a.ply"), (exact, "a.stl"), (full, "b.ply"), (full, "b.npz")):
+        made.save(tmp_path / name)
+        written = symrefine.load(tmp_path / name)
+        points = made.shape.points if made is exact else made.points
+        np.testing.assert_array_equal(np.unique(written.points, axis=0), np.unique(points, axis=0))
+    for made in (exact, full):
+        made.save(tmp_path / "c.json")
+        assert (tmp_path / "c.json").read_text() == made.to_json()
+        made.save(tmp_path / "c.png")
+        assert (tmp_path / "c.png").read_bytes().startswith(b"\x89PNG")
+        card = made._repr_html_()
+        assert "data:image/png;base64," in card
+        assert "<table>" not in card
+        with pytest.raises(InputError, match=r"c\.html: a \w+ cannot be written as \.html; expected a name"):
+            made.save(tmp_path / "c.html")
+    with pytest.raises(InputError, match=r"a\.csv: \.csv holds no faces; write a mesh as \.npz, "):
+        exact.save(tmp_path / "a.csv")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.ply", "a.stl", "b.npz", "b.ply", "c.json", "c.png"]
+
+
+def test_a_tolerance_may_be_a_length():
+    long = symrefine.detect(POINTS, tolerance="0.05u")
+    assert long.tolerance == pytest.approx(0.05 / long.diagonal, rel=0.02)
+    assert long.to_dict()["options"]["tolerance"] == "0.05u"
+    told = {"tolerance": "50mm", "units": "m"}
+    for given in (told, {"tolerance": 0.05 / long.diagonal}):
+        answer = symrefine.detect(POINTS, **given)
+        assert answer.tolerance == pytest.approx(long.tolerance, rel=0.02)
+        assert answer.to_dict()["options"].items() >= given.items()
+        assert symrefine.symmetrize((CORNERS, TRIANGLES), **given).group.name == "D2h"
+        assert symrefine.complete(scan(), **given).options.items() >= given.items()
+        assert symrefine.align(POINTS, POINTS, **given).options.items() >= given.items()
+    assert symrefine.detect(molecule("ase"), tolerance="0.1A").point_group == "C2v"
+    with pytest.raises(InputError, match="does not say its unit, which tolerance 5mm needs; give it as units"):
+        symrefine.detect(POINTS, tolerance="5mm")
+    with pytest.raises(InputError, match="'mm', for a tolerance with a unit"):
+        symrefine.detect(POINTS, units="mm")
+    with pytest.raises(InputError, match=r"'5 %' is not a length above 0 with its unit"):
+        symrefine.detect(POINTS, tolerance="5 %")
 
 
 def test_an_alignment_says_how_sure_it_is(found):
@@ -403,5 +457,5 @@ def test_the_front_page_shows_promises_only():
 
 def test_schemas_stand_beside_the_code():
     assert {p.name.split(".")[0] for p in Path(str(files("symrefine"))).glob("schema/*.json")} == {
-        "detection", "detection2d", "detection_nd", "alignment"
+        "detection", "detection2d", "detection_nd", "alignment", "symmetrized", "completed", "info"
     }  # fmt: skip

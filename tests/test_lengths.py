@@ -93,10 +93,10 @@ def test_strays_do_not_stretch_the_diagonal() -> None:
 @pytest.mark.parametrize(
     ("asked", "units", "part"),
     [
-        ("0.1mm", None, "the file does not say its unit; give it as --units mm"),
+        ("0.1mm", None, "box.ply: does not say its unit, which tolerance 0.1mm needs; give it as units"),
         ("2u", None, "of the diagonal, 7.483 in units of the file; expected at most 0.2 of it"),
         ("1mm", "yd", "units are 'yd'"),
-        (0.02, "mm", "--units mm: says what a tolerance with a unit is"),
+        (0.02, "mm", "units are 'mm', for a tolerance with a unit, such as 0.5mm; 0.02 has none"),
     ],
 )
 def test_what_makes_no_tolerance_is_refused(asked: float | str, units: str | None, part: str) -> None:

@@ -184,6 +184,8 @@ def test_pictures_without_an_object(tmp_path: Path) -> None:
     assert "the same grey value" in refusal(tmp_path, np.zeros((4, 5, 4), np.uint8))
     message = refusal(tmp_path, letter(100, 120), threshold=0.9)
     assert "grey values run from 0.392 to 0.471; choose a threshold between them, not 0.9" in message
+    grain = np.random.default_rng(0).integers(100, 140, (60, 60)).astype(np.uint8)
+    assert "nothing stands out: grey values run from 0.392 to 0.545; try threshold 'otsu'" in refusal(tmp_path, grain)
     one = np.full((5, 5), 255, np.uint8)
     one[2, 2] = 0
     assert "only one point, [2.5, 2.5]" in refusal(tmp_path, one)

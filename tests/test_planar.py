@@ -293,7 +293,7 @@ def arrow(tmp_path: Path) -> Path:
 def test_detect_prints_a_picture(arrow: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert invoke(["detect", str(arrow), "--threshold", "otsu"]) == 0
     shown = capsys.readouterr().out
-    assert shown.startswith(f"{arrow}: D1, 1 mirror line; tolerance 2 %, confidence 1.00")
+    assert shown.startswith(f"{arrow}: D1, one mirror line; tolerance 2 %, confidence 1.00")
     assert "n-tuples lie on one line: a mirror line at most" in shown
     assert "v(p,p')" in shown
     assert "(8, 9)" in shown

@@ -102,6 +102,7 @@ def test_every_group_has_a_meaning() -> None:
 def test_numbers_are_short_and_honest() -> None:
     assert words.percent(0.00751) == "0.75 %"
     assert words.percent(1e-16) == "less than 0.01 %"
+    assert [words.percent(x) for x in (0.0, 0.994, 0.996, 1.0)] == ["0 %", "99 %", "99.6 %", "100 %"]
     assert words.coordinates([1e6 + 0.25, -1e-9, 3.0], 1.0) == "(1000000.2500, 0.0000, 3.0000)"
     assert words.direction(np.array([1e-9, -0.6, 0.8])) == words.direction(np.array([-1e-9, 0.6, -0.8]))
 

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -162,6 +163,18 @@ def test_info_says_it_in_words_and_as_json(run: Callable[..., str]) -> None:
     assert record["mesh"]["area"] == pytest.approx(0.22)
     assert "wrote a.json" in run("info", "box.off", "--json", "a.json")
     assert json.loads(Path("a.json").read_text()) == record
+
+
+def test_what_info_writes_obeys_its_schema(run: Callable[..., str]) -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    text = files("symrefine").joinpath("schema", "info.schema.json").read_text(encoding="utf-8")
+    rule = jsonschema.Draft202012Validator(json.loads(text))
+    np.savetxt("four.csv", np.random.default_rng(0).random((40, 4)), delimiter=",")
+    np.savetxt("flat.csv", np.random.default_rng(0).random((40, 2)), delimiter=",")
+    for name in ("box.off", "water.xyz", "ball.xyz", "four.csv", "flat.csv"):
+        record = json.loads(run("info", name, "--json", "-"))
+        rule.validate(record)
+        assert not any(rule.is_valid({key: record[key] for key in record if key != left_out}) for left_out in record)
 
 
 def test_a_unit_is_said_or_guessed_with_why(run: Callable[..., str]) -> None:

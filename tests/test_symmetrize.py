@@ -409,7 +409,7 @@ def test_points_without_counterparts_are_not_closed() -> None:
 
 
 def written(path: Path, shape: Shape) -> Path:
-    path.write_bytes(model_bytes(path, shape))
+    path.write_bytes(model_bytes(path.suffix, shape))
     return path
 
 
@@ -422,7 +422,7 @@ def test_the_command_writes_the_mesh_and_tells_by_how_much_it_moved(
     path, out = written(tmp_path / "a.ply", replace(mesh, points=mesh.points + noise)), tmp_path / "b.obj"
     assert invoke(["symmetrize", str(path), "-o", str(out), "--json", str(tmp_path / "r.json")]) == 0
     shown = capsys.readouterr().out
-    assert "made exact: C4v" in shown
+    assert "a.ply: C4v, made exact" in shown
     assert "RMS" in shown
     record = json.loads((tmp_path / "r.json").read_text())
     assert (record["found"], record["point_group"], record["method"]) == ("C4v", "C4v", "vertices")
@@ -433,7 +433,7 @@ def test_the_command_writes_the_mesh_and_tells_by_how_much_it_moved(
     assert distance < 1e-11 * size
     first = out.read_bytes()
     assert invoke(["symmetrize", str(path), "-o", str(out), "--group", "Cs"]) == 0
-    assert "made exact: Cs" in capsys.readouterr().out
+    assert "a.ply: Cs, made exact" in capsys.readouterr().out
     assert out.read_bytes() != first
 
 
@@ -449,7 +449,7 @@ def test_a_continuous_group_is_told_to_become_finite(tmp_path: Path, capsys: pyt
         ("odd.ply -o b.ply", "is C1, nothing to make symmetric"),
         ("a.ply -o b.ply --group D5", "D5 is no subgroup of C4v"),
         ("a.ply -o b.ply --group X", "is not a point group"),
-        ("a.ply -o b.stl", "cannot write .stl"),
+        ("a.ply -o b.glb", "cannot write .glb"),
         ("a.ply -o b.xyz", "holds no faces"),
         ("a.ply -o a.ply", "same file as the input"),
     ],

@@ -180,7 +180,7 @@ ENTRIES = (
 
 def put(path: Path, shape: Shape) -> None:
     """Write a mesh or cloud."""
-    path.write_bytes(model_bytes(path, shape))
+    path.write_bytes(model_bytes(path.suffix, shape))
 
 
 def said(command: str, folder: Path) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 from symrefine.cli.outputs import check_outputs, json_writer, tell, write_all
 from symrefine.cli.signs import waiting
-from symrefine.cli.values import add_detection_options
+from symrefine.cli.values import add_detection_options, natural
 from symrefine.clock import Clock
 
 HELP = "find the map that takes one object onto another, reflections included"
@@ -22,6 +22,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("target", metavar="B", help="mesh or point cloud to move it onto")
     parser.add_argument("--json", metavar="FILE|-", help="write the whole result as JSON; - is stdout, with no table")
     parser.add_argument("--scale", action="store_true", help="let the size differ too: b = s M a + t")
+    for name, letter in (("source", "A"), ("target", "B")):
+        parser.add_argument(
+            f"--{name}-frame",
+            type=natural,
+            metavar="N",
+            help=f"which of several molecules, models or volumes in {letter}, from 0 (default: there has to be one)",
+        )
     parser.add_argument("--rotations-only", action="store_true", help="admit det M = +1 only")
     add_detection_options(parser, counts_as="agreement")
 
@@ -38,16 +45,14 @@ def run(args: argparse.Namespace) -> int:
 
 def _record(args: argparse.Namespace) -> dict[str, Any]:
     from symrefine.front.verbs import align
-    from symrefine.lengths import relative_tolerance
     from symrefine.load import load
 
     clock = Clock()
     with clock("load"):
-        source, target = (load(path, measure=args.measure) for path in (args.source, args.target))
-    tolerance = relative_tolerance(args.tolerance, target, units=args.units)
-    options = {"scale": args.scale, "seed": args.seed}
-    found = align(source, target, allow_reflection=not args.rotations_only, tolerance=tolerance, **options)
-    chosen = {"tolerance": args.tolerance, **options, "measure": args.measure, "rotations_only": args.rotations_only}
-    chosen |= {"units": args.units} if args.units else {}
-    chosen |= {"relative_tolerance": tolerance} if isinstance(args.tolerance, str) else {}
-    return found.to_dict(options=chosen, load_s=clock.seconds["load"])
+        given = ((args.source, args.source_frame), (args.target, args.target_frame))
+        source, target = (load(path, measure=args.measure, frame=frame) for path, frame in given)
+    asked = {"tolerance": args.tolerance, "units": args.units, "scale": args.scale, "seed": args.seed}
+    found = align(source, target, allow_reflection=not args.rotations_only, **asked)
+    frames = {"source_frame": args.source_frame, "target_frame": args.target_frame}
+    chosen = {"measure": args.measure} | {name: k for name, k in frames.items() if k is not None}
+    return found.to_dict(options={**found.options, **chosen}, load_s=clock.seconds["load"])

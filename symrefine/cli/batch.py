@@ -15,7 +15,6 @@ from symrefine.cli.outputs import (
     is_quiet,
     note,
     print_lines,
-    text_writer,
     write_all,
 )
 from symrefine.cli.signs import progress
@@ -29,7 +28,7 @@ from symrefine.cli.values import (
     positive,
 )
 from symrefine.errors import InputError
-from symrefine.files import naming
+from symrefine.files import naming, text_writer
 
 if TYPE_CHECKING:
     from symrefine.detection.result import Detection
@@ -76,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     check_beside("--bop", args.bop, {"--bop-scale": args.bop_scale})
     scale = _check_bop(args, files)
     options = detection_options(args)
-    from symrefine.cli.tables import ROW_HEAD, row_line
+    from symrefine.cli.rows import ROW_HEAD, row_line
     from symrefine.study.work import in_processes
 
     with opened(Path(args.out)) if args.out else nullcontext() as out:
@@ -104,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _show(row: Row) -> None:
     """A line for a file that was done, and an error even where nothing else is told."""
-    from symrefine.cli.tables import row_line
+    from symrefine.cli.rows import row_line
 
     if is_quiet() and row["error"] is not None:
         complain(row["error"])

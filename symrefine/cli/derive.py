@@ -3,10 +3,11 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from symrefine.cli.outputs import STDOUT, check_outputs, say, text_writer, write_all
+from symrefine.cli.outputs import STDOUT, check_outputs, say, write_all
 from symrefine.cli.signs import waiting
 from symrefine.cli.values import natural, orders
 from symrefine.errors import InputError
+from symrefine.files import text_writer
 
 if TYPE_CHECKING:
     from symrefine.ntuples.notation import NTupleBasis

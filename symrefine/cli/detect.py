@@ -1,13 +1,14 @@
-"""`symrefine detect`: one file in, its symmetries out."""
+"""`symrefine detect`: files in, the symmetries of the objects in them out."""
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from symrefine.cli.inputs import NAME, STDIN, expanded, failure, readable
+from symrefine.cli.inputs import STDIN, Object, expanded, failure, objects, read_scan, scans
 from symrefine.cli.outputs import (
     STDOUT,
     check_beside,
@@ -20,10 +21,9 @@ from symrefine.cli.outputs import (
     print_lines,
     say,
     tell,
-    text_writer,
     write_all,
 )
-from symrefine.cli.signs import progress, waiting
+from symrefine.cli.signs import Doing, counting
 from symrefine.cli.values import (
     add_class_options,
     add_depth_options,
@@ -38,10 +38,9 @@ from symrefine.cli.values import (
 )
 from symrefine.clock import Clock
 from symrefine.errors import InputError
-from symrefine.files import Writer, json_array_text
+from symrefine.files import Writer, json_array_text, text_writer
 
 if TYPE_CHECKING:
-    from symrefine.detection.result import Detection
     from symrefine.shape import Shape
 
 # Exit status of `--strict` where nothing is decided, and where one of several files could not be used.
@@ -56,7 +55,8 @@ DESCRIPTION = (
     "or of points with two coordinates (.csv .txt .npy .npz), or the hyperplanes of symmetry of points with 4 to 8 "
     "coordinates; each file may be packed (.gz). With --intrinsics PATH is a depth image. Prints a table; lengths are "
     "in the units of the file, misses in percent of the bounding-box diagonal. Several files, or a pattern in quotes, "
-    "give a line each; one that cannot be used is told on its line, the others go on, and the exit status is 2."
+    "or a file of several molecules, models or volumes, give a line for each object; one that cannot be used is told "
+    "on its line, the others go on, and the exit status is 2."
 )
 
 
@@ -66,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json",
         metavar="FILE|-",
-        help="write the whole report as JSON, of several files an array; - is stdout, with no table",
+        help="write the whole report as JSON, of several objects an array; - is stdout, with no table",
     )
     parser.add_argument("--picture", metavar="FILE.png", help="write a picture of the shape and what was found")
     parser.add_argument("--bop", metavar="FILE", help="put the symmetries into this models_info.json of BOP")
@@ -92,7 +92,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--strict", action="store_true", help=f"end with status {UNDETERMINED} where the answer is undetermined"
     )
     add_class_options(parser)
-    add_frame_option(parser)
+    add_frame_option(parser, otherwise="each of them")
     add_scan_options(parser)
     add_depth_options(parser)
     add_detection_options(parser)
@@ -101,58 +101,96 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Detect, write the files that were asked for, print."""
     paths = expanded(args.path)
-    outputs = {f"--{name}": getattr(args, name) for name in ("json", *_OF_ONE)}
-    check_outputs(outputs, [Path(path) for path in paths if path != STDIN])
-    check_beside("--bop", args.bop, {"--bop-id": args.bop_id, "--bop-scale": args.bop_scale})
-    if len(paths) > 1:
-        return _several(args, paths)
-    if args.picture is not None and Path(args.picture).suffix.lower() != ".png":
-        raise InputError(f"--picture {args.picture}: expected a name that ends in .png")
-    if args.bop is not None:
-        from symrefine.export.bop import read_models_info
-
-        read_models_info(Path(args.bop))
-    with waiting("detecting"):
-        shape, detection, record = _examined(args, paths[0])
-        writers = json_writer(args.json, record) | _writers(args, shape, detection)
-        write_all(writers)
+    _check(args, paths)
+    read = partial(scans, options=detection_options(args), **_picture(args))
+    with counting("detecting", len(paths)) as doing:
+        given = objects(paths, args.format, read)
+        first = next(given)
+        if several := len(paths) > 1 or first.frames > 1:
+            _check_alone(args, f"{paths[0]} holds {first.frames}", "choose one with --frame")
+            records = list(_told(args, chain([first], given), doing))
+        else:
+            shape, detection, record = _examined(args, first)
+            writers = json_writer(args.json, record) | _writers(args, shape, detection)
+            write_all(writers)
+    if several:
+        return _end(args, records)
     for text in _notes(args, shape, detection, record):
         note(text)
     tell(args.json, record, None, writers)
     return UNDETERMINED if args.strict and record["undetermined"] else 0
 
 
-def _examined(args: argparse.Namespace, path: str) -> tuple["Shape", Any, dict[str, Any]]:
-    """What `examine` says of a file, or of stdin."""
-    options, picture = detection_options(args), {"threshold": args.threshold, "invert": args.invert}
-    with readable(path, args.format) as file:
-        shape, detection, record = examine(file, options, **picture)
-    if file != path:
-        shape, record = replace(shape, source=NAME), record | {"source": NAME}
+def _check(args: argparse.Namespace, paths: Sequence[str]) -> None:
+    """Refuse, before any work, outputs that cannot be written or do not fit together, and what is for one file."""
+    outputs = {f"--{name}": getattr(args, name) for name in ("json", *_OF_ONE)}
+    check_outputs(outputs, [Path(path) for path in paths if path != STDIN])
+    check_beside("--bop", args.bop, {"--bop-id": args.bop_id, "--bop-scale": args.bop_scale})
+    if len(paths) > 1:
+        if STDIN in paths:
+            raise InputError("-: stdin is one file; name no others beside it")
+        of_bop = "`symrefine batch DIR --bop FILE` takes a directory"
+        _check_alone(args, f"PATH names {len(paths)}", of_bop if args.bop else "call `detect` for each")
+    if args.picture is not None and Path(args.picture).suffix.lower() != ".png":
+        raise InputError(f"--picture {args.picture}: expected a name that ends in .png")
+    if args.bop is not None:
+        from symrefine.export.bop import read_models_info
+
+        read_models_info(Path(args.bop))
+
+
+def _check_alone(args: argparse.Namespace, there: str, remedy: str) -> None:
+    """Refuse what is for one object."""
+    for name in _OF_ONE:
+        if (given := getattr(args, name)) is not None:
+            raise InputError(f"--{name} {given}: is for one object, and {there}; {remedy}")
+
+
+def _picture(args: argparse.Namespace) -> dict[str, Any]:
+    return {"threshold": args.threshold, "invert": args.invert}
+
+
+def _examined(args: argparse.Namespace, given: Object) -> tuple["Shape", Any, dict[str, Any]]:
+    """Shape, detection and JSON record of an object in a file."""
+    options = detection_options(args) | ({} if given.frame is None else {"frame": given.frame})
+    shape = given.shape
+    detection = detected(shape, options, given.file, **_picture(args))
+    record = detection.to_dict(load_s=given.load_s)
     if is_verbose():
         seconds = sum(record["timings"].values())
         complain(f"{len(shape.points):,} points in {seconds:.2f} s, {len(shape.points) / seconds:,.0f} points/s")
     return shape, detection, record
 
 
-def _several(args: argparse.Namespace, paths: Sequence[str]) -> int:
-    """A line for each of several files as soon as it is done; one that cannot be used does not end the others."""
-    _check_several(args, paths)
-    from symrefine.cli.tables import ROW_HEAD, row_line
+def _told(args: argparse.Namespace, given: Iterable[Object], doing: Doing) -> Iterator[dict[str, Any]]:
+    """The record of each of several objects, a line as soon as it is done; one that fails does not end the others."""
+    from symrefine.cli.rows import ROW_HEAD, row_line
 
     in_lines = args.json != STDOUT and not is_quiet()
-    records: list[dict[str, Any]] = []
-    with progress("detecting", len(paths), 0) as advance:
+    if in_lines:
+        print_lines([ROW_HEAD])
+    for one in given:
+        if not one.frame:
+            doing.expect(one.frames - 1)
+        record = _record_or_error(args, one)
         if in_lines:
-            print_lines([ROW_HEAD])
-        for path in paths:
-            record = _record_or_error(args, path)
-            records.append(record)
-            if in_lines:
-                print_lines([row_line(path, {"error": None} | record)])
-            elif "error" in record:
-                complain(record["error"])
-            advance()
+            print_lines([row_line(one.name, {"error": None} | record)])
+        elif "error" in record:
+            complain(record["error"])
+        doing.advance()
+        yield record
+
+
+def _record_or_error(args: argparse.Namespace, given: Object) -> dict[str, Any]:
+    """The record of one of several objects, or what was wrong with it."""
+    try:
+        return _examined(args, given)[2]
+    except Exception as error:  # noqa: BLE001 - one object must not end the others
+        return {"source": given.name, "error": failure(given.name, error)}
+
+
+def _end(args: argparse.Namespace, records: Sequence[dict[str, Any]]) -> int:
+    """Write the records of several objects, and tell whether all went well."""
     text = json_array_text(records)
     if args.json == STDOUT:
         say(text)
@@ -162,24 +200,6 @@ def _several(args: argparse.Namespace, paths: Sequence[str]) -> int:
     if any("error" in record for record in records):
         return REFUSED
     return UNDETERMINED if args.strict and any(record["undetermined"] for record in records) else 0
-
-
-def _check_several(args: argparse.Namespace, paths: Sequence[str]) -> None:
-    """Refuse what is for one file."""
-    if STDIN in paths:
-        raise InputError("-: stdin is one file; name no others beside it")
-    for name in _OF_ONE:
-        if (given := getattr(args, name)) is not None:
-            right = "`symrefine batch DIR --bop FILE` takes a directory" if name == "bop" else "call `detect` for each"
-            raise InputError(f"--{name} {given}: is for one file, and PATH names {len(paths)}; {right}")
-
-
-def _record_or_error(args: argparse.Namespace, path: str) -> dict[str, Any]:
-    """The record of one of several files, or what was wrong with it."""
-    try:
-        return _examined(args, path)[2]
-    except Exception as error:  # noqa: BLE001 - one file must not end the others
-        return {"source": path, "error": failure(path, error)}
 
 
 def _notes(args: argparse.Namespace, shape: "Shape", detection: Any, record: dict[str, Any]) -> Iterator[str]:
@@ -194,64 +214,40 @@ def _notes(args: argparse.Namespace, shape: "Shape", detection: Any, record: dic
         yield f"{shape.source}: if object and background are of different grey, try --threshold otsu"
 
 
-def examine(
-    path: str, options: dict[str, Any], *, threshold: float | Literal["otsu"] | None = None, invert: bool = False
-) -> tuple["Shape", Any, dict[str, Any]]:
-    """Shape, detection and JSON record of a file, with `detection_options`, and those of a picture.
-
-    The detection is a `PlanarDetection`, a `Detection` or a `SubspaceDetection`, as the points have two, three or more
-    coordinates.
-    """
-    from symrefine.front.verbs import detect
-    from symrefine.lengths import relative_tolerance
-    from symrefine.load import IMAGES, suffix_of
-
-    clock, outliers = Clock(), options.get("outliers", "auto")
+def examine(path: str, options: dict[str, Any]) -> tuple["Shape", Any, dict[str, Any]]:
+    """Shape, detection and JSON record of the one object in a file, with `detection_options`."""
+    clock = Clock()
     with clock("load"):
-        shape = read_scan(path, options, threshold=threshold, invert=invert)
-    if threshold is not None or invert or (shape.dim == 2 and suffix_of(Path(path)) in IMAGES):
-        options = options | {"threshold": threshold, "invert": invert}
-    found = detect(
-        shape,
-        outliers=outliers,
-        tolerance=relative_tolerance(options["tolerance"], shape, units=options.get("units"), outliers=outliers),
-        seed=options["seed"],
-    )
-    found = replace(found, options=options)
+        shape = read_scan(path, options)
+    found = detected(shape, options, path)
     return shape, found, found.to_dict(load_s=clock.seconds["load"])
 
 
-def read_scan(path: str, options: dict[str, Any], **picture: Any) -> "Shape":
-    """The shape in a file as `detection_options` say, and `picture`: a depth image, or a cloud that a camera saw."""
-    from symrefine.load import load, load_depth
+def detected(
+    shape: "Shape",
+    options: dict[str, Any],
+    file: str,
+    *,
+    threshold: float | Literal["otsu"] | None = None,
+    invert: bool = False,
+) -> Any:
+    """What `detect` says of the shape in a file, with `detection_options`, and those of a picture."""
+    from symrefine.front.verbs import detect
+    from symrefine.load import IMAGES, suffix_of
 
-    known = ("intrinsics", "depth_scale", "mask", "viewpoint", "measure", "labels", "weights", "frame")
-    said = {name: given for name in known if (given := options.get(name)) is not None}
-    depth = {name: said.pop(name) for name in ("depth_scale", "mask") if name in said}
-    if "intrinsics" in said:
-        camera = said.pop("intrinsics")
-        idle = [name for name, given in (said | picture).items() if given not in (None, False)]
-        if idle:
-            raise InputError(f"{path}: is read as a depth image, so {_option(idle[0])} does not apply; leave it out")
-        return load_depth(path, camera, **depth)
-    if depth:
-        raise InputError(f"{path}: {_option(next(iter(depth)))} goes with --intrinsics, which make it a depth image")
-    viewpoint = said.pop("viewpoint", None)
-    shape = load(path, **said, **picture)
-    if viewpoint is None:
-        return shape
-    import numpy as np
-
-    if shape.dim != 3 or shape.faces is not None:
-        raise InputError(f"{shape.source}: --viewpoint is for clouds in space, leave it out")
-    return replace(shape, viewpoint=np.array(viewpoint))
+    if threshold is not None or invert or (shape.dim == 2 and suffix_of(Path(file)) in IMAGES):
+        options = options | {"threshold": threshold, "invert": invert}
+    found = detect(
+        shape,
+        outliers=options.get("outliers", "auto"),
+        tolerance=options["tolerance"],
+        units=options.get("units"),
+        seed=options["seed"],
+    )
+    return replace(found, options=options)
 
 
-def _option(name: str) -> str:
-    return "--" + name.replace("_", "-")
-
-
-def _writers(args: argparse.Namespace, shape: "Shape", detection: "Detection") -> dict[str, Writer]:
+def _writers(args: argparse.Namespace, shape: "Shape", detection: Any) -> dict[str, Writer]:
     """Writers of the files that are of one object.
 
     Raises:
@@ -268,16 +264,7 @@ def _writers(args: argparse.Namespace, shape: "Shape", detection: "Detection") -
         entry = bop_entry(detection, shape, scale=args.bop_scale or 1.0)
         number = 1 if args.bop_id is None else args.bop_id
         writers[args.bop] = text_writer(bop_text(Path(args.bop), {number: entry}))
-    if args.recording is not None:
-        from symrefine.viewer import record as write_recording
-
-        writers[args.recording] = partial(write_recording, detection, shape)
-    if args.picture is not None:
-        from symrefine.report import draw
-
-        writers[args.picture] = partial(draw, detection, shape)
-    if args.report is not None:
-        from symrefine.report import write_html
-
-        writers[args.report] = partial(write_html, detection, shape)
+    for name, suffix in ((args.recording, ".rrd"), (args.picture, ".png"), (args.report, ".html")):
+        if name is not None:
+            writers[name] = detection.writer(suffix)
     return writers

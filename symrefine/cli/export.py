@@ -82,12 +82,10 @@ def detected(args: argparse.Namespace) -> tuple["Shape", "Detection"]:
         InputError: a picture, or points with two coordinates.
     """
     from symrefine.front.verbs import detect_in_space
-    from symrefine.lengths import relative_tolerance
     from symrefine.load import load
 
     shape = loaded(args.path, args.format, partial(load, measure=args.measure, frame=args.frame))
-    tolerance = relative_tolerance(args.tolerance, shape, units=args.units)
-    return shape, detect_in_space(shape, tolerance=tolerance, seed=args.seed)
+    return shape, detect_in_space(shape, tolerance=args.tolerance, units=args.units, seed=args.seed)
 
 
 def _check(args: argparse.Namespace) -> None:

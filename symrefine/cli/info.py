@@ -5,11 +5,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from symrefine.cli.detect import read_scan
-from symrefine.cli.inputs import loaded
+from symrefine.cli.inputs import loaded, read_scan
 from symrefine.cli.outputs import check_outputs, json_writer, tell, write_all
 from symrefine.cli.signs import waiting
-from symrefine.cli.values import add_class_options, add_depth_options, add_path, add_viewpoint, reading_options
+from symrefine.cli.values import (
+    add_class_options,
+    add_depth_options,
+    add_frame_option,
+    add_path,
+    add_viewpoint,
+    reading_options,
+)
 from symrefine.units import EVERYDAY_M, unit_of_size
 
 if TYPE_CHECKING:
@@ -33,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_path(parser, "mesh, point cloud or picture")
     parser.add_argument("--json", metavar="FILE|-", help="write all of it as JSON; - is stdout, with no table")
     add_class_options(parser)
+    add_frame_option(parser)
     add_viewpoint(parser)
     add_depth_options(parser)
 
@@ -51,7 +58,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _record(args: argparse.Namespace, shape: "Shape", found: "Survey") -> dict[str, Any]:
-    from symrefine.export.records import number, numbers
+    from importlib.metadata import version
+
+    from symrefine.export.numbers import number, numbers
     from symrefine.load import IMAGES, suffix_of
     from symrefine.survey import doubts
 
@@ -59,6 +68,7 @@ def _record(args: argparse.Namespace, shape: "Shape", found: "Survey") -> dict[s
     return {
         "schema": SCHEMA,
         "source": shape.source,
+        "version": version("symrefine"),
         "options": reading_options(args),
         "kind": "picture" if shape.dim == 2 and suffix_of(Path(shape.source)) in IMAGES else found.kind,
         "dimension": shape.dim,

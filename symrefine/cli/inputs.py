@@ -1,23 +1,26 @@
-"""Files to read: patterns that no shell expanded, what comes on stdin, and what was wrong with one of many."""
+"""Files to read: patterns that no shell expanded, what comes on stdin, the objects in them, what is wrong with one."""
 
 import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from glob import glob, has_magic
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from symrefine.clock import Clock
-from symrefine.errors import InputError, SymrefineError, meant, one_line
+from symrefine.errors import InputError, SymrefineError, about, meant, one_line
 
 if TYPE_CHECKING:
+    from symrefine.load import Frames
     from symrefine.shape import Shape
 
 # What is written for the path of a file that comes on stdin, and what it is called afterwards.
 STDIN, NAME = "-", "stdin"
+# Objects of one file that are taken at once: their records, of some ten kilobytes each, are kept for one array.
+FRAMES = 10_000
 
 
 def expanded(names: Sequence[str]) -> list[str]:
@@ -59,10 +62,17 @@ def readable(name: str, suffix: str | None) -> Iterator[str]:
         file = Path(folder, NAME).with_suffix(_known_suffix(suffix))
         with file.open("wb") as copy:
             shutil.copyfileobj(sys.stdin.buffer, copy)
-        try:
+        with _called(str(file), NAME):
             yield str(file)
-        except SymrefineError as error:
-            raise type(error)(str(error).replace(str(file), NAME)) from None
+
+
+@contextmanager
+def _called(file: str, name: str) -> Iterator[None]:
+    """Tell what is wrong with a file under another name."""
+    try:
+        yield
+    except SymrefineError as error:
+        raise type(error)(str(error).replace(file, name)) from None
 
 
 def loaded(name: str, suffix: str | None, read: Callable[[str], "Shape"]) -> "Shape":
@@ -70,6 +80,129 @@ def loaded(name: str, suffix: str | None, read: Callable[[str], "Shape"]) -> "Sh
     with readable(name, suffix) as file, Clock()("load"):
         shape = read(file)
     return shape if file == name else replace(shape, source=NAME)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Object:
+    """One of the objects in the files that were named.
+
+    Attributes:
+        file: that it is in, to read.
+        name: what it is called.
+        found: its shape, or why there is none.
+        frame: its number, where its file holds several.
+        frames: how many its file holds.
+        load_s: seconds that reading took.
+    """
+
+    file: str
+    name: str
+    found: "Shape | Exception"
+    frame: int | None = None
+    frames: int = 1
+    load_s: float = 0.0
+
+    @property
+    def shape(self) -> "Shape":
+        """Its shape.
+
+        Raises:
+            Exception: that reading ended with.
+        """
+        if isinstance(self.found, Exception):
+            raise self.found
+        return self.found
+
+
+def objects(names: Sequence[str], suffix: str | None, read: Callable[[str], "Frames[Shape]"]) -> Iterator[Object]:
+    """Every object in the files that names stand for, each read as it is asked for, by a function of a path.
+
+    What cannot be read does not end the others. The file of stdin is there until the next object is asked for.
+    """
+    for name in names:
+        try:
+            with readable(name, suffix) as file:
+                yield from _objects_in(file, name if file == name else NAME, read)
+        except Exception as error:  # noqa: BLE001 - one file must not end the others
+            yield Object(file=name, name=name, found=error)
+
+
+def _objects_in(file: str, called: str, read: Callable[[str], "Frames[Shape]"]) -> Iterator[Object]:
+    """Every object in one file, which people call something else if it holds what came on stdin."""
+    frames: Frames[Shape] | None = None
+    number = 0
+    while frames is None or number < len(frames):
+        clock = Clock()
+        with clock("load"):
+            frames = frames or read(file)
+            several = len(frames) > 1
+            found = _made(frames, number, file, called)
+        yield Object(
+            file=file,
+            name=f"{called}#{number}" if several else called,
+            found=found,
+            frame=number if several else None,
+            frames=len(frames),
+            load_s=clock.seconds["load"],
+        )
+        number += 1
+
+
+def _made(frames: "Frames[Shape]", number: int, file: str, called: str) -> "Shape | Exception":
+    """One of the shapes in a file, under the name that people call that, or why there is none."""
+    try:
+        with _called(file, called):
+            shape = frames[number]
+        return shape if called == file else replace(shape, source=shape.source.replace(file, called))
+    except Exception as error:  # noqa: BLE001 - one object must not end the others
+        return error
+
+
+def scans(path: str, options: dict[str, Any], **picture: Any) -> "Frames[Shape]":
+    """The objects in a file as `detection_options` say, and `picture`: all, or the one that they choose."""
+    from symrefine.load import Frames, load, load_depth, load_frames
+
+    known = ("intrinsics", "depth_scale", "mask", "viewpoint", "measure", "labels", "weights", "frame")
+    said = {name: given for name in known if (given := options.get(name)) is not None}
+    depth = {name: said.pop(name) for name in ("depth_scale", "mask") if name in said}
+    if "intrinsics" in said:
+        camera = said.pop("intrinsics")
+        idle = [name for name, given in (said | picture).items() if given not in (None, False)]
+        if idle:
+            raise InputError(f"{path}: is read as a depth image, so {_option(idle[0])} does not apply; leave it out")
+        return Frames("images", 1, lambda _: load_depth(path, camera, **depth))
+    if depth:
+        raise InputError(f"{path}: {_option(next(iter(depth)))} goes with --intrinsics, which make it a depth image")
+    viewpoint = said.pop("viewpoint", None)
+    if "frame" in said:
+        return Frames("objects", 1, lambda _: _seen(load(path, **said, **picture), viewpoint))
+    found = load_frames(path, **said, **picture)
+    if len(found) > FRAMES:
+        raise InputError(f"{path}: holds {len(found)} {found.what}, more than {FRAMES}; choose one with --frame")
+    return Frames(found.what, len(found), lambda k: _seen(found[k], viewpoint))
+
+
+def read_scan(path: str, options: dict[str, Any], **picture: Any) -> "Shape":
+    """The one shape in a file as `detection_options` say, and `picture`; with a camera, what that saw."""
+    frames = scans(path, options, **picture)
+    with about(path):
+        frames.check(None)
+    return frames[0]
+
+
+def _seen(shape: "Shape", viewpoint: Sequence[float] | None) -> "Shape":
+    """A cloud with the place of the camera that saw it, where that was told."""
+    if viewpoint is None:
+        return shape
+    if shape.dim != 3 or shape.faces is not None:
+        raise InputError(f"{shape.source}: --viewpoint is for clouds in space, leave it out")
+    import numpy as np
+
+    return replace(shape, viewpoint=np.array(viewpoint))
+
+
+def _option(name: str) -> str:
+    return "--" + name.replace("_", "-")
 
 
 def failure(path: str, error: Exception) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from symrefine.errors import InputError, one_line, printable
-from symrefine.files import Writer, check_target, json_text
+from symrefine.files import Writer, check_target, json_text, text_writer
 from symrefine.files import write_all as write_all
 
 if TYPE_CHECKING:
@@ -63,16 +63,6 @@ def check_beside(option: str, name: str | None, details: dict[str, object]) -> N
     given = [detail for detail, value in details.items() if value is not None]
     if name is None and given:
         raise InputError(f"{given[0]}: says how to write {option} FILE, which is not given; add it or leave this out")
-
-
-def text_writer(text: str) -> Writer:
-    """A writer of text in UTF-8, lines ending as they are."""
-    return bytes_writer(text.encode("utf-8"))
-
-
-def bytes_writer(data: bytes) -> Writer:
-    """A writer of bytes."""
-    return lambda path: path.write_bytes(data)
 
 
 def json_writer(name: str | None, record: Mapping[str, Any]) -> dict[str, Writer]:

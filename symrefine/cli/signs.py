@@ -21,12 +21,17 @@ class Doing:
         self.changed: Callable[[], None] = lambda: None
 
     def __str__(self) -> str:
-        steps = f"{self.done} of {self.steps}" if self.steps else ""
+        steps = f"{self.done} of {self.steps}" if self.steps > 1 else ""
         return ", ".join(part for part in (f"{self.text}: {self.stage}" if self.stage else self.text, steps) if part)
 
     def advance(self) -> None:
         """One more step is done."""
         self.done += 1
+        self.changed()
+
+    def expect(self, steps: int) -> None:
+        """So many more steps than was thought are to be done."""
+        self.steps += steps
         self.changed()
 
     def watch(self, stage: str, seconds: float | None) -> None:
@@ -48,9 +53,16 @@ def waiting(text: str) -> Iterator[None]:
 @contextmanager
 def progress(text: str, total: int, done: int) -> Iterator[Callable[[], None]]:
     """Show how many of all steps are done; the function it gives is called after each."""
+    with counting(text, total, done) as doing:
+        yield doing.advance
+
+
+@contextmanager
+def counting(text: str, total: int, done: int = 0) -> Iterator[Doing]:
+    """Show how many of all steps are done, where there may be more than was thought."""
     doing = Doing(text, total, done)
     with _shown(doing):
-        yield doing.advance
+        yield doing
 
 
 @contextmanager
@@ -70,12 +82,14 @@ def _live(doing: Doing) -> Iterator[None]:
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     words = TextColumn("{task.description}", markup=False)
-    columns = [SpinnerColumn(), words, *([BarColumn()] if doing.steps else []), TimeElapsedColumn()]
+    columns = [SpinnerColumn(), words, *([BarColumn()] if doing.steps > 1 else []), TimeElapsedColumn()]
     # Else rich would send to the terminal what is printed to a file.
     to_terminal = sys.stdout.isatty()
     with Progress(*columns, console=console(stderr=True), transient=True, redirect_stdout=to_terminal) as bar:
         only = bar.add_task(str(doing), total=doing.steps or None, completed=doing.done)
-        doing.changed = lambda: bar.update(only, description=str(doing), completed=doing.done)
+        doing.changed = lambda: bar.update(
+            only, description=str(doing), total=doing.steps or None, completed=doing.done
+        )
         yield
 
 

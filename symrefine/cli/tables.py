@@ -1,4 +1,4 @@
-"""What a person reads: the JSON record of a detection, as tables, or as one line among those of many files."""
+"""What a person reads: the JSON record of a detection or of an alignment, as tables."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -7,17 +7,15 @@ from typing import Any
 
 from rich.table import Table
 
-from symrefine.errors import one_line
+from symrefine.cli.rows import inversions, percentage, seconds
+from symrefine.front.lines import handedness, map_rows
 from symrefine.groups import point_group
-from symrefine.picture.words import DOUBLETS, TUPLES, evened, kind_name, meaning, taken_out, turns_name
+from symrefine.picture.words import DOUBLETS, TUPLES, evened, kind_name, meaning, planar_meaning, taken_out, turns_name
 
 Record = dict[str, Any]
 
 _RESIDUALS = ("mean", "p95", "max")
 _WORDS = ("kind",)
-# One of many files; names last, so that none is ever cut or folded, and no row waits for the longest.
-_ROW = "{:<13}  {:>6}  {:>4}  {:>6}  {:>10}  {:>7}  {}"
-ROW_HEAD = _ROW.format("group", "planes", "axes", "p95 %", "confidence", "seconds", "file")
 _REFINED = "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows"
 
 
@@ -50,7 +48,7 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
         yield f"It may be meant otherwise: {otherwise(record)}."
     if record["staircase"]:
         yield f"Group by tolerance: {staircase(record)}"
-    yield f"{_count(record['iterations'], 'iteration')}, {_seconds(record)} s"
+    yield f"{_count(record['iterations'], 'iteration')}, {seconds(record)} s"
 
 
 def partial(record: Record) -> str:
@@ -95,7 +93,7 @@ def headline(record: Record) -> str:
     name = record["point_group"]
     if record["undetermined"]:
         return f"undetermined: {record['undetermined']}"
-    means = _planar_meaning(record) if "lines" in record else meaning(point_group(name))
+    means = _in_the_plane(record) if "lines" in record else meaning(point_group(name))
     name = f"at least {name}" if record.get("at_least") else name
     return f"{name}, {means}; tolerance {_tolerance(record)}, confidence {record['confidence']:.2f}"
 
@@ -106,12 +104,10 @@ def _tolerance(record: Record) -> str:
     return f"{asked}, {relative:.3g} %" if isinstance(asked, str) else f"{relative:g} %"
 
 
-def _planar_meaning(record: Record) -> str:
+def _in_the_plane(record: Record) -> str:
     rotation = record["rotation"]
-    if record["point_group"] in ("C1", "O(2)"):
-        return "no symmetry" if record["point_group"] == "C1" else "round"
-    lines = _count(len(record["lines"]), "mirror line") if record["lines"] else "no mirror line"
-    return lines + (f", {turns_name(float(rotation['order']))}" if rotation else "")
+    turns = float(rotation["order"]) if rotation else None
+    return planar_meaning(record["point_group"], len(record["lines"]), turns)
 
 
 def otherwise(record: Record) -> str:
@@ -137,7 +133,7 @@ def planar_lines(record: Record) -> Iterator[Table | str]:
     yield "Offsets in units of the file (of a picture: pixels, y up), misses in % of the diagonal."
     if record["near_misses"]:
         yield f"{_REFINED}."
-    yield f"{_seconds(record)} s"
+    yield f"{seconds(record)} s"
 
 
 def _planar(record: Record) -> Iterator[Table]:
@@ -179,15 +175,15 @@ def hyperplane_lines(record: Record) -> Iterator[Table | str]:
     yield from _apart(*(_hyperplanes(title, candidates, record) for title, candidates in titled.items()))
     yield ""
     yield "Offsets in units of the file, asymmetry and noise in % of the moments, largest miss in % of the diameter."
-    yield f"{_seconds(record)} s"
+    yield f"{seconds(record)} s"
 
 
 def _hyperplanes(title: str, candidates: Sequence[Record], record: Record) -> Table:
     table = _table(title, "offset", "asymmetry", "noise", "largest miss")
     for h in candidates:
-        miss = "" if h["miss"] is None else _percent(h["miss"])
+        miss = "" if h["miss"] is None else percentage(h["miss"])
         table.add_row(
-            *_mirror(h, {"diagonal": record["diameter"]}), _percent(h["asymmetry"]), _percent(h["noise"]), miss
+            *_mirror(h, {"diagonal": record["diameter"]}), percentage(h["asymmetry"]), percentage(h["noise"]), miss
         )
     return table
 
@@ -201,20 +197,18 @@ def alignment_lines(record: Record) -> Iterator[str]:
     else:
         yield f"{record['source']} onto {record['target']}: {record['status']}"
     yield ""
-    rows = list(zip(record["matrix"], record["translation"], strict=True))
-    yield from (f"  {' '.join(f'{x + 0.0:11.8f}' for x in row)}  |  {t:.8g}" for row, t in rows)
+    yield from map_rows(record)
     yield ""
-    kind = "rotation" if record["determinant"] > 0 else "reflection or rotoreflection"
     scale = "" if record["scale"] == 1.0 else f", scale {record['scale']:.8g}"
-    yield f"matrix | translation in units of the target; determinant {record['determinant']:+d} ({kind}){scale}"
-    distance = f"rms distance {_percent(record['rms'])} % of the diagonal"
+    yield f"matrix | translation in units of the target; {handedness(record)}{scale}"
+    distance = f"rms distance {percentage(record['rms'])} % of the diagonal"
     if record["misfit"]:
         yield distance
     else:
         yield f"{distance}, {_known(record)}"
         observable = record["observable"]
         yield f"determined: {'everything' if observable == 'full' else observable}"
-    yield f"{_seconds(record)} s"
+    yield f"{seconds(record)} s"
 
 
 def misfit(record: Record) -> str:
@@ -236,37 +230,6 @@ def _known(record: Record) -> str:
     return "rotation unknown" if isinstance(sigma, str) else f"rotation known to {math.degrees(sigma):.2g} degrees"
 
 
-def row_line(name: str, row: Record) -> str:
-    """What was found in one of many files, or what was wrong with it; the name stands last and whole."""
-    if row["error"] is not None:
-        told, name = one_line(row["error"]), one_line(name)
-        return f"failed: {told}" if name in told else f"failed: {name}: {told}"
-    if "hyperplanes" in row:
-        told, mirrors, turns = f"{row['dimension']}-D", row["hyperplanes"], None
-    else:
-        # Planes and axes of a detection in space, lines and turns of one in the plane.
-        mirrors = row["lines"] if "lines" in row else row["planes"]
-        turns = ([row["rotation"]] if row["rotation"] else []) if "lines" in row else row["axes"]
-        told = f"at least {row['point_group']}" if row.get("at_least") else row["point_group"]
-    elements = [] if turns is None else mirrors + turns + _inversions(row)
-    return _ROW.format(
-        "undetermined" if row["undetermined"] else told,
-        len(mirrors),
-        "" if turns is None else len(turns),
-        _percent(max(e["residual"]["p95"] for e in elements)) if elements else "",
-        f"{min(e['confidence'] for e in elements):.2f}" if elements else "",
-        _seconds(row),
-        one_line(name),
-    )
-
-
-def _inversions(record: Record) -> list[Record]:
-    """The inversion as an element, if there is one; rows of a batch in the plane, or of an early version, tell none."""
-    if not record.get("inversion_residual"):
-        return []
-    return [{"residual": record["inversion_residual"], "confidence": record["inversion_confidence"]}]
-
-
 def _spatial(record: Record) -> Iterator[Table]:
     """Planes, axes, the inversion and near misses of a detection in space."""
     planes = [(_mirror(p, record), p) for p in record["planes"]]
@@ -274,7 +237,7 @@ def _spatial(record: Record) -> Iterator[Table]:
     turns = [_turn("improper" if a["improper"] else "axis", a["order"]) for a in record["axes"]]
     axes = [((_direction(a["direction"]), turn), a) for a, turn in zip(record["axes"], turns, strict=True)]
     yield _elements(("axes: direction", "kind"), "confidence", axes)
-    yield _elements(("inversion",), "confidence", [(("about the centre",), found) for found in _inversions(record)])
+    yield _elements(("inversion",), "confidence", [(("about the centre",), found) for found in inversions(record)])
     near = [(_near(m, record), m) for m in record["near_misses"]]
     yield _elements(("near misses: direction", "offset", "kind"), "x limit", near)
 
@@ -298,7 +261,7 @@ def _elements(heads: Sequence[str], last: str, rows: Sequence[tuple[Sequence[str
     table = _table(*heads, *_RESIDUALS, last)
     score = "excess" if last == "x limit" else "confidence"
     for named, element in rows:
-        misses = [_percent(element["residual"][name]) for name in _RESIDUALS]
+        misses = [percentage(element["residual"][name]) for name in _RESIDUALS]
         table.add_row(*named, *misses, f"{element[score]:.2f}")
     return table
 
@@ -310,10 +273,6 @@ def _table(first: str, *others: str) -> Table:
         title = f"{name} %" if name in _RESIDUALS else name
         table.add_column(title, overflow="fold", justify="left" if name in _WORDS else "right")
     return table
-
-
-def _percent(fraction: float) -> str:
-    return f"{100 * fraction:.3f}"
 
 
 def _direction(values: list[float]) -> str:
@@ -331,10 +290,6 @@ def _length(value: float, record: Record) -> str:
 
 def _turn(kind: str, order: int | str) -> str:
     return "revolution" if order == "inf" else f"{kind_name(kind)} {order}"
-
-
-def _seconds(record: Record) -> str:
-    return f"{sum(record['timings'].values()):.2f}"
 
 
 def _count(number: int, noun: str, plural: str = "") -> str:

@@ -113,13 +113,13 @@ def add_class_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_frame_option(parser: argparse.ArgumentParser) -> None:
-    """The option that chooses one of several objects in a file."""
+def add_frame_option(parser: argparse.ArgumentParser, *, otherwise: str = "there has to be one") -> None:
+    """The option that chooses one of several objects in a file, and what happens without it."""
     parser.add_argument(
         "--frame",
         type=natural,
         metavar="N",
-        help="which of several molecules, models or volumes in one file, from 0 (default: there has to be one)",
+        help=f"which of several molecules, models or volumes in one file, from 0 (default: {otherwise})",
     )
 
 

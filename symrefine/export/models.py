@@ -5,15 +5,16 @@ materials, polygons, comments, the order of everything. `model_bytes` writes wha
 """
 
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from symrefine.errors import InputError
+from symrefine.errors import InputError, about
 from symrefine.geometry import Array
+from symrefine.load.elements import symbol
 from symrefine.load.ply_header import Element, Header, parse_header
 from symrefine.shape import Shape
 
@@ -26,27 +27,44 @@ def check_suffix(path: Path, shape: Shape | None = None) -> None:
     Raises:
         InputError: with the formats that can.
     """
-    suffix = path.suffix.lower()
-    if suffix not in _WRITERS:
-        raise InputError(f"{path}: cannot write {suffix or 'a file without suffix'}; known are {' '.join(_WRITERS)}")
-    if shape is None:
-        return
-    if shape.faces is not None and suffix in (".xyz", ".npy"):
-        raise InputError(f"{path}: {suffix} holds no faces; write a mesh as .ply, .obj, .off or .npz")
+    with about(str(path)):
+        suffix = path.suffix.lower()
+        if suffix not in MODELS:
+            raise InputError(f"cannot write {suffix or 'a file without suffix'}; known are {' '.join(MODELS)}")
+        if shape is not None:
+            _check_format(suffix, shape)
+
+
+def _check_format(suffix: str, shape: Shape) -> None:
+    if shape.faces is not None and suffix in _CLOUDS:
+        raise InputError(f"{suffix} holds no faces; write a mesh as {_but(_CLOUDS)}")
+    if shape.faces is None and suffix == ".stl":
+        raise InputError(f".stl holds nothing but faces; write a cloud as {_but(['.stl'])}")
     if shape.weights is not None and shape.faces is None and suffix != ".npz":
-        raise InputError(f"{path}: {suffix} holds no weights, which {shape.source} has; write .npz")
-    if shape.normals is not None and suffix in (".npy", ".off"):
-        raise InputError(f"{path}: {suffix} holds no normals, which {shape.source} has; write .ply, .obj, .xyz or .npz")
+        raise InputError(f"{suffix} holds no weights, which {shape.source} has; write .npz")
+    if shape.normals is not None and suffix in _BARE:
+        raise InputError(f"{suffix} holds no normals, which {shape.source} has; write {_but(_BARE)}")
 
 
-def model_bytes(path: Path, shape: Shape) -> bytes:
-    """A mesh or cloud in the format of the suffix of `path`, coordinates in full precision.
+def _but(left_out: Collection[str]) -> str:
+    """The formats that remain, as a list to choose from."""
+    *first, last = (suffix for suffix in MODELS if suffix not in left_out)
+    return f"{', '.join(first)} or {last}"
+
+
+def model_bytes(suffix: str, shape: Shape) -> bytes:
+    """A mesh or cloud in the format of a suffix, one of `MODELS`, coordinates in full precision.
 
     Raises:
-        InputError: as `check_suffix`.
+        InputError: the format cannot hold the shape.
     """
-    check_suffix(path, shape)
-    return _WRITERS[path.suffix.lower()](shape)
+    _check_format(suffix, shape)
+    return _WRITERS[suffix](shape)
+
+
+def keeps_labels(suffix: str, shape: Shape) -> bool:
+    """Whether a format has what the labels of a shape tell apart, if it has any: elements in a table of atoms."""
+    return shape.labels is None or (suffix == ".xyz" and shape.elements)
 
 
 def moved(data: bytes, suffix: str, matrix: Array) -> bytes | None:
@@ -160,7 +178,41 @@ def _off(shape: Shape) -> bytes:
 
 
 def _xyz(shape: Shape) -> bytes:
+    if shape.elements and shape.labels is not None:
+        atoms = [f"{symbol(k)} {row}" for k, row in zip(shape.labels.tolist(), _rows(shape.points), strict=True)]
+        return "\n".join([str(len(atoms)), "", *atoms, ""]).encode("ascii")
+    return _txt(shape)
+
+
+def _txt(shape: Shape) -> bytes:
     return "\n".join([*_rows(_table(shape)), ""]).encode("ascii")
+
+
+def _csv(shape: Shape) -> bytes:
+    table = _table(shape)
+    names = ",".join((*_POSITION, *_NORMAL)[: table.shape[1]])
+    return "\n".join([names, *(",".join(map(repr, row)) for row in table.tolist()), ""]).encode("ascii")
+
+
+def _pcd(shape: Shape) -> bytes:
+    table = np.ascontiguousarray(_table(shape), dtype="<f8")
+    count, width = table.shape
+    names = (*_POSITION, *(f"normal_{axis}" for axis in _POSITION))[:width]
+    head = ["# .PCD v0.7", "VERSION 0.7", f"FIELDS {' '.join(names)}", f"SIZE{width * ' 8'}", f"TYPE{width * ' F'}"]
+    head += [f"COUNT{width * ' 1'}", f"WIDTH {count}", "HEIGHT 1", "VIEWPOINT 0 0 0 1 0 0 0", f"POINTS {count}"]
+    return "\n".join([*head, "DATA binary", ""]).encode("ascii") + table.tobytes()
+
+
+def _stl(shape: Shape) -> bytes:
+    """Text, as the binary kind rounds to single precision."""
+    assert shape.faces is not None
+    corners = shape.points[shape.faces]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
+    lines = ["solid symrefine"]
+    for normal, triangle in zip(_rows(normals, "facet normal "), corners, strict=True):
+        lines += [normal, "outer loop", *_rows(triangle, "vertex "), "endloop", "endfacet"]
+    return "\n".join([*lines, "endsolid symrefine", ""]).encode("ascii")
 
 
 def _npy(shape: Shape) -> bytes:
@@ -194,10 +246,19 @@ def marked_bytes(suffix: str, points: Array, inferred: NDArray[np.bool_]) -> byt
 
 
 _WRITERS: dict[str, Callable[[Shape], bytes]] = {
+    ".csv": _csv,
     ".npy": _npy,
     ".npz": _npz,
     ".obj": _obj,
     ".off": _off,
+    ".pcd": _pcd,
     ".ply": _ply,
+    ".stl": _stl,
+    ".txt": _txt,
     ".xyz": _xyz,
 }
+# Formats of models, those that hold no faces, those that hold no normals, and those that mark what is inferred.
+MODELS = tuple(_WRITERS)
+_CLOUDS = (".csv", ".npy", ".pcd", ".txt", ".xyz")
+_BARE = (".npy", ".off", ".stl", ".txt")
+MARKED = (".npz", ".ply")

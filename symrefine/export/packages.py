@@ -183,4 +183,4 @@ def _model(path: Path, shape: Shape, pose: Canonical, scale: float) -> tuple[byt
     check_suffix(path, shape)
     lost = shape.faces is not None or shape.labels is not None
     notes = ["colours, textures, labels and normals of meshes are not carried over"] if lost else []
-    return model_bytes(path, pose.shape(shape, scale)), notes
+    return model_bytes(path.suffix.lower(), pose.shape(shape, scale)), notes

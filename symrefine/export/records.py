@@ -2,12 +2,13 @@
 
 import math
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from symrefine.export.numbers import matrix, number, numbers, seconds
 from symrefine.geometry import Array, Plane, positive, toward_positive
 from symrefine.shape import Shape
 from symrefine.surface.misses import Deviation
@@ -26,9 +27,6 @@ ALIGNMENT_SCHEMA = "symrefine.alignment/1"
 Record = dict[str, Any]
 _COVERAGE = ("supported", "contradicted", "unseen")
 
-# Digits that are kept: what lies beyond differs between processors.
-_DIGITS = 12
-
 
 def detection_record(
     detection: "Detection", shape: Shape, *, options: Mapping[str, Any], load_s: float | None = None
@@ -45,7 +43,7 @@ def detection_record(
     """
     d, scale = detection, detection.diagonal
     return {
-        **_opening(SCHEMA, shape, options),
+        **opening(SCHEMA, shape, options),
         "classes": _classes(shape),
         **_answer(d),
         "at_least": bool(d.at_least),
@@ -79,7 +77,7 @@ def detection_record(
         "iterations": int(d.iterations),
         "undetermined": d.undetermined or None,
         "ntuples": {"kind": d.tuples.kind} | _sizes(d.tuples),
-        "timings": _seconds(d.timings, load_s),
+        "timings": seconds(d.timings, load_s),
     }
 
 
@@ -94,7 +92,7 @@ def planar_record(
     d, scale, turns = detection, detection.diagonal, detection.rotation
     nowhere = {"normal": None, "offset": None}
     return {
-        **_opening(PLANAR_SCHEMA, shape, options),
+        **opening(PLANAR_SCHEMA, shape, options),
         **_answer(d),
         "lines": [_placed(found.line, scale) | _held(found) for found in d.lines],
         "rotation": None if turns is None else {"order": _order(turns.order), **_held(turns)},
@@ -123,7 +121,7 @@ def planar_record(
                 for v in d.doublets.vectors
             ],
         },
-        "timings": _seconds(d.timings, load_s),
+        "timings": seconds(d.timings, load_s),
     }
 
 
@@ -144,7 +142,7 @@ def subspace_record(
         return _placed(found.plane, d.diameter) | figures
 
     return {
-        **_opening(SUBSPACE_SCHEMA, shape, options),
+        **opening(SUBSPACE_SCHEMA, shape, options),
         "dimension": shape.dim,
         "center": numbers(d.center, d.diameter),
         "diameter": number(d.diameter),
@@ -154,11 +152,11 @@ def subspace_record(
         "incomplete": d.incomplete or None,
         "reflection_group_order": d.reflection_group_order,
         "ntuples": {"rank": d.fixed.rank} | _sizes(d.fixed),
-        "timings": _seconds(d.timings, load_s),
+        "timings": seconds(d.timings, load_s),
     }
 
 
-def _opening(schema: str, shape: Shape, options: Mapping[str, Any]) -> Record:
+def opening(schema: str, shape: Shape, options: Mapping[str, Any]) -> Record:
     """How every record of a detection begins: what it is, of what, by which version, and what was asked."""
     return {
         "schema": schema,
@@ -206,7 +204,7 @@ def alignment_record(
         "misfit": bool(a.is_misfit),
         "confidence": number(a.confidence),
         "determinant": a.determinant,
-        "matrix": _matrix(a.matrix),
+        "matrix": matrix(a.matrix),
         "translation": numbers(a.translation, size),
         "scale": number(a.scale),
         "rms": number(a.rms, 1.0),
@@ -214,14 +212,14 @@ def alignment_record(
         "exact": bool(a.exact),
         "observable": a.observable,
         "symmetry": a.coset.symmetry or None,
-        "free": _matrix(a.coset.free),
+        "free": matrix(a.coset.free),
         "equivalents": [
-            {"matrix": _matrix(m), "translation": numbers(t, size)}
+            {"matrix": matrix(m), "translation": numbers(t, size)}
             for m, t in zip(a.coset.matrices, a.coset.translations, strict=True)
         ],
     }
     equivalents_s = time.perf_counter() - start
-    return record | {"timings": _seconds(dict(a.timings) | {"equivalents": equivalents_s}, load_s)}
+    return record | {"timings": seconds(dict(a.timings) | {"equivalents": equivalents_s}, load_s)}
 
 
 def _classes(shape: Shape) -> Record | None:
@@ -230,31 +228,6 @@ def _classes(shape: Shape) -> Record | None:
         return None
     sizes = np.unique(shape.labels, return_counts=True)[1].tolist()
     return {"count": len(sizes), "sizes": sizes}
-
-
-def number(value: float, scale: float = 0.0) -> float | str | None:
-    """A finite number to 12 significant digits, 0 if it is nothing beside `scale`; "inf", "-inf", or None for NaN."""
-    value = float(value)
-    if math.isnan(value):
-        return None
-    if math.isinf(value):
-        return str(value)
-    return 0.0 if abs(value) <= 10.0**-_DIGITS * scale else float(f"{value:.{_DIGITS}g}")
-
-
-def numbers(values: Iterable[float], scale: float) -> list[float | str | None]:
-    """Each value as `number` writes it."""
-    return [number(v, scale) for v in values]
-
-
-def _matrix(rows: Array) -> list[list[float | str | None]]:
-    return [numbers(row, 1.0) for row in rows]
-
-
-def _seconds(timings: Mapping[str, float], load_s: float | None = None) -> dict[str, float]:
-    """Seconds by stage, to the microsecond, those of reading first."""
-    stages = ({} if load_s is None else {"load": load_s}) | dict(timings)
-    return {stage: round(spent, 6) for stage, spent in stages.items()}
 
 
 def _placed(plane: Plane, scale: float) -> Record:

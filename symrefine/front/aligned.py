@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from symrefine.align.alignment import Alignment as BareAlignment
-from symrefine.front import lines
 from symrefine.front.answers import Answer, Options
 from symrefine.shape import Shape
 
@@ -29,6 +28,3 @@ class Alignment(Answer, BareAlignment):
         from symrefine.export.records import alignment_record
 
         return alignment_record(self, self.source, self.target, options=options, load_s=load_s)
-
-    def __repr__(self) -> str:
-        return "\n".join(lines.alignment_summary(self, self.source, self.target))

@@ -1,15 +1,16 @@
 """Results with a voice: they print on six lines, become JSON, pages, pictures and recordings, and draw themselves."""
 
 import base64
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from symrefine.errors import InputError
-from symrefine.files import check_target, json_text, whole
+from symrefine.errors import InputError, about
+from symrefine.files import Writer, bytes_writer, check_target, json_text, text_writer, write_all
 from symrefine.front import lines
 from symrefine.geometry import Array, homogeneous
 from symrefine.shape import Shape
@@ -17,9 +18,11 @@ from symrefine.shape import Shape
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from symrefine.picture.draw import Found as BareFound
+
 Options = Mapping[str, Any]
-# What answers are written as.
-KINDS = ("json", "html", "png", "rrd")
+# What detections are written as.
+KINDS = (".json", ".html", ".png", ".rrd")
 # Width and height of a picture, in pixels.
 SIZE = (1200, 900)
 
@@ -73,40 +76,43 @@ class Answer:
         return json_text(self.to_dict())
 
     def save(self, path: str | Path) -> None:
-        """Write the answer, whole or not at all, as its suffix says: .json, .html (a page), .png, .rrd (a recording).
+        """Write the answer, whole or not at all, as its suffix says: .json; of most also .png, .html (a page), .rrd.
 
         Raises:
-            InputError: another suffix, a kind of file that there is not for this kind of object, or no room.
+            InputError: another suffix, a kind of file that there is not for this kind of answer, or no room.
         """
         path = Path(path)
-        getattr(self, f"_write_{check_kind(path)}")(path)
+        with about(str(path)):
+            write = self.writer(path.suffix.lower())
+        check_target(path)
+        write_all({str(path): write})
 
-    def _write_json(self, path: Path) -> None:
-        with whole(path) as draft:
-            draft.write_text(self.to_json(), encoding="utf-8", newline="")
+    def writer(self, suffix: str) -> Writer:
+        """What fills a file with the answer, in the format of a suffix such as `.json`.
 
-    def _write_html(self, path: Path) -> None:
-        raise _lacks(self, path)
+        Raises:
+            InputError: a kind of file that there is not for this kind of answer.
+        """
+        kinds = self.kinds()
+        if suffix not in kinds:
+            raise InputError(
+                f"a {type(self).__name__} cannot be written as {suffix or 'a file without suffix'}; expected a name "
+                f"that ends in {', '.join(kinds)}"
+            )
+        return kinds[suffix]()
 
-    def _write_png(self, path: Path) -> None:
-        raise _lacks(self, path)
-
-    def _write_rrd(self, path: Path) -> None:
-        raise _lacks(self, path)
+    def kinds(self) -> dict[str, Callable[[], Writer]]:
+        """What makes the writer of each kind of file that there is, by its suffix."""
+        return {".json": lambda: text_writer(self.to_json())}
 
     def __repr__(self) -> str:
         return "\n".join(lines.summary(self.to_dict()))
 
 
-class Found(Answer):
-    """What every detection can do."""
+class Pictured(Answer):
+    """What every answer can do of which there is a picture."""
 
     __slots__ = ()
-    shape: Shape
-
-    def operations(self) -> Operations:
-        """Operations, or what generates them, as homogeneous matrices in the units and the frame of the input."""
-        raise NotImplementedError
 
     def plot(self, axes: "Axes | None" = None) -> "Axes":
         """The picture of `save("x.png")` on axes of matplotlib, on those of a new figure if None."""
@@ -117,41 +123,55 @@ class Found(Answer):
 
         if axes is None:
             axes = plt.figure(figsize=(8.0, 6.0), layout="constrained").add_subplot()
-        axes.imshow(imread(BytesIO(self._picture())))
+        axes.imshow(imread(BytesIO(self._picture(*SIZE))))
         axes.set_axis_off()
         return axes
 
     def _repr_html_(self) -> str:
-        return lines.card(self.to_dict(), base64.b64encode(self._picture()).decode("ascii"))
+        return lines.card(self.to_dict(), base64.b64encode(self._picture(*SIZE)).decode("ascii"))
 
-    def _picture(self) -> bytes:
+    def _picture(self, width: int, height: int) -> bytes:
+        """PNG of so many pixels."""
+        raise NotImplementedError
+
+    def kinds(self) -> dict[str, Callable[[], Writer]]:
+        return super().kinds() | {".png": lambda: bytes_writer(self._picture(*SIZE))}
+
+
+class Found(Pictured):
+    """What every detection can do."""
+
+    __slots__ = ()
+    shape: Shape
+
+    def operations(self) -> Operations:
+        """Operations, or what generates them, as homogeneous matrices in the units and the frame of the input."""
+        raise NotImplementedError
+
+    def _bare(self) -> "BareFound":
+        """Itself, as pictures and pages know it."""
+        raise NotImplementedError
+
+    def _picture(self, width: int, height: int) -> bytes:
         from symrefine.picture.draw import picture_png
 
-        return picture_png(self, self.shape, width=SIZE[0], height=SIZE[1])  # type: ignore[arg-type]
+        return picture_png(self._bare(), self.shape, width=width, height=height)
 
-    def _write_html(self, path: Path) -> None:
+    def kinds(self) -> dict[str, Callable[[], Writer]]:
+        return super().kinds() | {".html": self._page}
+
+    def _page(self) -> Writer:
         from symrefine.report import write_html
 
-        write_html(self, self.shape, path)  # type: ignore[arg-type]
-
-    def _write_png(self, path: Path) -> None:
-        from symrefine.report import draw
-
-        draw(self, self.shape, path)  # type: ignore[arg-type]
+        return partial(write_html, self._bare(), self.shape)
 
 
-def check_kind(path: Path) -> str:
-    """What kind of file an answer is to be written as: json, html, png or rrd.
+def check_kind(path: Path) -> None:
+    """Refuse, before any work, a name that no detection can be written as.
 
     Raises:
-        InputError: another suffix, or a place that cannot be written.
+        InputError: another suffix than those of `KINDS`, or a place that cannot be written.
     """
-    kind = path.suffix.lower().removeprefix(".")
-    if kind not in KINDS:
-        raise InputError(f"{path}: expected a name that ends in .{', .'.join(KINDS)}")
+    if path.suffix.lower() not in KINDS:
+        raise InputError(f"{path}: expected a name that ends in {', '.join(KINDS)}")
     check_target(path)
-    return kind
-
-
-def _lacks(answer: Answer, path: Path) -> InputError:
-    return InputError(f"{path}: a {type(answer).__name__} cannot be written as {path.suffix}; .json holds all of it")

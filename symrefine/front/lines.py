@@ -3,34 +3,67 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from symrefine.picture.words import order_name, percent, symbol
-from symrefine.shape import Shape
-
-if TYPE_CHECKING:
-    from symrefine.align.alignment import Alignment
 
 Record = dict[str, Any]
 # Width of what a line is about, elements and alternatives that are told one by one, decimals of a direction.
 LABEL, TOLD = 12, 4
+# What a detection calls its mirrors, in space, in the plane, and beyond.
+MIRRORS = ("planes", "lines", "hyperplanes")
+# How a shape was made symmetric.
+METHODS = {
+    "vertices": "each is the mean of its counterparts",
+    "orbits": "one sector moved onto the symmetric surface, and its copies",
+    "surface": "the others lie on the symmetric surface, the triangles are as they were",
+}
 
 
 def summary(record: Record) -> list[str]:
-    """Six lines: the answer, its mirrors and turns, what else it may be, near misses, and what was asked."""
-    told = {
+    """A result in six lines, whatever it is: the answer, what there is to say of it, and what was asked."""
+    if "matrix" in record:
+        return list(_aligned(record))
+    told = _made(record) if "found" in record else _completed(record) if "inferred" in record else _detected(record)
+    lines = {**told, "asked": _asked(record)}
+    return [f"{record['source']}: {answer(record)}", *(f"  {name:<{LABEL}}{text}" for name, text in lines.items())]
+
+
+def _detected(record: Record) -> dict[str, str]:
+    """Mirrors and turns, what else it may be, near misses."""
+    return {
         "mirrors": _mirrors(record),
         "turns": _turns(record),
         "otherwise": _otherwise(record),
         "near misses": _near(record),
-        "asked": _asked(record),
     }
-    return [f"{record['source']}: {answer(record)}", *(f"  {name:<{LABEL}}{text}" for name, text in told.items())]
+
+
+def _made(record: Record) -> dict[str, str]:
+    """What was made exact, how, how far points moved, and how exact it is."""
+    return {
+        "found": f"{symbol(record['found'])}, confidence {record['confidence']:.3f}",
+        "points": f"{record['points']:,}, {percent(record['paired'])} of them paired; {METHODS[record['method']]}",
+        "moved": f"by {percent(record['largest'])} of the diagonal at most, {percent(record['rms'])} RMS",
+        "result": f"misses itself by {record['residual']:.1e} of the diagonal",
+    }
+
+
+def _completed(record: Record) -> dict[str, str]:
+    """What was seen, what was inferred from it, what speaks against it, and what was left out."""
+    return {
+        "seen": f"{record['seen']:,} points",
+        "inferred": f"{record['inferred']:,} points where nobody looked",
+        "against": f"{record['contradicted']:,} points have an image where the scan says that there is nothing",
+        "left out": f"{record['outliers']:,} outliers",
+    }
 
 
 def answer(record: Record) -> str:
     """The answer with how sure it is, or why there is none."""
-    if record["undetermined"]:
+    if "found" in record:
+        return f"{symbol(record['point_group'])}, made exact"
+    if record.get("undetermined"):
         return f"undetermined: {record['undetermined']}"
     if "hyperplanes" in record:
         order = record["reflection_group_order"]
@@ -41,8 +74,8 @@ def answer(record: Record) -> str:
 
 
 def mirrors(record: Record) -> Sequence[Record]:
-    """The records of all mirrors: planes, lines or hyperplanes."""
-    return next(record[name] for name in ("planes", "lines", "hyperplanes") if name in record)
+    """The records of all mirrors of a detection: planes, lines or hyperplanes."""
+    return next(record[name] for name in MIRRORS if name in record)
 
 
 def _mirrors(record: Record) -> str:
@@ -68,7 +101,7 @@ def _order(axis: Record) -> str:
 
 def _otherwise(record: Record) -> str:
     others = record.get("alternatives", [])
-    told = [f"{symbol(a['point_group'])} {100 * a['probability']:.2g} %" for a in others[:TOLD]]
+    told = [f"{symbol(a['point_group'])} {percent(a['probability'])}" for a in others[:TOLD]]
     return ", ".join(told + ["..."] * (len(others) > TOLD)) or "nothing else"
 
 
@@ -82,35 +115,53 @@ def _near(record: Record) -> str:
 
 def _asked(record: Record) -> str:
     tolerance = record.get("tolerance", record["options"].get("tolerance"))
-    sample = f", {record['outliers']['count']:,} outliers" if record.get("outliers", {}).get("count") else ""
+    out = record.get("outliers")
+    sample = f", {out['count']:,} outliers" if isinstance(out, dict) and out["count"] else ""
     took = sum(record["timings"].values())
     whole = "diagonal" if "diagonal" in record else "diameter"
     return f"tolerance {percent(tolerance)} of the {whole}{sample}; {took:.2g} s"
 
 
-def alignment_summary(found: "Alignment", source: Shape, target: Shape) -> list[str]:
+def _aligned(record: Record) -> Iterator[str]:
     """The status, the map, and how well it holds."""
-    rows = zip(found.matrix.tolist(), found.translation.tolist(), strict=True)
-    kind = "rotation" if found.determinant > 0 else "reflection or rotoreflection"
-    return [
-        f"{source.source} onto {target.source}: {found.status}",
-        *(f"  {' '.join(f'{x + 0.0:11.8f}' for x in row)}  |  {shift:.8g}" for row, shift in rows),
-        f"  determinant {found.determinant:+d} ({kind}), confidence {found.confidence:.3f}",
-        f"  rms {percent(found.rms)} of the diagonal, scale {found.scale:.6g}; {sum(found.timings.values()):.2g} s",
-    ]
+    yield f"{record['source']} onto {record['target']}: {record['status']}"
+    yield from map_rows(record)
+    yield f"  {handedness(record)}, confidence {record['confidence']:.3f}"
+    yield (
+        f"  rms {percent(record['rms'])} of the diagonal, scale {record['scale']:.6g}; "
+        f"{sum(record['timings'].values()):.2g} s"
+    )
+
+
+def map_rows(record: Record) -> Iterator[str]:
+    """The rows of the matrix of an alignment, each with its entry of the translation."""
+    for row, shift in zip(record["matrix"], record["translation"], strict=True):
+        yield f"  {' '.join(f'{x + 0.0:11.8f}' for x in row)}  |  {shift:.8g}"
+
+
+def handedness(record: Record) -> str:
+    """The determinant of an alignment, and what it means."""
+    kind = "rotation" if record["determinant"] > 0 else "reflection or rotoreflection"
+    return f"determinant {record['determinant']:+d} ({kind})"
 
 
 def card(record: Record, picture: str) -> str:
-    """HTML for a notebook: the picture (PNG in base64) and a table of mirrors and turns."""
-    head = "<tr><th>element</th><th>direction</th><th>offset</th><th>95 % within</th><th>confidence</th></tr>"
-    rows = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in _rows(record))
+    """HTML for a notebook: the picture (PNG in base64), of a detection a table of mirrors and turns, and the rest."""
     said = escape(answer(record), quote=True)
-    told = "<br>".join(escape(line) for line in summary(record)[3:])
+    detected = any(name in record for name in MIRRORS)
+    told = "<br>".join(escape(line) for line in summary(record)[3 if detected else 1 :])
     return (
         f"<div><p><b>{escape(record['source'])}: {said}</b></p>"
         f'<img src="data:image/png;base64,{picture}" alt="{said}" style="max-width:600px">'
-        f"<table><thead>{head}</thead><tbody>{rows}</tbody></table><p>{told}</p></div>"
+        f"{_table(record) if detected else ''}<p>{told}</p></div>"
     )
+
+
+def _table(record: Record) -> str:
+    """HTML of a line for each mirror and turn."""
+    head = "<tr><th>element</th><th>direction</th><th>offset</th><th>95 % within</th><th>confidence</th></tr>"
+    rows = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in _rows(record))
+    return f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>"
 
 
 def _rows(record: Record) -> Iterator[tuple[str, str, str, str, str]]:

@@ -1,10 +1,12 @@
 """What was found in an object in space."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 from symrefine.detection.result import Detection as BareDetection
+from symrefine.files import Writer
 from symrefine.front.answers import Found, Operations, Options
 from symrefine.geometry import Array
 from symrefine.groups import PointGroup
@@ -24,6 +26,9 @@ class Detection(Found, BareDetection):
 
     shape: Shape
     options: Options
+
+    def _bare(self) -> BareDetection:
+        return self
 
     def _record(self, options: Options, load_s: float | None) -> dict[str, Any]:
         from symrefine.export.records import detection_record
@@ -75,7 +80,10 @@ class Detection(Found, BareDetection):
 
         return show(self, self.shape)
 
-    def _write_rrd(self, path: Path) -> None:
+    def kinds(self) -> dict[str, Callable[[], Writer]]:
+        return Found.kinds(self) | {".rrd": self._recording}
+
+    def _recording(self) -> Writer:
         from symrefine.viewer import record
 
-        record(self, self.shape, path)
+        return partial(record, self, self.shape)

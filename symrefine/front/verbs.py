@@ -1,8 +1,6 @@
-"""What can be asked of any object: `detect`, `align`, `symmetrize`, `complete`, `export`, `report`."""
+"""What can be asked of any object, and told: `detect`, `align`, `report`."""
 
 from collections.abc import Sequence
-from dataclasses import replace
-from operator import index
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -10,20 +8,18 @@ from numpy.typing import ArrayLike
 
 from symrefine.errors import InputError
 from symrefine.front.answers import Found, check_kind
-from symrefine.geometry import check_tolerance
+from symrefine.front.asked import seed_of, told
+from symrefine.lengths import relative_tolerance
 from symrefine.load.objects import shape_of
 from symrefine.surface.misses import TOLERANCE
 
 # Each verb imports what it needs when it is used: who detects waits for no alignment.
 if TYPE_CHECKING:
-    from symrefine.complete import Completion
     from symrefine.detection.measure import Outliers
-    from symrefine.export.packages import Format, Package
     from symrefine.front.aligned import Alignment
     from symrefine.front.beyond import SubspaceDetection
     from symrefine.front.planar import PlanarDetection
     from symrefine.front.space import Detection
-    from symrefine.symmetrize import Symmetrized
 
     Detected: TypeAlias = Detection | PlanarDetection | SubspaceDetection
 
@@ -36,7 +32,8 @@ def detect(
     labels: ArrayLike | None = None,
     viewpoint: ArrayLike | None = None,
     outliers: "Outliers" = "auto",
-    tolerance: float = TOLERANCE,
+    tolerance: float | str = TOLERANCE,
+    units: str | None = None,
     ladder: Sequence[float] | None = None,
     seed: int = 0,
 ) -> "Detected":
@@ -51,7 +48,10 @@ def detect(
         labels: [N] whole numbers, [F] for a mesh: classes (elements, colours, materials) that every symmetry must keep.
         viewpoint: [3] or [N, 3] place of the camera that saw the points, or each of them.
         outliers: "auto": points of a cloud that belong to no surface are set apart; "none": all points count.
-        tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal.
+        tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal, or as a
+            length: "0.5mm", "0.1A", "0.5u" in units of the object.
+        units: what a length of 1 in the object is, such as "mm", for a tolerance with a unit; what its format says if
+            None.
         ladder: other tolerances to tell the group at, in space; those of the command line if None.
         seed: of the random choices (samples of a mesh, subsets of a cloud).
 
@@ -64,14 +64,14 @@ def detect(
         DegenerateShapeError: the points do not spread.
     """
     shape = shape_of(shape, weights=weights, normals=normals, labels=labels, viewpoint=viewpoint)
-    tolerance, seed = _number(tolerance), _seed(seed)
-    options: dict[str, Any] = {"tolerance": tolerance, "seed": seed}
+    used = relative_tolerance(tolerance, shape, units=units, outliers=outliers)
+    options = told(tolerance, units) | {"seed": (seed := seed_of(seed))}
     if shape.dim == 3:
         from symrefine.detection import story
         from symrefine.front.space import Detection
 
         steps = story.LADDER if ladder is None else tuple(ladder)
-        found = story.detect(shape, outliers=outliers, ladder=steps, tolerance=tolerance, seed=seed)
+        found = story.detect(shape, outliers=outliers, ladder=steps, tolerance=used, seed=seed)
         return Detection.of(found, shape=shape, options=options | {"outliers": outliers})
     given = {
         "labels are": shape.labels is not None,
@@ -86,14 +86,16 @@ def detect(
         from symrefine.front.planar import PlanarDetection
         from symrefine.plane import detect_planar
 
-        return PlanarDetection.of(detect_planar(shape, tolerance=tolerance, seed=seed), shape=shape, options=options)
+        return PlanarDetection.of(detect_planar(shape, tolerance=used, seed=seed), shape=shape, options=options)
     from symrefine.front.beyond import SubspaceDetection
     from symrefine.ndim import detect_nd
 
-    return SubspaceDetection.of(detect_nd(shape, tolerance=tolerance, seed=seed), shape=shape, options=options)
+    return SubspaceDetection.of(detect_nd(shape, tolerance=used, seed=seed), shape=shape, options=options)
 
 
-def detect_in_space(shape: Any, *, tolerance: float = TOLERANCE, seed: int = 0) -> "Detection":
+def detect_in_space(
+    shape: Any, *, tolerance: float | str = TOLERANCE, units: str | None = None, seed: int = 0
+) -> "Detection":
     """What `detect` says of an object in space.
 
     Raises:
@@ -104,7 +106,7 @@ def detect_in_space(shape: Any, *, tolerance: float = TOLERANCE, seed: int = 0) 
     shape = shape_of(shape)
     if shape.dim != 3:
         raise InputError(f"{shape.source}: points have {shape.dim} coordinates; this is for objects in space")
-    found = detect(shape, tolerance=tolerance, seed=seed)
+    found = detect(shape, tolerance=tolerance, units=units, seed=seed)
     assert isinstance(found, Detection)
     return found
 
@@ -116,7 +118,8 @@ def align(
     scale: bool = False,
     polish: bool = True,
     allow_reflection: bool = True,
-    tolerance: float = TOLERANCE,
+    tolerance: float | str = TOLERANCE,
+    units: str | None = None,
     seed: int = 0,
 ) -> "Alignment":
     """The orthogonal map and the translation that take one object onto another; samplings and formats may differ.
@@ -127,7 +130,8 @@ def align(
         scale: whether the objects may differ in size; then `target ~ scale * matrix @ source + translation`.
         polish: refine on the points (3-space only); without it the moments have the last word, in half of the time.
         allow_reflection: whether determinant -1 is an answer.
-        tolerance: largest miss that still counts as agreement, as in `detect`.
+        tolerance: largest miss that still counts as agreement, as in `detect`; a length is measured by the target.
+        units: what a length of 1 in the target is, as in `detect`.
         seed: of the random choices (samples of meshes, subsets of clouds).
 
     Raises:
@@ -138,123 +142,14 @@ def align(
     from symrefine.front.aligned import Alignment
 
     moved, met = shape_of(source, name="source"), shape_of(target, name="target")
-    tolerance, seed = _number(tolerance), _seed(seed)
+    used, seed = relative_tolerance(tolerance, met, units=units), seed_of(seed)
     found = story.align(
-        moved, met, scale=scale, polish=polish, allow_reflection=allow_reflection, tolerance=tolerance, seed=seed
+        moved, met, scale=scale, polish=polish, allow_reflection=allow_reflection, tolerance=used, seed=seed
     )
-    options = {"tolerance": tolerance, "scale": bool(scale), "seed": seed}
-    told = options | {"measure": None, "rotations_only": not allow_reflection}
-    return Alignment.of(found, source=moved, target=met, options=told)
-
-
-def symmetrize(
-    shape: Any,
-    found: "Detection | None" = None,
-    *,
-    group: str | None = None,
-    tolerance: float = TOLERANCE,
-    seed: int = 0,
-) -> "Symmetrized":
-    """The nearest exactly symmetric mesh or cloud.
-
-    Args:
-        shape: whatever `detect` takes, in 3-space.
-        found: what `detect` found in it; detected if None.
-        group: the subgroup of it that is to be made exact, such as "Cs"; the whole group if None.
-        tolerance: by what fraction of the diagonal the shape may miss the symmetry.
-        seed: of the random samples of a surface.
-
-    Raises:
-        InputError: nothing is decided, no symmetry, or no such subgroup.
-        DegenerateShapeError: a few points, of which some have no counterpart.
-    """
-    from symrefine.symmetrize import placed_subgroup, symmetrize
-
-    shape = shape_of(shape)
-    found = detect_in_space(shape, tolerance=tolerance, seed=seed) if found is None else _in_space(found)
-    if found.undetermined:
-        raise InputError(f"{shape.source}: no symmetry to make exact: {found.undetermined}")
-    if found.point_group == "C1":
-        raise InputError(f"{shape.source}: is C1, nothing to make symmetric{_nearest_miss(found)}")
-    chosen = found.group if group is None else placed_subgroup(found.group, group)
-    return symmetrize(shape, chosen, found.center, tolerance=tolerance, seed=seed)
-
-
-def complete(
-    shape: Any,
-    found: "Detection | None" = None,
-    *,
-    viewpoint: ArrayLike | None = None,
-    outliers: "Outliers" = "auto",
-    tolerance: float = TOLERANCE,
-    seed: int = 0,
-) -> "Completion":
-    """The points of a scan and their images where nobody looked, under the group that is found in it.
-
-    Args:
-        shape: a cloud in 3-space, in any form that `detect` takes.
-        found: what `detect` found in it; the options that follow are those of `detect` where this is None.
-        viewpoint: as of `detect`.
-        outliers: as of `detect`.
-        tolerance: as of `detect`.
-        seed: as of `detect`.
-
-    Raises:
-        InputError: a mesh or atoms, an object without a symmetry, or none that can be decided.
-    """
-    from symrefine.complete import complete
-    from symrefine.front.space import Detection
-
-    shape = shape_of(shape, viewpoint=viewpoint)
-    made = complete(shape, found, outliers=outliers, tolerance=tolerance, seed=seed)
-    options = {"tolerance": tolerance, "seed": seed, "outliers": outliers}
-    return replace(made, detection=found or Detection.of(made.detection, shape=shape, options=options))
-
-
-def export(
-    shape: Any,
-    to: "Format",
-    out: str | Path,
-    *,
-    found: "Detection | None" = None,
-    number: int = 1,
-    scale: float = 1.0,
-    improper: bool = False,
-    steps: int | None = None,
-    transform: str | Path | None = None,
-) -> "Package":
-    """Write the symmetries as another program reads them: all files or none.
-
-    Args:
-        shape: whatever `detect` takes, in 3-space.
-        to: "bop": an entry in `models_info.json`; "npz": matrices [N, 4, 4]; "canonical": the model with its axis on z;
-            or a folder for "foundationpose", "megapose", "dope", "isaac".
-        out: the file, or the folder.
-        found: what `detect` found in it; detected if None.
-        number: of the object in `models_info.json`.
-        scale: millimetres in one unit of the object.
-        improper: npz: whether mirrors and the like belong to the matrices.
-        steps: npz: turns that stand for a continuous axis; 72 if None.
-        transform: canonical: where the transform goes, .json or .npz; `OUT_transform.json` if None.
-
-    Returns:
-        What was written, and notes on what the format cannot express.
-
-    Raises:
-        InputError: another format, nothing decided, or files that cannot be written.
-    """
-    from symrefine.export.operations import STEPS
-    from symrefine.export.packages import package_of, write_package
-
-    shape, out = shape_of(shape), Path(out)
-    found = detect_in_space(shape) if found is None else _in_space(found)
-    place = None if transform is None else Path(transform)
-    turns = STEPS if steps is None else steps
-    package = package_of(
-        to, out, found, shape, number=number, scale=scale, improper=improper, steps=turns, transform=place
-    )
-    write_package(package, to, out)
-    return package
+    options = told(tolerance, units) | {"scale": bool(scale), "seed": seed}
+    options |= {"relative_tolerance": used} if isinstance(tolerance, str) else {}
+    options |= {"measure": None, "rotations_only": not allow_reflection}
+    return Alignment.of(found, source=moved, target=met, options=options)
 
 
 def report(given: Any, path: str | Path) -> "Detected":
@@ -271,38 +166,3 @@ def report(given: Any, path: str | Path) -> "Detected":
     found: Any = given if isinstance(given, Found) else detect(given)
     found.save(path)
     return found
-
-
-def _in_space(found: Any) -> "Detection":
-    """What was found before, if it is of an object in space."""
-    from symrefine.front.space import Detection
-
-    if not isinstance(found, Detection):
-        raise InputError(f"found is of type {type(found).__name__}; expected what symrefine.detect found in space")
-    return found
-
-
-def _number(tolerance: Any) -> float:
-    check_tolerance(tolerance)
-    return float(tolerance)
-
-
-def _seed(seed: Any) -> int:
-    """A seed that numpy takes and JSON can hold."""
-    try:
-        whole = index(seed)
-    except TypeError:
-        whole = -1
-    if whole < 0:
-        raise InputError(f"seed is {seed!r}; expected a whole number from 0")
-    return whole
-
-
-def _nearest_miss(found: "Detection") -> str:
-    if not found.near_misses:
-        return ""
-    miss = found.near_misses[0]
-    return (
-        f"; the nearest, a {miss.kind}, misses by {miss.residual.p95:.1%} of the diagonal at the 95th percentile: "
-        "choose a larger tolerance if that counts as symmetric"
-    )

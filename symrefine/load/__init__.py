@@ -26,6 +26,7 @@ from symrefine.load.cif import read_cif
 from symrefine.load.collada import read_dae
 from symrefine.load.content import Content, Threshold, Wanted, check_distinct, check_finite
 from symrefine.load.depth import load_depth
+from symrefine.load.frames import Frames, one
 from symrefine.load.gltf import read_glb, read_gltf
 from symrefine.load.image import FORMATS, read_image
 from symrefine.load.labels import point_classes, point_weights
@@ -45,11 +46,12 @@ from symrefine.load.threemf import read_3mf
 from symrefine.load.volume_files import read_mrc, read_nifti, read_nrrd
 from symrefine.shape import Shape
 
-__all__ = ["IMAGES", "READERS", "SUFFIXES", "load", "load_depth", "stem_of", "suffix_of"]
+__all__ = ["IMAGES", "READERS", "SUFFIXES", "Frames", "load", "load_depth", "load_frames", "stem_of", "suffix_of"]
 
 # A reader gets the bytes of a file, its path where others lie beside it or another program reads it, and what the
-# caller wants beyond coordinates. It says what is wrong, not in which file.
-Reader = Callable[[bytes, Path, Wanted], Content]
+# caller wants beyond coordinates. It says what is wrong, not in which file. Of formats that can hold several objects it
+# gives the frames.
+Reader = Callable[[bytes, Path, Wanted], Content | Frames[Content]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,13 +89,13 @@ _MESHES_AND_CLOUDS = {
     ".stl": _Format(lambda data, *_: read_stl(data)),
     ".stp": _Format(lambda data, path, _: read_step(data, path), unit="m"),
     ".txt": _Format(lambda data, _, wanted: read_table(data, wanted.fields)),
-    ".xyz": _Format(lambda data, _, wanted: read_xyz(data, wanted.frame), ("fields", "frame")),
+    ".xyz": _Format(lambda data, *_: read_xyz(data), ("fields", "frame")),
 }
 _MOLECULES = {
-    ".cif": _Format(lambda data, _, wanted: read_cif(data, wanted.frame, wanted.fields), ("fields", "frame"), "A"),
-    ".mol": _Format(lambda data, _, wanted: read_molfile(data, wanted.frame), ("fields", "frame"), "A"),
-    ".pdb": _Format(lambda data, _, wanted: read_pdb(data, wanted.frame, wanted.fields), ("fields", "frame"), "A"),
-    ".sdf": _Format(lambda data, _, wanted: read_molfile(data, wanted.frame), ("fields", "frame"), "A"),
+    ".cif": _Format(lambda data, _, wanted: read_cif(data, wanted.fields), ("fields", "frame"), "A"),
+    ".mol": _Format(lambda data, *_: read_molfile(data), ("fields", "frame"), "A"),
+    ".pdb": _Format(lambda data, _, wanted: read_pdb(data, wanted.fields), ("fields", "frame"), "A"),
+    ".sdf": _Format(lambda data, *_: read_molfile(data), ("fields", "frame"), "A"),
 }
 _VOLUMES = {
     ".map": _Format(lambda data, _, wanted: read_mrc(data, wanted), ("frame", "grey", "measure"), "A"),
@@ -146,7 +148,8 @@ def load(
             of the scale become one class (see `symrefine.load.colours`). A face whose vertices have labels takes that
             of two corners, or of the first where all differ. Elements if None, for molecules.
         weights: a property, column or array of numbers that are the masses of the points of a cloud.
-        frame: which of several molecules, models or volumes in one file, from 0; None where there is one.
+        frame: which of several molecules, models or volumes in one file, from 0; None where there is one. `load_frames`
+            takes all.
         threshold: of a picture or a volume: grey value from 0 (its darkest) to 1 that makes it binary, or "otsu"; it is
             taken as it is if None.
         invert: of a picture or a volume: exchange object and background.
@@ -157,29 +160,66 @@ def load(
             frames of which none is chosen; options that the format knows nothing of; labels or weights that the file
             does not have, or that are of the wrong kind; a library that is not installed.
     """
+    if frame is not None and (isinstance(frame, bool) or not isinstance(frame, int)):
+        raise InputError(f"frame is {frame!r}; expected a whole number from 0, or None")
+    wanted = _wanted(measure, labels, weights, threshold, invert)
+    with about(str(path)):
+        content = _contents(Path(path), wanted, is_chosen=frame is not None).chosen(frame)
+    return _shape(content, Path(path), measure, labels, weights, source=str(path))
+
+
+def load_frames(
+    path: str | PathLike[str],
+    *,
+    measure: Literal["surface", "solid"] | None = None,
+    labels: str | None = None,
+    weights: str | None = None,
+    threshold: Threshold | None = None,
+    invert: bool = False,
+) -> Frames[Shape]:
+    """Every object in a file: molecules one after the other, models, volumes of a series; one of any other file.
+
+    Args:
+        path: as of `load`, and so are the others.
+
+    Returns:
+        A sequence of as many shapes as the file has, each made when it is asked for, and named `traj.xyz#3` where there
+        are several.
+
+    Raises:
+        InputError: as `load`; what is wrong with one of several objects is told when that is asked for.
+    """
+    source, wanted = str(path), _wanted(measure, labels, weights, threshold, invert)
+    with about(source):
+        contents = _contents(Path(path), wanted)
+
+    def shape(number: int) -> Shape:
+        name = source if len(contents) == 1 else f"{source}#{number}"
+        with about(name):
+            content = contents[number]
+        return _shape(content, Path(path), measure, labels, weights, source=name)
+
+    return Frames(contents.what, len(contents), shape)
+
+
+def _wanted(
+    measure: Literal["surface", "solid"] | None,
+    labels: str | None,
+    weights: str | None,
+    threshold: Threshold | None,
+    invert: bool,
+) -> Wanted:
+    """What a caller wants of a file beyond coordinates."""
     if measure not in (None, "surface", "solid"):
         raise InputError(f"measure is {measure!r}; expected 'surface', 'solid' or None")
     if threshold not in (None, "otsu") and not (isinstance(threshold, int | float) and 0.0 < threshold < 1.0):
         raise InputError(f"threshold is {threshold}; expected a grey value between 0 (black) and 1 (white), or 'otsu'")
-    if frame is not None and (isinstance(frame, bool) or not isinstance(frame, int)):
-        raise InputError(f"frame is {frame!r}; expected a whole number from 0, or None")
-    source, file = str(path), Path(path)
-    with about(source):
-        named = [name for name in (labels, weights) if name is not None]
-        wanted = Wanted(fields=named, frame=frame, measure=measure, threshold=threshold, invert=invert)
-        content = _content(file, wanted)
-        check_finite(content)
-        check_distinct(content)
-        kind = _FORMATS[suffix_of(file)]
-        arrays = _arrays(content, None if "measure" in kind.takes else measure, labels, weights, source)
-    # Labels that count unasked are elements, and lengths between them angstroms.
-    elements = labels is None and content.labels is not None
-    return Shape(
-        source=source, unit=content.unit or kind.unit or ("A" if elements else None), elements=elements, **arrays
-    )
+    named = [name for name in (labels, weights) if name is not None]
+    return Wanted(fields=named, measure=measure, threshold=threshold, invert=invert)
 
 
-def _content(file: Path, wanted: Wanted) -> Content:
+def _contents(file: Path, wanted: Wanted, *, is_chosen: bool = False) -> Frames[Content]:
+    """The objects in a file, of which one may be chosen."""
     suffix = suffix_of(file)
     try:
         is_folder = file.is_dir()
@@ -192,16 +232,33 @@ def _content(file: Path, wanted: Wanted) -> Content:
         raise InputError(
             f"unknown suffix {suffix!r}; known are {' '.join(READERS)}, and images {images}, and {GZIP} of each"
         )
-    _check_options(_FORMATS[suffix], wanted)
+    _check_options(_FORMATS[suffix], wanted, is_chosen=is_chosen)
     data = file_bytes(file)
-    return _FORMATS[suffix].read(unpacked(data) if file.suffix.lower() == GZIP else data, file, wanted)
+    found = _FORMATS[suffix].read(unpacked(data) if file.suffix.lower() == GZIP else data, file, wanted)
+    return found if isinstance(found, Frames) else one(found, "objects")
 
 
-def _check_options(kind: _Format, wanted: Wanted) -> None:
+def _shape(
+    content: Content, file: Path, measure: str | None, labels: str | None, weights: str | None, *, source: str
+) -> Shape:
+    """The shape that a content of a file is."""
+    kind = _FORMATS[suffix_of(file)]
+    with about(source):
+        check_finite(content)
+        check_distinct(content)
+        arrays = _arrays(content, None if "measure" in kind.takes else measure, labels, weights, source)
+    # Labels that count unasked are elements, and lengths between them angstroms.
+    elements = labels is None and content.labels is not None
+    return Shape(
+        source=source, unit=content.unit or kind.unit or ("A" if elements else None), elements=elements, **arrays
+    )
+
+
+def _check_options(kind: _Format, wanted: Wanted, *, is_chosen: bool) -> None:
     """Refuse what the files of one suffix know nothing of."""
     given = {
         "fields": bool(wanted.fields),
-        "frame": wanted.frame is not None,
+        "frame": is_chosen,
         "grey": wanted.threshold is not None or wanted.invert,
     }
     for group, said in given.items():

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from symrefine.errors import InputError
-from symrefine.load.content import Content, Values, chosen
+from symrefine.load.content import Content, Values
 from symrefine.load.elements import atoms, element
 from symrefine.load.extras import library
+from symrefine.load.frames import Frames
 from symrefine.load.pdb import check_single
 from symrefine.load.text import is_number, shorten
 
@@ -31,16 +32,15 @@ _GROUPS = ("_symmetry_space_group_name_H-M", "_space_group_name_H-M_alt", "_spac
 _Table = dict[str, list[str]]
 
 
-def read_cif(data: bytes, frame: int | None = None, named: Collection[str] = ()) -> Content:
-    """Atoms of one model, or of one block of several; elements are labels.
+def read_cif(data: bytes, named: Collection[str] = ()) -> Frames[Content]:
+    """Atoms of each model of each block, counted through; elements are labels.
 
     Args:
-        frame: which model of which block, counted through from 0; None if the file has one.
         named: fields that the caller asks for; with `occupancy` an atom may have several places.
 
     Raises:
-        InputError: damaged, unknown coordinates or elements, atoms with alternative places, crystals with symmetry;
-            several models of which none was chosen; gemmi is not installed.
+        InputError: damaged, crystals with symmetry, gemmi is not installed; of a model, when it is asked for: unknown
+            coordinates or elements, atoms with alternative places.
     """
     gemmi = library("gemmi", "chem")
     try:
@@ -50,7 +50,7 @@ def read_cif(data: bytes, frame: int | None = None, named: Collection[str] = ())
     models = [model for block in document for model in _models(block, gemmi)]
     if not models:
         raise InputError("holds no coordinates of atoms (_atom_site)")
-    return _content(*models[chosen(frame, len(models), "models")], named)
+    return Frames("models", len(models), lambda k: _content(*models[k], named))
 
 
 def _models(block: Any, gemmi: Any) -> Iterator[tuple[Any, _Table]]:

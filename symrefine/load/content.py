@@ -27,14 +27,12 @@ class Wanted:
 
     Args:
         fields: names of labels and weights, for formats in which what nobody names is refused.
-        frame: which of several molecules, models or volumes, from 0; None if there has to be one.
         measure: "solid" for the voxels of a volume, else its surface.
         threshold: grey value that makes a picture or a volume binary, or how to find it; None leaves it as it is.
         invert: exchange object and background of a picture or a volume.
     """
 
     fields: Collection[str] = ()
-    frame: int | None = None
     measure: Literal["surface", "solid"] | None = None
     threshold: Threshold | None = None
     invert: bool = False
@@ -100,23 +98,6 @@ class Content:
         """A point or a face as a message calls it: `point 7 (line 12)`, numbered as the format does."""
         lines = self.point_lines if kind == "point" else self.face_lines
         return f"{kind} {row + self.first_index}" + (f" (line {lines[row]})" if lines is not None else "")
-
-
-def chosen(frame: int | None, frames: int, what: str) -> int:
-    """Which of the frames of a file is read: the only one, or the one that was chosen.
-
-    Args:
-        what: what the frames are, in the plural.
-
-    Raises:
-        InputError: several frames, of which none was chosen, or one that is not there.
-    """
-    if frame is None and frames > 1:
-        raise InputError(f"holds {frames} {what}; choose one with frame (--frame), from 0 to {frames - 1}")
-    if frame is not None and not 0 <= frame < frames:
-        there = f"has {frames} {what}, from 0 to {frames - 1}" if frames > 1 else f"has one of the {what}, number 0"
-        raise InputError(f"frame is {frame}; the file {there}")
-    return frame or 0
 
 
 def polygons(rows: Iterable[Sequence[int]]) -> Polygons:

@@ -28,6 +28,11 @@ def atomic_number(symbol: str) -> int | None:
     return _NUMBERS.get(symbol.capitalize())
 
 
+def symbol(label: int) -> str:
+    """The symbol of an element, from its label."""
+    return _SYMBOLS[label - 1] if label > 0 else {-2: "D", -3: "T"}[label]
+
+
 def element(symbol: str, place: str) -> int:
     """Label of an element by its symbol.
 

@@ -50,10 +50,12 @@ def read_image(data: bytes, suffix: str, wanted: Wanted) -> Content:
     weights = pixel_weights(without_grain(grey), threshold=wanted.threshold, invert=wanted.invert)
     if np.ptp(weights) == 0.0:
         low, high = float(grey.min()), float(grey.max())
-        raise InputError(
-            f"nothing stands out: grey values run from {low:.3g} to {high:.3g}"
-            + (f"; choose a threshold between them, not {wanted.threshold}" if wanted.threshold is not None else "")
+        remedy = (
+            "try threshold 'otsu' (--threshold otsu), which parts dark from light"
+            if wanted.threshold is None
+            else f"choose a threshold between them, not {wanted.threshold}"
         )
+        raise InputError(f"nothing stands out: grey values run from {low:.3g} to {high:.3g}; {remedy}")
     row, column = np.nonzero(weights)
     points = np.column_stack([column + 0.5, len(grey) - row - 0.5])
     return Content(points=points, weights=weights[row, column])

@@ -1,6 +1,6 @@
 """Chemical .xyz: the number of atoms, a remark, then an element and three coordinates for each atom.
 
-Three variants are read as well: several frames one after the other, of which one is chosen; extended .xyz, whose remark
+Three variants are read as well: several frames one after the other; extended .xyz, whose remark
 says `Properties=species:S:1:pos:R:3...` what the columns are (its `Lattice` repeats nothing: the atoms that are written
 are the object); and lines of atoms with no number in front of them.
 """
@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.errors import InputError
-from symrefine.load.content import Content, Values, chosen
+from symrefine.load.content import Content, Values
 from symrefine.load.elements import HEAVIEST, atomic_number
+from symrefine.load.frames import Frames
 from symrefine.load.text import NATURAL, Line, count, is_number, numbered_lines, parse_table, shorten
 
 _LAYOUT = "an element and x y z, as 'O 0.0 0.0 0.1'"
@@ -46,22 +47,23 @@ def is_bare_molecule(lines: list[Line]) -> bool:
     return len(words) == 4 and _WORD.fullmatch(words[0]) is not None and all(map(is_number, words[1:]))
 
 
-def read_molecule(data: bytes, frame: int | None = None) -> Content:
-    """Atoms of one frame; elements are labels: atomic numbers, and -2 and -3 for D and T.
-
-    Args:
-        frame: which frame, from 0; None if the file has one.
+def read_molecule(data: bytes) -> Frames[Content]:
+    """Atoms of each frame; elements are labels: atomic numbers, and -2 and -3 for D and T.
 
     Raises:
-        InputError: other numbers of atoms than the file says, unknown elements, columns that nothing explains; several
-            frames of which none was chosen.
+        InputError: other numbers of atoms than the file says; of a frame, when it is asked for: unknown elements,
+            columns that nothing explains.
     """
     lines = numbered_lines(data)
     if lines[0][0] != 1:
         raise InputError(f"line {lines[0][0]}: {lines[0][1]}; the number of atoms must be line 1, a remark line 2")
     frames = _frames(dict(lines), lines[-1][0])
-    remark, atoms = frames[chosen(frame, len(frames), "frames")]
-    return _atoms(atoms, _columns(remark))
+
+    def made(k: int) -> Content:
+        remark, atoms = frames[k]
+        return _atoms(atoms, _columns(remark))
+
+    return Frames("frames", len(frames), made)
 
 
 def read_bare_molecule(lines: Sequence[Line]) -> Content:

@@ -6,8 +6,9 @@ Only the atoms are read: their places and symbols. Isotopes that a list `M  ISO`
 from collections.abc import Sequence
 
 from symrefine.errors import InputError
-from symrefine.load.content import Content, chosen
+from symrefine.load.content import Content
 from symrefine.load.elements import atoms, element
+from symrefine.load.frames import Frames
 from symrefine.load.text import NATURAL, Line, all_lines, count, is_number, shorten
 
 _END_OF_RECORD = "$$$$"
@@ -15,18 +16,19 @@ _HEADER = 4
 _V30 = "M  V30 "
 
 
-def read_molfile(data: bytes, frame: int | None = None) -> Content:
-    """Atoms of one record.
-
-    Args:
-        frame: which record, from 0; None if the file has one.
+def read_molfile(data: bytes) -> Frames[Content]:
+    """Atoms of each record.
 
     Raises:
-        InputError: cut off, other numbers of atoms or bonds than declared, columns without numbers, no elements; a
-            drawing in two dimensions; several records of which none was chosen.
+        InputError: of a record, when it is asked for: cut off, other numbers of atoms or bonds than declared, columns
+            without numbers, no elements; a drawing in two dimensions.
     """
     records = _records(all_lines(data))
-    lines = records[chosen(frame, len(records), "molecules")]
+    return Frames("molecules", len(records), lambda k: _molecule(records[k]))
+
+
+def _molecule(lines: list[Line]) -> Content:
+    """Atoms of one record."""
     if len(lines) < _HEADER:
         raise InputError(f"cut off after line {lines[-1][0]}; expected three lines of a header and one of counts")
     _check_end(lines)

@@ -1,4 +1,4 @@
-"""Protein Data Bank files, .pdb: atoms of one model, in Angstrom.
+"""Protein Data Bank files, .pdb: atoms of one model or of several, in Angstrom.
 
 The atoms that are written are the object: neither the copies of a biological assembly nor those of a crystal are made.
 """
@@ -10,8 +10,9 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from symrefine.errors import InputError
-from symrefine.load.content import Content, Values, chosen
+from symrefine.load.content import Content, Values
 from symrefine.load.elements import atomic_number, atoms, element
+from symrefine.load.frames import Frames
 from symrefine.load.text import Line, all_lines, is_number, shorten
 
 _ATOMS = ("ATOM", "HETATM")
@@ -20,19 +21,22 @@ _DECIMAL = re.compile(r" *-?[0-9]+\.[0-9]{3}")
 _COORDINATES = {"x": slice(30, 38), "y": slice(38, 46), "z": slice(46, 54)}
 
 
-def read_pdb(data: bytes, frame: int | None = None, named: Collection[str] = ()) -> Content:
-    """Atoms of one model; elements are labels, and chain, residue, name and occupancy can be.
+def read_pdb(data: bytes, named: Collection[str] = ()) -> Frames[Content]:
+    """Atoms of each model; elements are labels, and chain, residue, name and occupancy can be.
 
     Args:
-        frame: which model, from 0; None if the file has one.
         named: fields that the caller asks for; with `occupancy` an atom may have several places.
 
     Raises:
-        InputError: columns without numbers or elements, models that do not end, atoms with alternative places;
-            several models of which none was chosen.
+        InputError: models that do not end; of a model, when it is asked for: columns without numbers or elements,
+            atoms with alternative places.
     """
     models = _models(all_lines(data))
-    lines = models[chosen(frame, len(models), "models")]
+    return Frames("models", len(models), lambda k: _model(models[k], named))
+
+
+def _model(lines: Sequence[Line], named: Collection[str]) -> Content:
+    """Atoms of one model."""
     places = [[_number(line, name) for name in _COORDINATES] for line in lines]
     elements = [_element(line) for line in lines]
     columns = {"chain": slice(21, 22), "residue": slice(17, 20), "name": slice(12, 16)}

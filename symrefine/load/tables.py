@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from symrefine.errors import InputError, about
 from symrefine.geometry import Array
-from symrefine.load.content import Content, Polygons, Values, as_float64, chosen
+from symrefine.load.content import Content, Polygons, Values, as_float64
+from symrefine.load.frames import Frames, one
 from symrefine.load.molecule import is_bare_molecule, is_molecule, read_bare_molecule, read_molecule
 from symrefine.load.packed import archive
 from symrefine.load.text import (
@@ -26,6 +27,8 @@ from symrefine.load.text import (
 )
 
 _FIELDS = ("points", "normals", "weights", "faces")
+# What `complete` writes beside the points, of no matter unless it is asked for, as the property of a .ply.
+_MARK = "inferred"
 _COLOURS = (("red", "green", "blue"), ("r", "g", "b"))
 # First columns that number the rows; pandas writes the last where it has read the first.
 _INDEX = re.compile(r"|index|id|unnamed: 0")
@@ -33,14 +36,15 @@ _INDEX = re.compile(r"|index|id|unnamed: 0")
 _UNIT = 1e-2
 
 
-def read_xyz(data: bytes, frame: int | None = None) -> Content:
+def read_xyz(data: bytes) -> Frames[Content]:
     """Points of 3-space, with unit normals or without, where `#` begins a remark; or the atoms of chemical .xyz."""
     lines = numbered_lines(data, comment="#")
     if is_molecule(lines):
-        return read_molecule(data, frame)
-    chosen(frame, 1, "clouds")
-    if is_bare_molecule(lines):
-        return read_bare_molecule(lines)
+        return read_molecule(data)
+    return one(read_bare_molecule(lines) if is_bare_molecule(lines) else _cloud(lines), "clouds")
+
+
+def _cloud(lines: list[Line]) -> Content:
     table = parse_table(lines, columns=(3, 6), layout="3 columns (x y z) or 6 (x y z and a unit normal)")
     normals = table[:, 3:] if table.shape[1] == 6 else None
     if normals is not None and (bad := np.flatnonzero(~_is_unit(normals))).size:
@@ -149,6 +153,7 @@ def read_npz(data: bytes, named: Collection[str] = ()) -> Content:
     """
     arrays = _read_archive(data)
     fields = {name: arrays.pop(name) for name in named if name in arrays and name not in _FIELDS}
+    arrays.pop(_MARK, None)
     unknown = sorted(set(arrays) - set(_FIELDS))
     if unknown or "points" not in arrays:
         raise InputError(

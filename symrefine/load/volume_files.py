@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from symrefine.errors import InputError
-from symrefine.load.content import Content, Wanted, chosen
+from symrefine.load.content import Content, Wanted
 from symrefine.load.extras import library
+from symrefine.load.frames import Frames, one
 from symrefine.load.packed import unpacked
 from symrefine.load.text import count, shorten
 from symrefine.load.volume import Volume, check_size, volume_content
@@ -34,12 +35,12 @@ _TYPES = {
 _NIFTI_UNITS = {"meter": "m", "mm": "mm", "micron": "um"}
 
 
-def read_nifti(data: bytes, wanted: Wanted) -> Content:
-    """A volume of a NIfTI file, by its affine map, in millimetres as a rule; of a series one is chosen.
+def read_nifti(data: bytes, wanted: Wanted) -> Frames[Content]:
+    """The volumes of a NIfTI file, by its affine map, in millimetres as a rule.
 
     Raises:
-        InputError: damaged, colours or complex numbers, several volumes of which none was chosen, and as
-            `volume_content`; nibabel is not installed.
+        InputError: damaged, colours or complex numbers, nibabel is not installed; of a volume, when it is asked for: as
+            `volume_content`.
     """
     nibabel = library("nibabel", "volumes")
     kind = nibabel.Nifti2Image if 540 in _heads(data) else nibabel.Nifti1Image
@@ -58,14 +59,17 @@ def read_nifti(data: bytes, wanted: Wanted) -> Content:
     _check_length(shape, dtype, len(data) - start)
     check_size(shape[:3])
     series = [(0,) * (len(shape) - 3)] if len(shape) == 3 else list(np.ndindex(*shape[3:]))
-    number = chosen(wanted.frame, len(series), "volumes")
-    try:
-        with np.errstate(all="ignore"):
-            values = np.asarray(image.dataobj[(..., *series[number])], dtype=np.float32)
-    except Exception as error:  # noqa: BLE001 (as above)
-        raise InputError(f"not a whole NIfTI file: {shorten(str(error), 80)}") from None
-    content = volume_content(Volume(values=values, axes=affine[:3, :3], origin=affine[:3, 3]), wanted)
-    return replace(content, unit=unit)
+
+    def made(k: int) -> Content:
+        try:
+            with np.errstate(all="ignore"):
+                values = np.asarray(image.dataobj[(..., *series[k])], dtype=np.float32)
+        except Exception as error:  # noqa: BLE001 (as above)
+            raise InputError(f"not a whole NIfTI file: {shorten(str(error), 80)}") from None
+        content = volume_content(Volume(values=values, axes=affine[:3, :3], origin=affine[:3, 3]), wanted)
+        return replace(content, unit=unit)
+
+    return Frames("volumes", len(series), made)
 
 
 def _heads(data: bytes) -> tuple[int, int]:
@@ -81,15 +85,15 @@ def _check_length(shape: tuple[int, ...], dtype: "np.dtype[Any]", there: int) ->
         )
 
 
-def read_mrc(data: bytes, wanted: Wanted) -> Content:
-    """A density map, in the unit of its cell (Angstrom); of a stack of volumes one is chosen.
+def read_mrc(data: bytes, wanted: Wanted) -> Frames[Content]:
+    """Density maps, in the unit of their cell (Angstrom).
 
     The place of the grid is the origin in the header, or its first voxel where that is 0. A cell without lengths, as
     of maps in voxels, counts as one of the unit for each voxel.
 
     Raises:
-        InputError: damaged, pictures instead of volumes, complex numbers, cells without right angles, several volumes
-            of which none was chosen, and as `volume_content`; mrcfile is not installed.
+        InputError: damaged, pictures instead of volumes, complex numbers, mrcfile is not installed; of a volume, when
+            it is asked for: a cell without right angles, and as `volume_content`.
     """
     interpreter = library("mrcfile.mrcinterpreter", "volumes")
     sizes = [
@@ -116,7 +120,7 @@ def read_mrc(data: bytes, wanted: Wanted) -> Content:
             f"holds {count(1 if values.ndim == 2 else len(values), 'picture')}, no volume (mode of its grid)"
         )
     parts = values if stack[1] else values[None]
-    return volume_content(_map(parts[chosen(wanted.frame, len(parts), "volumes")], header), wanted)
+    return Frames("volumes", len(parts), lambda k: volume_content(_map(parts[k], header), wanted))
 
 
 def _map(values: Any, header: Any) -> Volume:
@@ -139,7 +143,7 @@ def _map(values: Any, header: Any) -> Volume:
     return Volume(values=turned, axes=np.diag(steps), origin=origin if origin.any() else starts * steps)
 
 
-def read_nrrd(data: bytes, wanted: Wanted) -> Content:
+def read_nrrd(data: bytes, wanted: Wanted) -> Frames[Content]:
     """A volume of a NRRD file, by its directions and origin, or its spacings.
 
     Raises:
@@ -147,7 +151,6 @@ def read_nrrd(data: bytes, wanted: Wanted) -> Content:
             not installed.
     """
     nrrd = library("nrrd", "volumes")
-    chosen(wanted.frame, 1, "volumes")
     stream = io.BytesIO(data)
     try:
         with warnings.catch_warnings():
@@ -165,7 +168,7 @@ def read_nrrd(data: bytes, wanted: Wanted) -> Content:
     _check_length(shape, dtype, len(body))
     values = np.frombuffer(body, dtype).reshape(shape, order="F").astype(np.float32)
     axes, origin = _nrrd_frame(header)
-    return volume_content(Volume(values=values, axes=axes, origin=origin), wanted)
+    return one(volume_content(Volume(values=values, axes=axes, origin=origin), wanted), "volumes")
 
 
 def _nrrd_type(header: Mapping[str, Any]) -> "np.dtype[Any]":

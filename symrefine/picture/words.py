@@ -66,15 +66,21 @@ def planar_headline(detection: PlanarDetection) -> str:
     """The same of an object in the plane."""
     if detection.undetermined:
         return f"Undetermined: {detection.undetermined}"
-    return f"{detection.point_group}: {planar_meaning(detection)}"
+    return f"{detection.point_group}: {detected_lines(detection)}"
 
 
-def planar_meaning(detection: PlanarDetection) -> str:
-    """What the lines and turns of an object in the plane come to."""
-    if detection.point_group in ("C1", "O(2)", "SO(2)"):
-        return {"C1": "no symmetry", "O(2)": "round"}.get(detection.point_group, "all turns, no mirror line")
-    lines = count(len(detection.lines), "mirror line") if detection.lines else "no mirror line"
-    return lines + ("" if detection.rotation is None else f", {turns_name(detection.rotation.order)}")
+def detected_lines(detection: PlanarDetection) -> str:
+    """What the lines and turns that were found in the plane come to."""
+    turns = detection.rotation
+    return planar_meaning(detection.point_group, len(detection.lines), None if turns is None else turns.order)
+
+
+def planar_meaning(group: str, lines: int, turns: float | None) -> str:
+    """What a group of the plane comes to: so many mirror lines, and turns of some order, if there are any."""
+    if group in ("C1", "O(2)", "SO(2)"):
+        return {"C1": "no symmetry", "O(2)": "round"}.get(group, "all turns, no mirror line")
+    mirrors = count(lines, "mirror line") if lines else "no mirror line"
+    return mirrors + ("" if turns is None else f", {turns_name(turns)}")
 
 
 def turns_name(order: float) -> str:
@@ -173,7 +179,9 @@ def kind_name(kind: str, order: float = 0.0) -> str:
 
 def percent(fraction: float) -> str:
     """A fraction to two significant digits, in percent."""
-    return f"{100.0 * fraction:.2g} %" if fraction >= 1e-4 or fraction == 0 else "less than 0.01 %"
+    if 0.0 < fraction < 1e-4:
+        return "less than 0.01 %"
+    return f"{100.0 * fraction:.{2 if fraction < 0.995 else 3}g} %"
 
 
 def count(number: int, noun: str, plural: str = "") -> str:

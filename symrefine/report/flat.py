@@ -15,12 +15,12 @@ from symrefine.picture.words import (
     DOUBLETS,
     coordinates,
     count,
+    detected_lines,
     direction,
     length,
     order_name,
     percent,
     planar_headline,
-    planar_meaning,
     turns_name,
 )
 from symrefine.plane.detection import PlanarDetection
@@ -70,7 +70,7 @@ def _head(d: PlanarDetection, shape: Shape) -> str:
             f"Under {each}, 95 % of the outline meets itself within {percent(max(*misses, 1e-4))} of the diagonal, "
             f"where the tolerance of {percent(d.tolerance)} allows {percent(LIMITS[1] * d.tolerance)}."
         )
-    return head(shape.source, d.point_group, planar_meaning(d), summary)
+    return head(shape.source, d.point_group, detected_lines(d), summary)
 
 
 def _drawing(d: PlanarDetection, scene: FlatScene) -> str:

@@ -89,7 +89,7 @@ def listing(groups: Sequence[Group], heads: Heads, nothing: str) -> str:
     told = (
         f"Each element takes the {heads.body} to an image of itself; the figures say by how much that misses it, in % "
         "of the diagonal: on average, for the best 95 % and 99 %, and at worst. The bar shows the 95 % against what is "
-        "allowed, the dark mark."
+        "allowed, the mark on it."
     )
     parts = "".join(_group(group, heads) for group in groups)
     title = "What came close" if all(group.missed for group in groups) else "What was found"

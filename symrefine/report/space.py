@@ -38,7 +38,7 @@ from symrefine.surface.misses import LIMITS
 
 # Values of options that are as if they were not given, and options that `symrefine.detect` has too.
 _UNSAID = {"seed": 0, "outliers": "auto"}
-_IN_PYTHON = ("tolerance", "seed", "outliers")
+_IN_PYTHON = ("tolerance", "units", "seed", "outliers")
 
 
 def page(detection: Detection, shape: Shape) -> Page:

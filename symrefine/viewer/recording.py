@@ -70,7 +70,11 @@ def _stream(detection: Detection, shape: Shape) -> Any:
     """A recording that is named by its content, with no times of its own."""
     # The viewer keeps one layout for each application, so each object is one; rerun allows few characters there.
     application = "symrefine-" + re.sub(r"[^A-Za-z0-9]+", "-", Path(shape.source).stem)[:60].strip("-")
-    stream = rr.RecordingStream(application, recording_id=_identity(detection, shape), send_properties=False)
+    # Left to itself rerun parts the content where some time has passed, elsewhere in each run.
+    at_the_end = rr.ChunkBatcherConfig.NEVER()
+    stream = rr.RecordingStream(
+        application, recording_id=_identity(detection, shape), send_properties=False, batcher_config=at_the_end
+    )
     stream.set_log_time_enabled(False)
     stream.set_log_tick_enabled(False)
     return stream

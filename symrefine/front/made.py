@@ -1,0 +1,161 @@
+"""What can be made of any object with its symmetry: `symmetrize`, `complete`, `export`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import ArrayLike
+
+from symrefine.clock import Clock
+from symrefine.errors import InputError
+from symrefine.front.asked import in_space, seed_of, told
+from symrefine.front.verbs import detect_in_space
+from symrefine.lengths import relative_tolerance
+from symrefine.load.objects import shape_of
+from symrefine.surface.misses import TOLERANCE
+
+# Each verb imports what it needs when it is used.
+if TYPE_CHECKING:
+    from symrefine.detection.measure import Outliers
+    from symrefine.export.packages import Format, Package
+    from symrefine.front.completed import Completion
+    from symrefine.front.exact import Symmetrized
+    from symrefine.front.space import Detection
+
+
+def symmetrize(
+    shape: Any,
+    found: "Detection | None" = None,
+    *,
+    group: str | None = None,
+    tolerance: float | str = TOLERANCE,
+    units: str | None = None,
+    seed: int = 0,
+) -> "Symmetrized":
+    """The nearest exactly symmetric mesh or cloud.
+
+    Args:
+        shape: whatever `detect` takes, in 3-space.
+        found: what `detect` found in it; detected if None.
+        group: the subgroup of it that is to be made exact, such as "Cs"; the whole group if None.
+        tolerance: by how much the shape may miss the symmetry, as of `detect`.
+        units: as of `detect`.
+        seed: of the random samples of a surface.
+
+    Raises:
+        InputError: nothing is decided, no symmetry, or no such subgroup.
+        DegenerateShapeError: a few points, of which some have no counterpart.
+    """
+    from symrefine.front.exact import Symmetrized
+    from symrefine.symmetrize import placed_subgroup, symmetrize
+
+    shape = shape_of(shape)
+    found = detect_in_space(shape, tolerance=tolerance, units=units, seed=seed) if found is None else in_space(found)
+    if found.undetermined:
+        raise InputError(f"{shape.source}: no symmetry to make exact: {found.undetermined}")
+    if found.point_group == "C1":
+        raise InputError(f"{shape.source}: is C1, nothing to make symmetric{_nearest_miss(found)}")
+    chosen = found.group if group is None else placed_subgroup(found.group, group)
+    used, clock, seed = relative_tolerance(tolerance, shape, units=units), Clock(), seed_of(seed)
+    with clock("symmetrize"):
+        made = symmetrize(shape, chosen, found.center, tolerance=used, seed=seed)
+    return Symmetrized.of(
+        made,
+        source=shape,
+        detection=found,
+        options=told(tolerance, units) | {"seed": seed, "group": group},
+        timings={**found.timings, **clock.seconds},
+    )
+
+
+def complete(
+    shape: Any,
+    found: "Detection | None" = None,
+    *,
+    viewpoint: ArrayLike | None = None,
+    outliers: "Outliers" = "auto",
+    tolerance: float | str = TOLERANCE,
+    units: str | None = None,
+    seed: int = 0,
+) -> "Completion":
+    """The points of a scan and their images where nobody looked, under the group that is found in it.
+
+    Args:
+        shape: a cloud in 3-space, in any form that `detect` takes.
+        found: what `detect` found in it; the options that follow are those of `detect` where this is None.
+        viewpoint: as of `detect`.
+        outliers: as of `detect`.
+        tolerance: as of `detect`.
+        units: as of `detect`.
+        seed: as of `detect`.
+
+    Raises:
+        InputError: a mesh or atoms, an object without a symmetry, or none that can be decided.
+    """
+    from symrefine.complete import check_scan, complete
+    from symrefine.front.completed import Completion
+    from symrefine.front.verbs import detect
+
+    shape, clock = shape_of(shape, viewpoint=viewpoint), Clock()
+    check_scan(shape)
+    asked: dict[str, Any] = {"tolerance": tolerance, "units": units, "seed": seed, "outliers": outliers}
+    found = in_space(detect(shape, **asked) if found is None else found)
+    with clock("complete"):
+        made = complete(shape, found)
+    options = told(tolerance, units) | {"seed": seed_of(seed), "outliers": outliers}
+    return Completion.of(made, source=shape, options=options, timings={**found.timings, **clock.seconds})
+
+
+def export(
+    shape: Any,
+    to: "Format",
+    out: str | Path,
+    *,
+    found: "Detection | None" = None,
+    number: int = 1,
+    scale: float = 1.0,
+    improper: bool = False,
+    steps: int | None = None,
+    transform: str | Path | None = None,
+) -> "Package":
+    """Write the symmetries as another program reads them: all files or none.
+
+    Args:
+        shape: whatever `detect` takes, in 3-space.
+        to: "bop": an entry in `models_info.json`; "npz": matrices [N, 4, 4]; "canonical": the model with its axis on z;
+            or a folder for "foundationpose", "megapose", "dope", "isaac".
+        out: the file, or the folder.
+        found: what `detect` found in it; detected if None.
+        number: of the object in `models_info.json`.
+        scale: millimetres in one unit of the object.
+        improper: npz: whether mirrors and the like belong to the matrices.
+        steps: npz: turns that stand for a continuous axis; 72 if None.
+        transform: canonical: where the transform goes, .json or .npz; `OUT_transform.json` if None.
+
+    Returns:
+        What was written, and notes on what the format cannot express.
+
+    Raises:
+        InputError: another format, nothing decided, or files that cannot be written.
+    """
+    from symrefine.export.operations import STEPS
+    from symrefine.export.packages import package_of, write_package
+
+    shape, out = shape_of(shape), Path(out)
+    found = detect_in_space(shape) if found is None else in_space(found)
+    place = None if transform is None else Path(transform)
+    turns = STEPS if steps is None else steps
+    package = package_of(
+        to, out, found, shape, number=number, scale=scale, improper=improper, steps=turns, transform=place
+    )
+    write_package(package, to, out)
+    return package
+
+
+def _nearest_miss(found: "Detection") -> str:
+    if not found.near_misses:
+        return ""
+    miss = found.near_misses[0]
+    return (
+        f"; the nearest, a {miss.kind}, misses by {miss.residual.p95:.1%} of the diagonal at the 95th percentile: "
+        "choose a larger tolerance if that counts as symmetric"
+    )
