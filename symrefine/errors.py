@@ -5,7 +5,11 @@ from contextlib import contextmanager
 
 
 class SymrefineError(Exception):
-    """Base of every error the package raises on purpose; its text is one clear line."""
+    """Base of every error the package raises on purpose; its text is one clear line that steers no terminal."""
+
+    def __str__(self) -> str:
+        """The text; names of files and what stands in them may hold anything, and a traceback shows it as it is."""
+        return printable(" ".join(super().__str__().splitlines()))
 
 
 class InputError(SymrefineError, ValueError):

@@ -496,7 +496,7 @@ BAD_TEXT = [
     ("a.pcd", pcd("ascii", TETRA).replace(b"DATA ascii", b"DATA text"), "line 11: DATA 'text'; expected one of ascii"),
     ("a.pcd", pcd("binary", TETRA)[:-1], "the header gives 4 points of 24 bytes, 96 in all; 95 follow it"),
     ("a.npy", b"garbage", "not a whole .npy array of numbers"),
-    ("a.npy", npy(TETRA)[:-1], "not a whole .npy array of numbers"),
+    ("a.npy", npy(TETRA)[:-1], "the header gives shape (4, 3) of float64, 96 bytes; 95 follow: cut off or damaged"),
     ("a.npy", npy(TETRA) + b"x", "1 byte behind the array of shape (4, 3)"),
     ("a.npy", npy(np.arange(3.0)), "shape (3,); expected one row [N, n] for each point"),
     ("a.npy", npy(np.zeros((2, 3, 3))), "shape (2, 3, 3); expected one row"),

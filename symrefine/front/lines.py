@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from symrefine.errors import printable
 from symrefine.picture.words import order_name, percent, symbol
 from symrefine.shape import Shape
 
@@ -25,7 +26,10 @@ def summary(record: Record) -> list[str]:
         "near misses": _near(record),
         "asked": _asked(record),
     }
-    return [f"{record['source']}: {answer(record)}", *(f"  {name:<{LABEL}}{text}" for name, text in told.items())]
+    return [
+        f"{printable(record['source'])}: {answer(record)}",
+        *(f"  {name:<{LABEL}}{text}" for name, text in told.items()),
+    ]
 
 
 def answer(record: Record) -> str:
@@ -93,7 +97,7 @@ def alignment_summary(found: "Alignment", source: Shape, target: Shape) -> list[
     rows = zip(found.matrix.tolist(), found.translation.tolist(), strict=True)
     kind = "rotation" if found.determinant > 0 else "reflection or rotoreflection"
     return [
-        f"{source.source} onto {target.source}: {found.status}",
+        f"{printable(source.source)} onto {printable(target.source)}: {found.status}",
         *(f"  {' '.join(f'{x + 0.0:11.8f}' for x in row)}  |  {shift:.8g}" for row, shift in rows),
         f"  determinant {found.determinant:+d} ({kind}), confidence {found.confidence:.3f}",
         f"  rms {percent(found.rms)} of the diagonal, scale {found.scale:.6g}; {sum(found.timings.values()):.2g} s",

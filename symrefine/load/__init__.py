@@ -33,7 +33,7 @@ from symrefine.load.mesh import mesh_arrays
 from symrefine.load.molfile import read_molfile
 from symrefine.load.obj import read_obj
 from symrefine.load.off import read_off
-from symrefine.load.packed import GZIP, stem_of, suffix_of, unpacked
+from symrefine.load.packed import GZIP, LARGEST, stem_of, suffix_of, unpacked
 from symrefine.load.pcd import read_pcd
 from symrefine.load.pdb import read_pdb
 from symrefine.load.ply import read_ply
@@ -193,8 +193,10 @@ def _content(file: Path, wanted: Wanted) -> Content:
             f"unknown suffix {suffix!r}; known are {' '.join(READERS)}, and images {images}, and {GZIP} of each"
         )
     _check_options(_FORMATS[suffix], wanted)
-    data = file_bytes(file)
-    return _FORMATS[suffix].read(unpacked(data) if file.suffix.lower() == GZIP else data, file, wanted)
+    data, kind = file_bytes(file), _FORMATS[suffix]
+    if file.suffix.lower() == GZIP:
+        data = unpacked(data, LARGEST if "grey" in kind.takes else None)
+    return kind.read(data, file, wanted)
 
 
 def _check_options(kind: _Format, wanted: Wanted) -> None:

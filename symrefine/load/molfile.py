@@ -25,7 +25,7 @@ def read_molfile(data: bytes, frame: int | None = None) -> Content:
         InputError: cut off, other numbers of atoms or bonds than declared, columns without numbers, no elements; a
             drawing in two dimensions; several records of which none was chosen.
     """
-    records = _records(all_lines(data))
+    records = _records(list(all_lines(data)))
     lines = records[chosen(frame, len(records), "molecules")]
     if len(lines) < _HEADER:
         raise InputError(f"cut off after line {lines[-1][0]}; expected three lines of a header and one of counts")

@@ -31,7 +31,7 @@ def read_pdb(data: bytes, frame: int | None = None, named: Collection[str] = ())
         InputError: columns without numbers or elements, models that do not end, atoms with alternative places;
             several models of which none was chosen.
     """
-    models = _models(all_lines(data))
+    models = _models(list(all_lines(data)))
     lines = models[chosen(frame, len(models), "models")]
     places = [[_number(line, name) for name in _COORDINATES] for line in lines]
     elements = [_element(line) for line in lines]

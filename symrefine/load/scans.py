@@ -13,7 +13,7 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.content import Content, Values
 from symrefine.load.extras import library
-from symrefine.load.packed import LARGEST, on_disk
+from symrefine.load.packed import allowance, on_disk
 from symrefine.load.text import count, shorten
 from symrefine.shape import CAMERAS
 
@@ -52,8 +52,11 @@ def read_las(data: bytes) -> Content:
 def _check_size(header: Any, size: int) -> None:
     """Refuse counts that the file has no room for, or too much: laspy reads what there is."""
     points, each = int(header.point_count), int(header.point_format.size)
-    if points * each > LARGEST:
-        raise InputError(f"the header declares {count(points, 'point')} of {each} bytes; at most {LARGEST:,} bytes")
+    if points * (each + 24) > allowance(size):
+        raise InputError(
+            f"the header declares {count(points, 'point')}, {points * (each + 24):,} bytes once they are read; at most "
+            f"{allowance(size):,} of a file of {size:,}"
+        )
     if header.are_points_compressed:
         return
     behind = [
@@ -114,8 +117,8 @@ def _e57_scans(pye57: Any, file: Path) -> list[tuple[dict[str, Values], Array | 
     try:
         headers = [opened.get_header(k) for k in range(opened.scan_count)]
         points = sum(header.point_count for header in headers)
-        if points * 6 * 8 > LARGEST:
-            raise InputError(f"holds {count(points, 'point')}; at most {LARGEST // 48:,}")
+        if points * 6 * 8 > (most := allowance(file.stat().st_size)):
+            raise InputError(f"holds {count(points, 'point')}; at most {most // 48:,} of a file of its size")
         scans: list[tuple[dict[str, Values], Array | None]] = []
         for k, header in enumerate(headers):
             names = set(header.point_fields)
