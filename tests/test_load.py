@@ -491,7 +491,7 @@ BAD_TEXT = [
     ("a.pcd", pcd("ascii", TETRA)[:-12], "line 15 has 2 columns; expected one line for each point: x y z"),
     ("a.pcd", pcd("ascii", TETRA) + b"1 2 3\n", "the header gives POINTS 4, 5 lines of points follow it"),
     ("a.pcd", pcd("ascii", TETRA).replace(b"WIDTH 4", b"WIDTH 5"), "POINTS 4, but WIDTH 5 times HEIGHT 1"),
-    ("a.pcd", pcd("ascii", TETRA).replace(b"x y z", b"x y u"), "FIELDS are x y u; expected one x, one y and one z"),
+    ("a.pcd", pcd("ascii", TETRA).replace(b"x y z", b"x y u"), "FIELDS are 'x y u'; expected one x, one y, one z"),
     ("a.pcd", pcd("ascii", TETRA).replace(b"SIZE 8", b"SIZE 9"), "TYPE and SIZE give F9 F8 F8; expected of F4 F8"),
     ("a.pcd", pcd("ascii", TETRA).replace(b"DATA ascii", b"DATA text"), "line 11: DATA 'text'; expected one of ascii"),
     ("a.pcd", pcd("binary", TETRA)[:-1], "the header gives 4 points of 24 bytes, 96 in all; 95 follow it"),

@@ -98,7 +98,7 @@ def _interpret(entries: dict[str, list[str]], size: int, lines: int) -> _Header:
     if not set(types) <= _TYPES:
         raise InputError(f"TYPE and SIZE give {' '.join(types)}; expected of {' '.join(sorted(_TYPES))}")
     if any(names.count(name) != 1 or counts[names.index(name)] != "1" for name in _COORDINATES):
-        raise InputError(f"FIELDS are {' '.join(names)}; expected one x, one y and one z, each of COUNT 1")
+        raise InputError(f"FIELDS are {shorten(' '.join(names), 99)}; expected one x, one y, one z, each of COUNT 1")
     encoding = " ".join(entries["DATA"])
     if encoding not in _ENCODINGS:
         raise InputError(f"line {lines}: DATA {shorten(encoding)}; expected one of {', '.join(_ENCODINGS)}")

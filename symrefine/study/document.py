@@ -53,8 +53,8 @@ def read_document(path: Path) -> Node:
     """
     if not path.is_file():
         raise InputError(f"{path}: no such config file")
-    if path.stat().st_size > _LARGEST:
-        raise InputError(f"{path}: has {path.stat().st_size:,} bytes; a config has at most {_LARGEST:,}")
+    if (size := path.stat().st_size) > _LARGEST:
+        raise InputError(f"{path}: has {size:,} bytes; a config has at most {_LARGEST:,}")
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
@@ -146,6 +146,8 @@ def override(root: Node, settings: Sequence[str]) -> Node:
         name, equals, text = setting.partition("=")
         keys = name.strip().split(".")
         source = f"--set {setting}"
+        if len(keys) > _DEEPEST or len(setting) > _LARGEST:
+            raise InputError(f"--set {setting[:60]}...: {len(keys)} keys deep, {len(setting)} characters: too many")
         if not equals or not all(re.fullmatch(r"\w[\w -]*", key) for key in keys):
             raise InputError(f"{source}: expected KEY=VALUE, such as sweep.seed=[0,1] or fixed.points=5000")
         root = put(root, keys, _parse(text, source, lines=False), source)
