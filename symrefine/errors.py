@@ -3,9 +3,17 @@
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
+# Characters of a message that somebody reads; a damaged file can put megabytes between quotes.
+LONGEST = 1200
+
 
 class SymrefineError(Exception):
-    """Base of every error the package raises on purpose; its text is one clear line."""
+    """Base of every error the package raises on purpose; its text is one clear line that steers no terminal."""
+
+    def __str__(self) -> str:
+        """The text; names of files and what stands in them may hold anything, and a traceback shows it as it is."""
+        text = printable(" ".join(super().__str__().splitlines()))
+        return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
 
 
 class InputError(SymrefineError, ValueError):

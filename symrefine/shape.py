@@ -137,8 +137,13 @@ def _weights(values: ArrayLike, count: int, source: str) -> Array:
     array = _numbers(values, "weights", source)
     if array.shape != (count,):
         raise InputError(f"{source}: weights have shape {array.shape}; expected ({count},), one for each point")
-    if not np.isfinite(array).all() or (array < 0).any() or array.sum() == 0:
+    if not np.isfinite(array).all() or (array < 0).any() or not array.any():
         raise InputError(f"{source}: weights must be finite, non-negative and not all zero")
+    if array.max() > np.finfo(np.float64).max / count:
+        raise InputError(
+            f"{source}: weights of up to {array.max():.3g} may add up to more than {np.finfo(np.float64).max:.3g}; "
+            "divide all of them by the largest"
+        )
     return read_only(array)
 
 

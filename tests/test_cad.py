@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from experiments.objects.cylinder_step import STEP
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.load import load, step
@@ -148,69 +149,6 @@ def test_damage_never_shows_as_a_foreign_error(tmp_path: Path) -> None:
 
 
 # STEP: a cylinder of radius 20 and height 50, in millimetres.
-
-STEP = """\
-ISO-10303-21;
-HEADER;
-FILE_DESCRIPTION((''),'2;1');
-FILE_NAME('cyl','2026-01-01T00:00:00',(''),(''),'','','');
-FILE_SCHEMA(('AUTOMOTIVE_DESIGN { 1 0 10303 214 1 1 1 1 }'));
-ENDSEC;
-DATA;
-#1=APPLICATION_CONTEXT('automotive design');
-#2=PRODUCT_CONTEXT('',#1,'mechanical');
-#3=PRODUCT('c','c','',(#2));
-#4=PRODUCT_DEFINITION_FORMATION('','',#3);
-#5=PRODUCT_DEFINITION_CONTEXT('part definition',#1,'design');
-#6=PRODUCT_DEFINITION('','',#4,#5);
-#7=PRODUCT_DEFINITION_SHAPE('','',#6);
-#8=SHAPE_DEFINITION_REPRESENTATION(#7,#20);
-#10=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));
-#11=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));
-#12=(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT());
-#13=UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-05),#10,'','');
-#14=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#13))GLOBAL_UNIT_ASSIGNED_CONTEXT((#10,#11,#12))REPRESENTATION_CONTEXT('',''));
-#20=ADVANCED_BREP_SHAPE_REPRESENTATION('',(#21,#90),#14);
-#21=AXIS2_PLACEMENT_3D('',#22,#23,#24);
-#22=CARTESIAN_POINT('',(0.,0.,0.));
-#23=DIRECTION('',(0.,0.,1.));
-#24=DIRECTION('',(1.,0.,0.));
-#25=CARTESIAN_POINT('',(0.,0.,50.));
-#26=AXIS2_PLACEMENT_3D('',#25,#23,#24);
-#30=CARTESIAN_POINT('',(20.,0.,0.));
-#31=CARTESIAN_POINT('',(20.,0.,50.));
-#32=VERTEX_POINT('',#30);
-#33=VERTEX_POINT('',#31);
-#34=CIRCLE('',#21,20.);
-#35=CIRCLE('',#26,20.);
-#36=EDGE_CURVE('',#32,#32,#34,.T.);
-#37=EDGE_CURVE('',#33,#33,#35,.T.);
-#38=VECTOR('',#23,1.);
-#39=LINE('',#30,#38);
-#40=EDGE_CURVE('',#32,#33,#39,.T.);
-#50=CYLINDRICAL_SURFACE('',#21,20.);
-#51=ORIENTED_EDGE('',*,*,#36,.T.);
-#52=ORIENTED_EDGE('',*,*,#40,.T.);
-#53=ORIENTED_EDGE('',*,*,#37,.F.);
-#54=ORIENTED_EDGE('',*,*,#40,.F.);
-#55=EDGE_LOOP('',(#51,#52,#53,#54));
-#56=FACE_OUTER_BOUND('',#55,.T.);
-#57=ADVANCED_FACE('',(#56),#50,.T.);
-#60=PLANE('',#21);
-#61=ORIENTED_EDGE('',*,*,#36,.F.);
-#62=EDGE_LOOP('',(#61));
-#63=FACE_OUTER_BOUND('',#62,.T.);
-#64=ADVANCED_FACE('',(#63),#60,.F.);
-#70=PLANE('',#26);
-#71=ORIENTED_EDGE('',*,*,#37,.T.);
-#72=EDGE_LOOP('',(#71));
-#73=FACE_OUTER_BOUND('',#72,.T.);
-#74=ADVANCED_FACE('',(#73),#70,.T.);
-#80=CLOSED_SHELL('',(#57,#64,#74));
-#90=MANIFOLD_SOLID_BREP('',#80);
-ENDSEC;
-END-ISO-10303-21;
-"""
 
 
 @pytest.fixture

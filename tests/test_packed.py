@@ -95,11 +95,13 @@ def test_what_is_wrong_is_said(tmp_path: Path, data: bytes, message: str) -> Non
 
 
 def test_bombs_are_given_up_early(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(packed, "LARGEST", 10**6)
+    monkeypatch.setattr(packed, "ROOM", 10**6)
     bomb = gzip.compress(bytes(3 * 10**6))
     assert len(bomb) < 10**4
-    assert "unpacks to more than 1,000,000 bytes" in refusal(tmp_path / "a.ply.gz", bomb)
-    assert "unpacks to 3,000," in refusal(tmp_path / "a.npz", npz(points=np.zeros((125000, 3))))
+    assert "bytes unpack to more than 1,000,000 bytes" in refusal(tmp_path / "a.ply.gz", bomb)
+    assert "bytes unpack to more than 500,000 lines" in refusal(tmp_path / "a.xyz.gz", gzip.compress(b"\n" * 600000))
+    assert "bytes unpack to 3,000," in refusal(tmp_path / "a.npz", npz(points=np.zeros((125000, 3))))
+    assert "as double, where 1,000,000 are" in refusal(tmp_path / "a.npz", npz(points=np.zeros((125000, 3), np.uint8)))
     # An archive that hides its size: more follows than it says.
     honest = npz(points=np.zeros((125000, 3)))
     sizes = [m.file_size for m in zipfile.ZipFile(io.BytesIO(honest)).infolist()]

@@ -73,7 +73,7 @@ def test_las(tmp_path: Path, name: str, version: str, fmt: int) -> None:
 @pytest.mark.parametrize("name", ["a.las", "a.laz"])
 def test_las_is_refused_wherever_it_is_cut(tmp_path: Path, name: str) -> None:
     data = las(name == "a.laz")
-    for size in range(1, len(data), 7 if name == "a.las" else 1):
+    for size in range(1, len(data), 7 if name == "a.las" else len(data) // 12):  # a process for each of the latter
         refusal(tmp_path, data[:size], name)
 
 
@@ -87,14 +87,15 @@ def test_las_whose_header_lies(tmp_path: Path) -> None:
     for packed in (False, True):
         data = las(packed)
         changed = data[:107] + (2**31).to_bytes(4, "little") + data[111:]
-        assert "at most 1,073,741,824 bytes" in refusal(tmp_path, changed, "a.laz")
+        told = "bytes once they are read; at most 8,388,608 of a file of" if packed else "2720 are there"
+        assert told in refusal(tmp_path, changed, "a.laz")
 
 
 @pytest.mark.parametrize("name", ["a.las", "a.laz"])
 def test_damaged_las_never_shows_as_a_foreign_error(tmp_path: Path, name: str) -> None:
     data = las(name == "a.laz")
     rng = np.random.default_rng(1)
-    for _ in range(300):
+    for _ in range(300 if name == "a.las" else 15):
         broken = bytearray(data)
         broken[rng.integers(len(data))] = rng.integers(256)
         with suppress(InputError):

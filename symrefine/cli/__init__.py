@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Sequence
 from typing import NoReturn
 
+from symrefine.cli.streams import aside, discard, fill_closed
 from symrefine.errors import SymrefineError, one_line
 
 BAD_INPUT, BUG, INTERRUPTED, BROKEN_PIPE = 2, 70, 130, 141
@@ -15,6 +16,7 @@ BAD_INPUT, BUG, INTERRUPTED, BROKEN_PIPE = 2, 70, 130, 141
 
 def main(argv: Sequence[str] | None = None) -> NoReturn:
     """The command `symrefine`: end the process with the status of `invoke`."""
+    fill_closed()
     if not sys.warnoptions and not _debugging():
         warnings.simplefilter("ignore")  # of numpy and others: nothing that who runs a command could act upon
     if isinstance(sys.stdout, io.TextIOWrapper):
@@ -33,10 +35,10 @@ def invoke(argv: Sequence[str]) -> int:
     except KeyboardInterrupt:
         return _refuse("interrupted", INTERRUPTED)
     except BrokenPipeError:
-        _discard_stdout()
+        discard(sys.stdout)
         return BROKEN_PIPE
     except OSError as error:
-        _discard_stdout()
+        discard(sys.stdout)
         return _refuse(": ".join(str(part) for part in (error.filename, error.strerror or error) if part), BAD_INPUT)
     except MemoryError:
         return _refuse("out of memory: use a smaller cloud or mesh", BAD_INPUT)
@@ -61,7 +63,7 @@ def _command(argv: Sequence[str]) -> int:
 
 
 def _refuse(message: str, status: int) -> int:
-    print("symrefine:", one_line(message), file=sys.stderr)
+    aside(f"symrefine: {one_line(message)}")
     return status
 
 
@@ -76,14 +78,3 @@ def _bug(error: Exception) -> int:
 
 def _debugging() -> bool:
     return os.environ.get("SYMREFINE_DEBUG", "0") not in ("", "0")
-
-
-def _discard_stdout() -> None:
-    """Send what is still to be flushed nowhere: nobody reads it, or it cannot be written."""
-    try:
-        target = sys.stdout.fileno()
-    except OSError:
-        return
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, target)
-    os.close(nowhere)

@@ -7,6 +7,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from symrefine.cli.streams import aside
 from symrefine.errors import InputError, one_line, printable
 from symrefine.files import Writer, check_target, json_text, text_writer
 from symrefine.files import write_all as write_all
@@ -121,12 +122,12 @@ def say_lines(lines: Iterable[str]) -> None:
 def note(text: str) -> None:
     """Tell something on stderr, where it is in nobody's way."""
     if not is_quiet():
-        print("symrefine: note:", one_line(text), file=sys.stderr)
+        aside(f"symrefine: note: {one_line(text)}")
 
 
 def complain(text: str) -> None:
     """Tell on stderr what went wrong, however quiet it is to be."""
-    print("symrefine:", one_line(text), file=sys.stderr)
+    aside(f"symrefine: {one_line(text)}")
 
 
 def console(*, stderr: bool = False) -> "Console":

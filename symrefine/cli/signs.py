@@ -7,6 +7,7 @@ from threading import Event, Thread
 from time import perf_counter
 
 from symrefine.cli.outputs import console, is_quiet, is_verbose
+from symrefine.cli.streams import aside
 from symrefine.clock import watched
 
 # Seconds between two lines where nobody looks on: a log of an hour stays readable, and nobody thinks that it hangs.
@@ -40,7 +41,7 @@ class Doing:
         self.stage = "" if seconds is not None else name
         self.changed()
         if seconds is not None and is_verbose():
-            print(f"symrefine: {name} {seconds:.2f} s", file=sys.stderr, flush=True)
+            aside(f"symrefine: {name} {seconds:.2f} s")
 
 
 @contextmanager
@@ -73,7 +74,7 @@ def _shown(doing: Doing) -> Iterator[None]:
     with _live(doing) if sys.stderr.isatty() else _every_ten_seconds(doing), watched(doing.watch):
         yield
     if is_verbose():
-        print(f"symrefine: {doing.text} {perf_counter() - doing.begun:.2f} s in all", file=sys.stderr, flush=True)
+        aside(f"symrefine: {doing.text} {perf_counter() - doing.begun:.2f} s in all")
 
 
 @contextmanager
@@ -95,11 +96,11 @@ def _live(doing: Doing) -> Iterator[None]:
 
 @contextmanager
 def _every_ten_seconds(doing: Doing) -> Iterator[None]:
-    stream, over = sys.stderr, Event()
+    over = Event()
 
     def tell() -> None:
         while not over.wait(EVERY):
-            print(f"symrefine: {doing}, {perf_counter() - doing.begun:.0f} s", file=stream, flush=True)
+            aside(f"symrefine: {doing}, {perf_counter() - doing.begun:.0f} s")
 
     teller = Thread(target=tell, daemon=True)
     teller.start()

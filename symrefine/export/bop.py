@@ -127,7 +127,7 @@ def read_models_info(path: Path) -> dict[str, Entry]:
     if not path.is_file():
         return {}
     try:
-        data = json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_constant)
+        data = json.loads(path.read_text(encoding="utf-8"), parse_constant=_number, parse_float=_number)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: is there already and is no models_info.json: {error}") from None
     if not isinstance(data, dict) or not all(isinstance(entry, dict) for entry in data.values()):
@@ -149,8 +149,12 @@ def diameter(points: Array) -> float:
     return best
 
 
-def _no_constant(name: str) -> float:
-    raise ValueError(f"{name} is not JSON")
+def _number(text: str) -> float:
+    """A number that can be written again; Python reads NaN, and takes 1e999 for infinity."""
+    value = float(text)
+    if not np.isfinite(value):
+        raise ValueError(f"{text[:40]} is no finite number")
+    return value
 
 
 def _snapped(group: PointGroup) -> PointGroup:

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from typing import Any
 
+from symrefine.errors import printable
 from symrefine.picture.words import order_name, percent, symbol
 
 Record = dict[str, Any]
@@ -26,7 +27,10 @@ def summary(record: Record) -> list[str]:
         return list(_aligned(record))
     told = _made(record) if "found" in record else _completed(record) if "inferred" in record else _detected(record)
     lines = {**told, "asked": _asked(record)}
-    return [f"{record['source']}: {answer(record)}", *(f"  {name:<{LABEL}}{text}" for name, text in lines.items())]
+    return [
+        f"{printable(record['source'])}: {answer(record)}",
+        *(f"  {name:<{LABEL}}{text}" for name, text in lines.items()),
+    ]
 
 
 def _detected(record: Record) -> dict[str, str]:
@@ -124,7 +128,7 @@ def _asked(record: Record) -> str:
 
 def _aligned(record: Record) -> Iterator[str]:
     """The status, the map, and how well it holds."""
-    yield f"{record['source']} onto {record['target']}: {record['status']}"
+    yield f"{printable(record['source'])} onto {printable(record['target'])}: {record['status']}"
     yield from map_rows(record)
     yield f"  {handedness(record)}, confidence {record['confidence']:.3f}"
     yield (

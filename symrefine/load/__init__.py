@@ -34,7 +34,7 @@ from symrefine.load.mesh import mesh_arrays
 from symrefine.load.molfile import read_molfile
 from symrefine.load.obj import read_obj
 from symrefine.load.off import read_off
-from symrefine.load.packed import GZIP, stem_of, suffix_of, unpacked
+from symrefine.load.packed import GZIP, LARGEST, stem_of, suffix_of, unpacked
 from symrefine.load.pcd import read_pcd
 from symrefine.load.pdb import read_pdb
 from symrefine.load.ply import read_ply
@@ -232,9 +232,12 @@ def _contents(file: Path, wanted: Wanted, *, is_chosen: bool = False) -> Frames[
         raise InputError(
             f"unknown suffix {suffix!r}; known are {' '.join(READERS)}, and images {images}, and {GZIP} of each"
         )
-    _check_options(_FORMATS[suffix], wanted, is_chosen=is_chosen)
+    kind = _FORMATS[suffix]
+    _check_options(kind, wanted, is_chosen=is_chosen)
     data = file_bytes(file)
-    found = _FORMATS[suffix].read(unpacked(data) if file.suffix.lower() == GZIP else data, file, wanted)
+    if file.suffix.lower() == GZIP:
+        data = unpacked(data, LARGEST if "grey" in kind.takes else None)
+    found = kind.read(data, file, wanted)
     return found if isinstance(found, Frames) else one(found, "objects")
 
 

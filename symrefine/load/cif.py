@@ -98,11 +98,11 @@ def _cell(block: Any, gemmi: Any) -> Any:
     values = [gemmi.cif.as_number(word) for word in words]
     if not all(0.0 < value < limit for value, limit in zip(values, 3 * (np.inf,) + 3 * (180.0,), strict=True)):
         raise InputError(
-            f"block {shorten(block.name)}: cell {' '.join(words)}; expected three lengths and three angles"
+            f"block {shorten(block.name)}: cell {shorten(' '.join(words), 80)}; expected three lengths and three angles"
         )
     cell = gemmi.UnitCell(*values)
     if not 0.0 < cell.volume < np.inf:
-        raise InputError(f"block {shorten(block.name)}: cell {' '.join(words)} has no volume")
+        raise InputError(f"block {shorten(block.name)}: cell {shorten(' '.join(words), 80)} has no volume")
     return cell
 
 
@@ -113,7 +113,8 @@ def _content(cell: Any, table: _Table, named: Collection[str]) -> Content:
     axes = [name for name in table if name.startswith(("Cartn_", "fract_"))]
     points = np.array([[_number(table[axis][k], axis, names[k]) for axis in axes] for k in range(size)])
     if cell is not None:
-        points = points @ np.array(cell.orth.mat.tolist()).T
+        with np.errstate(all="ignore"):  # points that are not finite are refused by name later
+            points = points @ np.array(cell.orth.mat.tolist()).T
     symbols = table.get("type_symbol") or labels
     elements = [_element(symbol, name) for symbol, name in zip(symbols, names, strict=True)]
     if "occupancy" not in named:

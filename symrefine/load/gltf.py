@@ -74,12 +74,17 @@ def _check_tree(tree: Json) -> None:
         raise InputError(f"requires {', '.join(map(str, required))}; save it without extensions")
     if not _objects(tree, "scenes"):
         raise InputError("has no scene, so nothing is in its place; save it with a scene")
+    _referred(tree, "scenes", tree.get("scene", 0), "shows scene")
     for number, node in enumerate(_objects(tree, "nodes")):
+        if "mesh" in node:
+            _referred(tree, "meshes", node["mesh"], f"node {number} has mesh")
         if "camera" in node and ("mesh" in node or "children" in node):
             raise InputError(f"node {number} has a camera besides a mesh or children; remove the camera")
     for number, accessor in enumerate(_objects(tree, "accessors")):
         if "sparse" in accessor:
             raise InputError(f"accessor {number} is sparse, which is not supported; save it in full")
+        if not _is_whole(accessor.get("count"), 1):
+            raise InputError(f"accessor {number} has count {accessor.get('count')!r}; expected a whole number from 1")
     primitives = [p for mesh in _objects(tree, "meshes") for p in _objects(mesh, "primitives")]
     for primitive in primitives:
         _check_primitive(primitive, tree)
@@ -92,12 +97,23 @@ def _check_primitive(primitive: Json, tree: Json) -> None:
         raise InputError(f"a primitive is {what}; expected points, lines, triangles or triangle strips")
     attributes = primitive.get("attributes")
     position = attributes.get("POSITION") if isinstance(attributes, dict) else None
-    accessors = _objects(tree, "accessors")
-    if not isinstance(position, int) or not 0 <= position < len(accessors):
-        raise InputError(f"a primitive has POSITION {position}; expected one of {len(accessors)} accessors")
-    accessor = accessors[position]
+    accessor = _referred(tree, "accessors", position, "a primitive has POSITION")
+    _referred(tree, "accessors", primitive.get("indices", 0), "a primitive has indices")
     if accessor.get("componentType") != _FLOAT or accessor.get("type") != "VEC3" or "bufferView" not in accessor:
         raise InputError(f"accessor {position} holds positions, but not as three stored floats each")
+
+
+def _is_whole(value: Any, least: int) -> bool:
+    """Whether JSON gives a whole number; Python takes `true` for 1, and trimesh -1 for the last of a list."""
+    return isinstance(value, int) and not isinstance(value, bool) and value >= least
+
+
+def _referred(tree: Json, key: str, number: Any, what: str) -> Json:
+    """The object of a list that a number refers to; trimesh leaves out a mesh that is not there."""
+    things = _objects(tree, key)
+    if not _is_whole(number, 0) or number >= len(things):
+        raise InputError(f"{what} {number!r}; expected one of {len(things)} {key}")
+    return things[number]
 
 
 def _objects(owner: Json, key: str) -> list[Json]:

@@ -23,7 +23,7 @@ def read_molfile(data: bytes) -> Frames[Content]:
         InputError: of a record, when it is asked for: cut off, other numbers of atoms or bonds than declared, columns
             without numbers, no elements; a drawing in two dimensions.
     """
-    records = _records(all_lines(data))
+    records = _records(list(all_lines(data)))
     return Frames("molecules", len(records), lambda k: _molecule(records[k]))
 
 

@@ -4,7 +4,7 @@ import io
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from gzip import BadGzipFile, GzipFile
 from pathlib import Path
@@ -13,8 +13,10 @@ from symrefine.errors import InputError
 from symrefine.load.text import shorten
 
 GZIP = ".gz"
-# 1 GiB: about 40 million points in double precision. A few kilobytes can unpack to it, and a few more to all of memory.
-LARGEST = 2**30
+# Coordinates pack to a half or a third, text of regular parts to a tenth; a megabyte of nothing to a kilobyte. So a
+# file may unpack to RATIO times its own size, a small one to ROOM bytes, and no line of it can take less than a byte.
+# Only grids may be as empty as they like, to LARGEST bytes: the mask of an organ is nothing but its border.
+ROOM, RATIO, LARGEST = 2**23, 32, 2**30
 _CHUNK = 2**20
 
 
@@ -29,16 +31,25 @@ def stem_of(path: Path) -> str:
     return Path(path.stem).stem if path.suffix.lower() == GZIP else path.stem
 
 
-def unpacked(data: bytes) -> bytes:
+def allowance(size: int) -> int:
+    """Bytes that a packed file of so many may unpack to, numbers counted as the eight bytes that they will take."""
+    return min(max(ROOM, RATIO * size), LARGEST)
+
+
+def unpacked(data: bytes, most: int | None = None) -> bytes:
     """What gzip packed, all of its members one after the other.
 
+    Args:
+        most: bytes it may unpack to; by its own size, as `allowance` says, if None.
+
     Raises:
-        InputError: not gzip, cut off, damaged, nothing in it, or more than `LARGEST` bytes.
+        InputError: not gzip, cut off, damaged, nothing in it, or more in it than it may hold.
     """
+    limit = allowance(len(data)) if most is None else most
     whole = bytearray()
     try:
         with GzipFile(fileobj=io.BytesIO(data)) as stream:
-            while len(whole) <= LARGEST and (chunk := stream.read(_CHUNK)):
+            while len(whole) <= limit and (chunk := stream.read(_CHUNK)):
                 whole += chunk
     except BadGzipFile as error:
         raise InputError(f"not gzip, or damaged: {shorten(str(error), 80)}") from None
@@ -46,30 +57,41 @@ def unpacked(data: bytes) -> bytes:
         raise InputError(f"the gzip data are cut off after {len(data)} bytes, {len(whole)} unpacked") from None
     except zlib.error as error:
         raise InputError(f"the gzip data are damaged: {shorten(str(error), 80)}") from None
-    if len(whole) > LARGEST:
-        raise InputError(f"unpacks to more than {LARGEST:,} bytes; thin it out, or unpack it to read it all the same")
+    crowded = most is None and whole.count(b"\n") > max(ROOM // 2, len(data))
+    if len(whole) > limit or crowded:
+        what = f"{max(ROOM // 2, len(data)):,} lines" if crowded else f"{limit:,} bytes"
+        raise InputError(
+            f"{len(data):,} bytes unpack to more than {what}; thin it out, or unpack it to read it all the same"
+        )
     if not whole:
         raise InputError("unpacks to nothing (0 bytes)")
     return bytes(whole)
 
 
-def archive(data: bytes, kind: str) -> dict[str, bytes]:
+def archive(data: bytes, kind: str, check: Callable[[Collection[str]], object] | None = None) -> dict[str, bytes]:
     """Members of a zip archive by name, their checksums tested.
 
     Args:
         kind: what the archive is, for messages.
+        check: refuses names, before anything is unpacked.
 
     Raises:
-        InputError: no whole archive, or more than `LARGEST` bytes in it.
+        InputError: no whole archive, or more in it than it may hold.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as opened:
             sizes = {member.filename: member.file_size for member in opened.infolist()}
-            if sum(sizes.values()) <= LARGEST:
+            if check is not None:
+                check(sizes)
+            if sum(sizes.values()) <= allowance(len(data)):
                 return {name: _member(opened, name, size) for name, size in sizes.items()}
+    except InputError:
+        raise
     except Exception as error:  # noqa: BLE001 (zipfile leaks many types on damaged files; nothing else in the block)
         raise InputError(f"not a whole {kind} archive: {shorten(str(error), 80)}") from None
-    raise InputError(f"unpacks to {sum(sizes.values()):,} bytes; at most {LARGEST:,}")
+    raise InputError(
+        f"{len(data):,} bytes unpack to {sum(sizes.values()):,}, at most {allowance(len(data)):,}; save it unpacked"
+    )
 
 
 def _member(opened: zipfile.ZipFile, name: str, size: int) -> bytes:

@@ -10,7 +10,7 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.content import Content, as_float64
 from symrefine.load.open3d import open3d
-from symrefine.load.packed import on_disk
+from symrefine.load.packed import allowance, on_disk
 from symrefine.load.text import NATURAL, count, numbered_lines, parse_table, shorten
 
 _KEYS = frozenset("VERSION FIELDS SIZE TYPE COUNT WIDTH HEIGHT VIEWPOINT POINTS DATA".split())
@@ -98,7 +98,7 @@ def _interpret(entries: dict[str, list[str]], size: int, lines: int) -> _Header:
     if not set(types) <= _TYPES:
         raise InputError(f"TYPE and SIZE give {' '.join(types)}; expected of {' '.join(sorted(_TYPES))}")
     if any(names.count(name) != 1 or counts[names.index(name)] != "1" for name in _COORDINATES):
-        raise InputError(f"FIELDS are {' '.join(names)}; expected one x, one y and one z, each of COUNT 1")
+        raise InputError(f"FIELDS are {shorten(' '.join(names), 99)}; expected one x, one y, one z, each of COUNT 1")
     encoding = " ".join(entries["DATA"])
     if encoding not in _ENCODINGS:
         raise InputError(f"line {lines}: DATA {shorten(encoding)}; expected one of {', '.join(_ENCODINGS)}")
@@ -173,6 +173,8 @@ def _read_compressed(data: bytes, path: Path, header: _Header, wanted: list[str]
             f"compressed data of {packed} bytes for {unpacked} are announced; {max(follow, 0)} follow, and "
             f"the header asks for {full}"
         )
+    if full > allowance(len(data)):
+        raise InputError(f"{len(data):,} bytes unpack to {full:,}; at most {allowance(len(data)):,}: save it as binary")
     if any(header.types[header.names.index(name)] != "F4" for name in wanted):
         raise InputError("compressed coordinates must be of TYPE F and SIZE 4; save it as binary or ascii")
     with on_disk(data, path) as file:

@@ -31,7 +31,7 @@ def read_pdb(data: bytes, named: Collection[str] = ()) -> Frames[Content]:
         InputError: models that do not end; of a model, when it is asked for: columns without numbers or elements,
             atoms with alternative places.
     """
-    models = _models(all_lines(data))
+    models = _models(list(all_lines(data)))
     return Frames("models", len(models), lambda k: _model(models[k], named))
 
 

@@ -4,6 +4,9 @@ Lengths are in the unit of the file, metres as a rule; offsets and poses are app
 """
 
 import io
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +16,28 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.content import Content, Values
 from symrefine.load.extras import library
-from symrefine.load.packed import LARGEST, on_disk
+from symrefine.load.packed import allowance, on_disk
 from symrefine.load.text import count, shorten
 from symrefine.shape import CAMERAS
 
+# lazrs believes every size that a compressed file tells, and where there is no memory for it, ends the process. So it
+# works in a process of its own, whose memory is bounded.
+LONGEST_S = 120.0
+_UNPACK = """
+import io, sys, laspy
+try:
+    import resource
+    resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[1]),) * 2)
+except (ImportError, ValueError, OSError):
+    pass
+with laspy.open(io.BytesIO(sys.stdin.buffer.read()), laz_backend=laspy.LazBackend.Lazrs) as reader:
+    cloud, declared = reader.read(), reader.header.point_count
+if len(cloud.points) != declared:
+    sys.exit(f"the header declares {declared} points; {len(cloud.points)} are there")
+made = io.BytesIO()
+cloud.write(made, do_compress=False)
+sys.stdout.buffer.write(made.getvalue())
+"""
 _COLOURS = ("red", "green", "blue")
 _COORDINATES = frozenset({"X", "Y", "Z"})
 
@@ -30,8 +51,11 @@ def read_las(data: bytes) -> Content:
     """
     laspy = library("laspy", "scan")
     library("lazrs", "scan")
+    _check_records(data)
+    if data[104:105] >= b"\x40":
+        data = _unpacked(data)
     try:
-        with laspy.open(io.BytesIO(data), laz_backend=laspy.LazBackend.Lazrs) as reader:
+        with laspy.open(io.BytesIO(data)) as reader:
             _check_size(reader.header, len(data))
             cloud = reader.read()
             points = np.array(cloud.xyz, dtype=np.float64)
@@ -49,13 +73,46 @@ def read_las(data: bytes) -> Content:
     return Content(points=points, point_fields=fields)
 
 
+def _check_records(data: bytes) -> None:
+    """Refuse more records before and behind the points than there is room for: laspy looks for each of billions."""
+    before, behind = _whole(data, 100, 4), _whole(data, 243, 4) if data[25:26] >= b"\4" else 0
+    for number, smallest in ((before, 54), (behind, 60)):
+        if number * smallest > len(data):
+            raise InputError(f"the header declares {count(number, 'record')} besides points in {len(data)} bytes")
+
+
+def _whole(data: bytes, start: int, size: int) -> int:
+    """A whole number of a LAS file."""
+    return int.from_bytes(data[start : start + size], "little")
+
+
+def _unpacked(data: bytes) -> bytes:
+    """The uncompressed file of a compressed one."""
+    # Legacy counts of points are at 107, those of version 1.4 at 247.
+    points = max(_whole(data, 107, 4), _whole(data, 247, 8) if data[25:26] >= b"\4" else 0)
+    needed, most = points * (_whole(data, 105, 2) + 24), allowance(len(data))
+    if needed > most:
+        raise InputError(
+            f"the header declares {count(points, 'point')}, {needed:,} bytes once they are read; at most {most:,} of a "
+            f"file of {len(data):,}"
+        )
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _UNPACK, str(2**30 + 4 * most)], input=data, capture_output=True,
+            timeout=LONGEST_S, check=False, env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        raise InputError(f"cannot be unpacked within {LONGEST_S:g} s; the file may be damaged") from None
+    if done.returncode != 0:
+        said = done.stderr.decode("utf-8", errors="replace").strip().splitlines()
+        told = shorten(said[-1], 80) if said and done.returncode > 0 else "it asks for more than there is"
+        raise InputError(f"not a whole LAS file: {told}")
+    return done.stdout
+
+
 def _check_size(header: Any, size: int) -> None:
     """Refuse counts that the file has no room for, or too much: laspy reads what there is."""
     points, each = int(header.point_count), int(header.point_format.size)
-    if points * each > LARGEST:
-        raise InputError(f"the header declares {count(points, 'point')} of {each} bytes; at most {LARGEST:,} bytes")
-    if header.are_points_compressed:
-        return
     behind = [
         int(getattr(header, name, 0) or 0) for name in ("start_of_first_evlr", "start_of_waveform_data_packet_record")
     ]
@@ -114,8 +171,8 @@ def _e57_scans(pye57: Any, file: Path) -> list[tuple[dict[str, Values], Array | 
     try:
         headers = [opened.get_header(k) for k in range(opened.scan_count)]
         points = sum(header.point_count for header in headers)
-        if points * 6 * 8 > LARGEST:
-            raise InputError(f"holds {count(points, 'point')}; at most {LARGEST // 48:,}")
+        if points * 6 * 8 > (most := allowance(file.stat().st_size)):
+            raise InputError(f"holds {count(points, 'point')}; at most {most // 48:,} of a file of its size")
         scans: list[tuple[dict[str, Values], Array | None]] = []
         for k, header in enumerate(headers):
             names = set(header.point_fields)

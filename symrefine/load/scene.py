@@ -21,9 +21,9 @@ def flattened(scene: Any) -> Content:
     colours: list[Values] = []
     lines = 0
     for node in scene.graph.nodes_geometry:
-        to_scene, name = scene.graph[node]
-        part = scene.geometry[name]
         with np.errstate(all="ignore"):  # points that are not finite are refused by name later
+            to_scene, name = scene.graph[node]
+            part = scene.geometry[name]
             points = np.asarray(part.vertices, dtype=np.float64) @ to_scene[:3, :3].T + to_scene[:3, 3]
         colours += _colours(part)
         if hasattr(part, "faces"):

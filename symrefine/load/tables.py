@@ -1,6 +1,7 @@
 """Tables of coordinates: .xyz, .csv and .txt as text, .npy and .npz as NumPy writes them."""
 
 import io
+import math
 import re
 from collections.abc import Collection
 from typing import Any
@@ -13,7 +14,7 @@ from symrefine.geometry import Array
 from symrefine.load.content import Content, Polygons, Values, as_float64
 from symrefine.load.frames import Frames, one
 from symrefine.load.molecule import is_bare_molecule, is_molecule, read_bare_molecule, read_molecule
-from symrefine.load.packed import archive
+from symrefine.load.packed import allowance, archive
 from symrefine.load.text import (
     Line,
     count,
@@ -151,15 +152,9 @@ def read_npz(data: bytes, named: Collection[str] = ()) -> Content:
         named: further arrays that the caller asks for: numbers or texts [F] for faces, [N] for points (the faces have
             them where both would do), or colours [F, 3] or [N, 3], [F, 4] or [N, 4]. Others are refused as ever.
     """
-    arrays = _read_archive(data)
+    arrays = _read_archive(data, named)
     fields = {name: arrays.pop(name) for name in named if name in arrays and name not in _FIELDS}
     arrays.pop(_MARK, None)
-    unknown = sorted(set(arrays) - set(_FIELDS))
-    if unknown or "points" not in arrays:
-        raise InputError(
-            f"holds arrays {', '.join(sorted(arrays)) or '(none)'}; expected points, and any of "
-            f"{', '.join(_FIELDS[1:])}, and what you name as labels or weights"
-        )
     numbers = {name: _numbers(array, name) for name, array in arrays.items() if name != "faces"}
     _check_shape(numbers["points"])
     faces = _faces(arrays["faces"]) if "faces" in arrays else None
@@ -195,24 +190,64 @@ def _sorted(fields: dict[str, NDArray[Any]], points: int, faces: int) -> tuple[d
     return of_points, of_faces
 
 
-def _read_archive(data: bytes) -> dict[str, NDArray[Any]]:
-    arrays = {}
-    for name, member in archive(data, ".npz").items():
+def _read_archive(data: bytes, named: Collection[str]) -> dict[str, NDArray[Any]]:
+    """Arrays by name, none of them read that is not known or asked for."""
+
+    def check(members: Collection[str]) -> None:
+        names = {member.removesuffix(".npy") for member in members}
+        if not {"points"} <= names <= {*_FIELDS, _MARK, *named}:
+            raise InputError(
+                f"holds arrays {', '.join(sorted(names)) or '(none)'}; expected points, and any of "
+                f"{', '.join(_FIELDS[1:])}, and what you name as labels or weights"
+            )
+
+    arrays, left = {}, allowance(len(data))
+    for name, member in archive(data, ".npz", check).items():
         with about(name):
-            arrays[name.removesuffix(".npy")] = read_array(io.BytesIO(member))
+            array = read_array(io.BytesIO(member), left)
+            left -= _room(array.shape, array.dtype)
+            arrays[name.removesuffix(".npy")] = array
     return arrays
 
 
-def read_array(stream: io.BytesIO) -> NDArray[Any]:
-    """The array of an .npy file, of any type but objects."""
+def _room(shape: tuple[int, ...], dtype: "np.dtype[Any]") -> int:
+    """Bytes that an array takes in the end."""
+    return math.prod(shape) * max(dtype.itemsize, 8)
+
+
+def read_array(stream: io.BytesIO, most: int | None = None) -> NDArray[Any]:
+    """The array of an .npy file, of any type but objects.
+
+    Args:
+        most: bytes that it may take as float64; any, as many as the file has for it, if None.
+    """
     try:
+        _check_header(stream, most)
         array: NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)
+    except InputError:
+        raise
     except Exception as error:  # noqa: BLE001 (NumPy evaluates the header: many types; nothing else in the block)
         raise InputError(f"not a whole .npy array of numbers: {shorten(str(error), 80)}") from None
     rest = len(stream.read())
     if rest:
         raise InputError(f"{count(rest, 'byte')} behind the array of shape {array.shape}; save it again")
     return array
+
+
+def _check_header(stream: io.BytesIO, most: int | None) -> None:
+    """Refuse arrays that are larger than what there is of them, or than they may be, before memory is taken."""
+    size = len(stream.getbuffer())
+    first = np.lib.format.read_magic(stream) < (2, 0)
+    read = np.lib.format.read_array_header_1_0 if first else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(stream)
+    told, there = math.prod(shape) * dtype.itemsize, size - stream.tell()
+    if told > there and not dtype.hasobject:
+        raise InputError(f"the header gives shape {shape} of {dtype}, {told} bytes; {there} follow: cut off or damaged")
+    if most is not None and _room(shape, dtype) > most:
+        raise InputError(
+            f"{_room(shape, dtype):,} bytes as double, where {most:,} are allowed of so small a file; save it unpacked"
+        )
+    stream.seek(0)
 
 
 def _numbers(array: NDArray[Any], name: str) -> Array:

@@ -1,7 +1,7 @@
 """Text files: numbered lines, and tables of numbers in which no line is skipped or repaired."""
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
@@ -18,7 +18,7 @@ NATURAL = re.compile(r"[0-9]{1,18}")
 _SPACED = re.compile(r"[^\t ] +[^\t ]")
 
 
-def all_lines(data: bytes) -> list[Line]:
+def all_lines(data: bytes) -> Iterator[Line]:
     """Every line as it stands, empty ones too, without the white space behind it.
 
     Raises:
@@ -28,7 +28,7 @@ def all_lines(data: bytes) -> list[Line]:
         raise InputError(f"not a text file: zero byte at offset {data.index(0)}")
     # Names and remarks may be in any encoding; a number that is not ASCII is refused where it is parsed.
     text = data.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
-    return [(number, line.rstrip()) for number, line in enumerate(text.split("\n"), start=1)]
+    return ((number, line.rstrip()) for number, line in enumerate(text.split("\n"), start=1))
 
 
 def numbered_lines(data: bytes, *, comment: str | None = None, tabs: bool = False) -> list[Line]:
@@ -42,7 +42,7 @@ def numbered_lines(data: bytes, *, comment: str | None = None, tabs: bool = Fals
     """
     lines = all_lines(data)
     if comment is not None:
-        lines = [(number, line.partition(comment)[0].rstrip()) for number, line in lines]
+        lines = ((number, line.partition(comment)[0].rstrip()) for number, line in lines)
     return [(number, line.lstrip(" " if tabs else None)) for number, line in lines if line]
 
 

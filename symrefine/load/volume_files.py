@@ -1,9 +1,11 @@
 """Formats of volumes, each read by the library that keeps it: nibabel, mrcfile, and pynrrd for headers."""
 
 import bz2
+import gzip
 import io
 import math
 import warnings
+import zlib
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -14,7 +16,6 @@ from symrefine.errors import InputError
 from symrefine.load.content import Content, Wanted
 from symrefine.load.extras import library
 from symrefine.load.frames import Frames, one
-from symrefine.load.packed import unpacked
 from symrefine.load.text import count, shorten
 from symrefine.load.volume import Volume, check_size, volume_content
 
@@ -32,6 +33,8 @@ _TYPES = {
     "f8": ("double",),
 }
 
+# How NRRD packs its data.
+_OPENERS: dict[str, Any] = {"gzip": gzip.open, "gz": gzip.open, "bzip2": bz2.open, "bz2": bz2.open}
 _NIFTI_UNITS = {"meter": "m", "mm": "mm", "micron": "um"}
 
 
@@ -184,13 +187,11 @@ def _unpacked(body: bytes, encoding: str, size: int) -> bytes:
     """Data of a NRRD file; one byte more than expected at most."""
     if encoding == "raw":
         return body
-    if encoding in ("gzip", "gz"):
-        return unpacked(body)
-    if encoding in ("bzip2", "bz2"):
+    if encoding in _OPENERS:
         try:
-            with bz2.open(io.BytesIO(body)) as file:
+            with _OPENERS[encoding](io.BytesIO(body)) as file:
                 return file.read(size + 1)
-        except (OSError, EOFError) as error:
+        except (OSError, EOFError, zlib.error) as error:
             raise InputError(f"the data are damaged: {shorten(str(error), 80)}") from None
     raise InputError(f"encoding is {shorten(encoding)}; expected raw, gzip or bzip2")
 

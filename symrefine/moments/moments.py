@@ -22,6 +22,8 @@ BLOCK = 2048
 # Waves, about a radian to a diagonal, that the edges of a solid's surface are tested with, and the share of the area
 # that may be missing or turned round: what single precision leaves where triangles meet without sharing vertices.
 WAVES, LOOSE = 6, 1e-6
+# What all points but one must weigh of the whole: less is lost in the rounding of sums.
+ALONE = 1e-12
 
 
 def exponents_of(dim: int, degree: int) -> list[tuple[int, ...]]:
@@ -137,8 +139,10 @@ def central_moments(points: Array, weights: Array, order: int, *, parts: int = 0
         parts: number of interleaved parts to leave out in turn; 0 for exact nodes.
 
     Raises:
-        DegenerateShapeError: the points do not spread about their mean.
+        DegenerateShapeError: the points do not spread about their mean, or one has all the weight.
     """
+    # By a power of two, which changes no digit: products of large weights and large squares would overflow.
+    weights = np.ldexp(weights, -int(np.frexp(weights.max())[1]))
     shift = points[len(points) // 2]
     local, mass = points - shift, weights.sum()
     mean = weights @ local / mass
@@ -147,6 +151,11 @@ def central_moments(points: Array, weights: Array, order: int, *, parts: int = 0
     if not scale > 0:
         raise DegenerateShapeError(
             "the points do not spread about their mean; a shape needs at least two distinct points"
+        )
+    if mass - weights.max() < ALONE * mass:
+        raise DegenerateShapeError(
+            f"point {weights.argmax()} weighs more than {1.0 / ALONE:g} times as much as all others together; a shape "
+            "needs at least two points that count"
         )
     local /= scale
     w = weights / mass

@@ -159,7 +159,7 @@ class _Program:
                 columns.append(np.sqrt(np.maximum(entries[:, low] * entries[:, high], 0.0)))
             else:
                 norms = [np.sqrt(entries[:, at] ** 2 @ often) for at, often in ends]
-                columns.append(np.max([entries[:, low] ** ratio, *norms], axis=0))
+                columns.append(np.max([np.maximum(entries[:, low], 0.0) ** ratio, *norms], axis=0))
         return np.stack(columns, axis=1)
 
 

@@ -1,5 +1,6 @@
 """YAML documents as trees whose every value knows its file, line and key path; `--set` puts other values in."""
 
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +9,11 @@ from typing import Any
 
 from symrefine.errors import InputError
 
-_DEEPEST = 20
+# Levels, values with all aliases written out, and bytes: ten times what the largest config here has, or more. A few
+# lines of aliases stand for billions of values, and the parser takes a second for 25 kB.
+_DEEPEST, _MOST, _LARGEST = 20, 100_000, 2**16
+_NESTED = 100
+_DASHES = re.compile(rf"(?:[-?:]\s+){{{_NESTED}}}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +53,8 @@ def read_document(path: Path) -> Node:
     """
     if not path.is_file():
         raise InputError(f"{path}: no such config file")
+    if (size := path.stat().st_size) > _LARGEST:
+        raise InputError(f"{path}: has {size:,} bytes; a config has at most {_LARGEST:,}")
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
@@ -59,14 +66,42 @@ def _parse(text: str, source: str, *, lines: bool) -> Node:
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
+    if _nests(text):
+        raise InputError(f"{source}: nested too deep: {_NESTED} brackets or dashes that nothing closes")
     try:
-        return _node(YAML(typ="rt", pure=True).load(text), source, 1 if lines else None, "", 0)
+        tree = YAML(typ="rt", pure=True).load(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark
         where = f":{mark.line + 1 if mark else 1}" if lines else ""
         raise InputError(f"{source}{where}: not YAML: {error.problem}") from None
     except YAMLError as error:
         raise InputError(f"{source}: not YAML: {str(error).splitlines()[0]}") from None
+    except Exception as error:  # noqa: BLE001 - values that their tag or form promises and that are none: !!int x
+        raise InputError(f"{source}: not YAML: {str(error)[:80]}") from None
+    if (size := _size(tree, 0, {})) > _MOST:
+        raise InputError(f"{source}: its aliases stand for {float(size):.3g} values; at most {_MOST:,}")
+    return _node(tree, source, 1 if lines else None, "", 0)
+
+
+def _nests(text: str) -> bool:
+    """Whether a text opens more than any config does: for 1,000 levels the parser takes 8 s, and then gives up."""
+    steps = (1 if c in "[{" else -1 for c in text if c in "[]{}")
+    return max(itertools.accumulate(steps), default=0) > _NESTED or bool(_DASHES.search(text))
+
+
+def _size(value: Any, depth: int, known: dict[int, int]) -> int:
+    """Values in a tree as if every alias were written out; what holds itself counts as too many.
+
+    Args:
+        known: sizes of the mappings and lists that were counted before, by identity.
+    """
+    if not isinstance(value, dict | list) or depth > _DEEPEST:
+        return 1
+    if id(value) not in known:
+        known[id(value)] = _MOST + 1  # until it is counted: itself
+        inner = value.values() if isinstance(value, dict) else value
+        known[id(value)] = 1 + sum(_size(item, depth + 1, known) for item in inner)
+    return known[id(value)]
 
 
 def _node(value: Any, source: str, line: int | None, path: str, depth: int) -> Node:
@@ -111,6 +146,8 @@ def override(root: Node, settings: Sequence[str]) -> Node:
         name, equals, text = setting.partition("=")
         keys = name.strip().split(".")
         source = f"--set {setting}"
+        if len(keys) > _DEEPEST or len(setting) > _LARGEST:
+            raise InputError(f"--set {setting[:60]}...: {len(keys)} keys deep, {len(setting)} characters: too many")
         if not equals or not all(re.fullmatch(r"\w[\w -]*", key) for key in keys):
             raise InputError(f"{source}: expected KEY=VALUE, such as sweep.seed=[0,1] or fixed.points=5000")
         root = put(root, keys, _parse(text, source, lines=False), source)
