@@ -82,7 +82,7 @@ def test_beside_a_surface_the_distance_grows_to_that_of_its_nearest_point():
 def test_distances_never_exceed_that_of_the_nearest_centre():
     cloud, rng = surface_of(mug()).cloud, np.random.default_rng(3)
     queries = rng.uniform(-2, 2, (500, 3))
-    nearest = cloud.tree.query(queries)[0]
+    nearest = cloud.tree.nearest(queries)[0]
     found = disc_distances(cloud, queries)
     assert found.min() >= 0
     assert np.all(found <= nearest + 1e-9)
