@@ -28,14 +28,16 @@ if TYPE_CHECKING:
     from symrefine.groups import point_group as point_group
     from symrefine.load import load as load
     from symrefine.load import load_depth as load_depth
+    from symrefine.load import stream as stream
     from symrefine.ntuples.derive import derive as derive
     from symrefine.shape import Shape as Shape
+    from symrefine.stream import Stream as Stream
 
     __version__: str
 
 # Where each public name comes from.
 _HOMES = {
-    "symrefine.load": ("load", "load_depth"),
+    "symrefine.load": ("load", "load_depth", "stream"),
     "symrefine.front.verbs": ("detect", "align", "symmetrize", "complete", "export", "report"),
     "symrefine.front.space": ("Detection",),
     "symrefine.front.planar": ("PlanarDetection",),
@@ -43,6 +45,7 @@ _HOMES = {
     "symrefine.front.aligned": ("Alignment",),
     "symrefine.ntuples.derive": ("derive",),
     "symrefine.shape": ("Shape",),
+    "symrefine.stream": ("Stream",),
     "symrefine.geometry": ("Plane", "Axis"),
     "symrefine.groups": ("PointGroup", "point_group"),
     "symrefine.errors": ("SymrefineError", "InputError", "DegenerateShapeError"),

@@ -3,16 +3,18 @@
 import numpy as np
 
 from symrefine.detection.measure import Outliers, is_few
+from symrefine.detection.sketch import MANY, sketched
 from symrefine.errors import InputError
 from symrefine.geometry import LARGEST_TOLERANCE, Array, tight_diagonal
 from symrefine.plane.outline import smallest_diagonal
 from symrefine.shape import Shape
+from symrefine.stream import Stream
 from symrefine.surface.sampling import sampling
 from symrefine.units import METRES, OF_FILE, read_length
 
 
 def relative_tolerance(
-    asked: float | str, shape: Shape, *, units: str | None = None, outliers: Outliers = "auto"
+    asked: float | str, shape: Shape | Stream, *, units: str | None = None, outliers: Outliers = "auto"
 ) -> float:
     """A tolerance as the fraction of the diagonal that detections take.
 
@@ -29,6 +31,8 @@ def relative_tolerance(
         if units is not None:
             raise InputError(f"--units {units}: says what a tolerance with a unit is; --tolerance {asked:g} has none")
         return asked
+    if isinstance(shape, Stream):
+        shape = sketched(shape).sample if shape.count > MANY else shape.held()
     value, unit = read_length(asked)
     length = value if unit == OF_FILE else value * METRES[unit] / METRES[_unit(asked, shape, units)]
     diagonal = object_diagonal(shape, outliers=outliers)

@@ -70,7 +70,7 @@ class Shape:
         if self.viewpoint is not None:
             object.__setattr__(self, "viewpoint", _viewpoint(self.viewpoint, points.shape, self.source))
         object.__setattr__(self, "measure", _measure(self.measure, self.faces, self.source))
-        if np.ptp(points, axis=0).max() == 0.0:
+        if (points[-1] == points[0]).all() and (points == points[0]).all():
             raise DegenerateShapeError(
                 f"{self.source}: all {len(points)} points coincide; a shape needs at least two distinct points"
             )
@@ -119,7 +119,7 @@ def _numbers(values: ArrayLike, name: str, source: str) -> Array:
         if array.dtype.kind not in "iuf":
             kind = "complex" if np.iscomplexobj(array) else f"of type {array.dtype}"
             raise InputError(f"{source}: {name} are not numbers in rows of one length: they are {kind}")
-        return array.astype(np.float64)
+        return array.astype(np.float64, copy=False)
     except InputError:
         raise
     except (TypeError, ValueError) as error:
@@ -138,8 +138,8 @@ def _matrix(values: ArrayLike, name: str, source: str) -> Array:
         raise InputError(f"{source}: {name} have shape {array.shape}; expected [N, n] with n >= 2")
     if len(array) == 0:
         raise InputError(f"{source}: no {name}; expected at least two distinct points")
-    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
-    if bad.size:
+    if not np.isfinite(array).all():
+        bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
         raise InputError(
             f"{source}: {bad.size} of {len(array)} {name} hold NaN or infinity, the first in row {bad[0]}; "
             "remove those rows"

@@ -13,6 +13,7 @@ from symrefine.decide.posterior import NEAR, Decision, alternatives
 from symrefine.detection.examination import Examined, examined
 from symrefine.detection.measure import Outliers
 from symrefine.detection.result import Candidate, Detection, FoundAxis, FoundPlane, NearMiss, Step
+from symrefine.detection.sketch import Sketch
 from symrefine.errors import InputError
 from symrefine.fit.refine import Iterate
 from symrefine.geometry import Array, Axis, Plane, cross_matrix, positive
@@ -24,7 +25,7 @@ LADDER = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08)
 
 
 def detect(
-    shape: Shape | ArrayLike,
+    shape: Shape | Sketch | ArrayLike,
     *,
     weights: ArrayLike | None = None,
     normals: ArrayLike | None = None,
@@ -38,7 +39,8 @@ def detect(
     """Point group, mirror planes and rotation axes of an object in 3-space, with what it misses each of them by.
 
     Args:
-        shape: a `Shape`, or points [N, 3].
+        shape: a `Shape`, points [N, 3], or the `Sketch` of a cloud too large to hold; of a cloud of more than 100,000
+            points a sketch is made, too.
         weights: [N] masses of the points; not with a `Shape`, which carries its own. Of up to 250 points those of
             different mass are different things, which no symmetry exchanges; of more, masses are a sampling density.
         normals: [N, 3] normals, any sign; estimated where absent. Not with a `Shape`.
@@ -71,20 +73,20 @@ def told(found: Examined, *, tolerance: float = TOLERANCE, ladder: Sequence[floa
 
 
 def _given(
-    shape: Shape | ArrayLike,
+    shape: Shape | Sketch | ArrayLike,
     weights: ArrayLike | None,
     normals: ArrayLike | None,
     labels: ArrayLike | None,
     viewpoint: ArrayLike | None,
-) -> Shape:
+) -> Shape | Sketch:
     """The shape in 3-space."""
-    if not isinstance(shape, Shape):
+    if not isinstance(shape, Shape | Sketch):
         shape = Shape.of(shape, weights=weights, normals=normals, labels=labels, viewpoint=viewpoint)
     elif not (weights is None and normals is None and labels is None and viewpoint is None):
         raise InputError(
             "weights, normals, labels and viewpoint belong to the Shape; give them there, or give an array of points"
         )
-    if shape.dim != 3:
+    if isinstance(shape, Shape) and shape.dim != 3:
         raise InputError(f"{shape.source}: detect takes 3-D shapes; {_elsewhere(shape.dim)}")
     return shape
 
@@ -115,7 +117,6 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
     names, needs = [h.group.name for h in links], [h.need for h in links]
     told = alternatives(names, needs, decision, -1 if reason else index)
     history = chosen.history
-    outliers = np.sort(np.concatenate([measured.strays, *(indices for indices, _ in measured.clumps)]))
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
     planes = [e for e in chosen.elements if e.operations.kind == "plane"]
     turns = [e for e in chosen.elements if e.operations.kind in ("axis", "improper")]
@@ -174,10 +175,11 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
             )
             for start, need in sorted((*found.pool.looked, *found.pool.hopeless), key=lambda k: k[1])
         ),
-        outliers=outliers,
-        outlier_share=len(outliers) / (len(outliers) + measured.count),
+        outliers=found.outliers,
+        outlier_share=found.outlier_share,
         at_least=found.pool.at_least and not reason,
         clumps=len(measured.clumps),
+        sample=found.sample,
         even_sample=len(measured.shape.points) if len(measured.shape.points) < measured.count else None,
         origin=origin,
         scale=scale,

@@ -50,10 +50,16 @@ def read_las(data: bytes) -> Content:
 
 
 def _check_size(header: Any, size: int) -> None:
-    """Refuse counts that the file has no room for, or too much: laspy reads what there is."""
+    """Refuse counts that memory has no room for, or the file."""
     points, each = int(header.point_count), int(header.point_format.size)
     if points * each > LARGEST:
         raise InputError(f"the header declares {count(points, 'point')} of {each} bytes; at most {LARGEST:,} bytes")
+    check_room(header, size)
+
+
+def check_room(header: Any, size: int) -> None:
+    """Refuse counts that the file has no room for, or too much: laspy reads what there is."""
+    points, each = int(header.point_count), int(header.point_format.size)
     if header.are_points_compressed:
         return
     behind = [

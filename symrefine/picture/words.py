@@ -143,7 +143,8 @@ def body_name(body: str) -> str:
 def scanned(detection: Detection) -> str:
     """What the points lack: outliers among them, parts that were not seen; empty where there is nothing to say."""
     d = detection
-    told = taken_out(len(d.outliers), d.outlier_share, d.clumps), evened(d.even_sample)
+    of = None if d.sample is None else (d.sample.points, d.sample.of)
+    told = taken_out(len(d.outliers), d.outlier_share, d.clumps), sampled(of), evened(d.even_sample)
     unseen = "Parts of the surface were not seen: there may be more." if d.at_least else ""
     return " ".join(said for said in (*(f"{t[:1].upper()}{t[1:]}." for t in told if t), unseen) if said)
 
@@ -159,6 +160,11 @@ def taken_out(outliers: int, share: float, clumps: int) -> str:
     """How many points were taken as no part of the object, if any: `1,214 points (6 %) taken as outliers`."""
     among = f", {count(clumps, 'clump')} among them" if clumps else ""
     return f"{outliers:,} points ({percent(share)}) taken as outliers{among}" if outliers else ""
+
+
+def sampled(sample: tuple[int, int] | None) -> str:
+    """How many points were looked at, and of how many, where that was not all of them."""
+    return "" if sample is None else f"the surface is known by {sample[0]:,} of {sample[1]:,} points, drawn at random"
 
 
 def evened(sample: int | None) -> str:

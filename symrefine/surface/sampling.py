@@ -185,6 +185,20 @@ def _alone(around: Surroundings) -> Mask:
     return found
 
 
+def strays_beside(points: Array, around: Surroundings) -> Mask:
+    """Which of further points [N, 3] are far from a surface that some are known of, and in no plane with them."""
+    far = FAR * np.median(around.reach)
+    found = np.asarray(around.tree.query(points, k=[AROUND // 2])[0][:, 0] > far)
+    if not found.any():
+        return found
+    away, near = around.tree.query(points[found], k=AROUND)
+    mean, normals, variances = fit_planes(sums_of(around.points[near.ravel()]).reshape(*near.shape, -1).sum(axis=1))
+    across = np.abs(np.einsum("ni,ni->n", normals, points[found] - mean))
+    thick = np.sqrt(variances[:, 0] / np.maximum(variances[:, 2], 1e-300))
+    found[found] = (thick > FLAT) | (across > FLAT * away[:, -1])
+    return found
+
+
 def _planes(around: Surroundings, some: Index | slice) -> tuple[Array, Array, Array]:
     """Means and normals, each [K, 3], of what is around some points, and how thick [K] that is over how wide."""
     near = around.near[some]
