@@ -3,7 +3,7 @@
 import numpy as np
 
 from symrefine.detection.measure import Outliers, is_few
-from symrefine.detection.sketch import MANY, sketched
+from symrefine.detection.sketch import MANY, is_large, sampled, sketched
 from symrefine.errors import InputError
 from symrefine.geometry import LARGEST_TOLERANCE, Array, tight_diagonal
 from symrefine.plane.outline import smallest_diagonal
@@ -75,7 +75,12 @@ def object_diagonal(shape: Shape, *, outliers: Outliers = "auto") -> float:
 
 
 def body(shape: Shape, *, outliers: Outliers = "auto") -> Array:
-    """The points [K, 3] of a shape without those that belong to no surface, if outliers are looked for ("auto")."""
+    """The points [K, 3] of a shape without those that belong to no surface, if outliers are looked for ("auto").
+
+    Of very many points a sample stands for all.
+    """
+    if is_large(shape):
+        shape = sampled(shape)
     points = heavy(shape)
     if shape.faces is not None or is_few(shape):
         return points

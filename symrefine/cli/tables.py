@@ -9,7 +9,17 @@ from rich.table import Table
 
 from symrefine.errors import one_line
 from symrefine.groups import point_group
-from symrefine.picture.words import DOUBLETS, TUPLES, evened, kind_name, meaning, sampled, taken_out, turns_name
+from symrefine.picture.words import (
+    DOUBLETS,
+    TUPLES,
+    evened,
+    exactly,
+    kind_name,
+    meaning,
+    sampled,
+    taken_out,
+    turns_name,
+)
 
 Record = dict[str, Any]
 
@@ -34,6 +44,8 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
     yield f"{record['source']}: {headline(record)}"
     yield f"n-tuples {TUPLES[record['ntuples']['kind']]}"
     yield _place(record)
+    if record["exact"]:
+        yield exactly(record["exact"]["miss"], record["exact"]["faces"], record["exact"]["point_group"])
     if record["classes"]:
         yield f"labels: {_count(record['classes']['count'], 'class', 'classes')}"
     out, sample = record["outliers"], record["sample"]

@@ -91,6 +91,21 @@ class Sample:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Exact:
+    """That the group maps the vertices of a mesh onto one another: planes, axes and centre are those of the vertices.
+
+    Attributes:
+        miss: largest distance of an image to its counterpart, a fraction of the diagonal; rounding alone leaves 1e-15.
+        faces: whether triangles are mapped onto triangles as well; if not, a triangulation chose its diagonals.
+        point_group: what does so: the group, or the fold that a continuous one has in the vertices.
+    """
+
+    miss: float
+    faces: bool
+    point_group: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Verified:
     """What all points say, which were moved one by one, with whatever noise they have.
 
@@ -138,6 +153,7 @@ class Detection(ReadOnly):
         at_least: whether the surface has open borders beyond which nobody looked: the object may have more symmetry.
         clumps: how many groups of them stand apart from the body, the others being single strays.
         outlier_share: of all points.
+        exact: that and how exactly the group maps vertices of a mesh onto vertices, if it does; None of anything else.
         sample: what stands for the surface where there are too many points to look at all of them; None where all do.
         verified: what all points say, where they were asked.
         even_sample: how many points, more evenly spread, it was decided by where the density falls off; None where by
@@ -170,6 +186,7 @@ class Detection(ReadOnly):
     outliers: Index
     outlier_share: float
     clumps: int
+    exact: Exact | None
     sample: Sample | None
     even_sample: int | None
     at_least: bool

@@ -60,6 +60,11 @@ def is_large(shape: Shape) -> bool:
     return shape.faces is None and shape.dim == 3 and len(shape.points) > MANY
 
 
+def sampled(shape: Shape, seed: int = 0) -> Shape:
+    """The sample that stands for a cloud, without the moments of all of it."""
+    return part(shape, _picked(len(shape.points), np.random.default_rng(seed)))
+
+
 def sketched(given: Shape | Stream, seed: int = 0) -> Sketch:
     """Sample and moments of a cloud, in one pass over its chunks.
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,11 +12,13 @@ from symrefine.decide.chain import Pool
 from symrefine.decide.hypotheses import Element, Hypothesis
 from symrefine.decide.posterior import NEAR, Decision, alternatives
 from symrefine.detection.examination import Examined, examined
-from symrefine.detection.measure import Outliers
-from symrefine.detection.result import Candidate, Detection, FoundAxis, FoundPlane, NearMiss, Step
+from symrefine.detection.measure import Measured, Outliers
+from symrefine.detection.result import Candidate, Detection, Exact, FoundAxis, FoundPlane, NearMiss, Step
 from symrefine.detection.sketch import Sketch
 from symrefine.errors import InputError
+from symrefine.fit.placed import Placed
 from symrefine.fit.refine import Iterate
+from symrefine.fit.vertices import OnVertices, on_vertices
 from symrefine.geometry import Array, Axis, Plane, cross_matrix, positive
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
@@ -117,6 +120,9 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
     names, needs = [h.group.name for h in links], [h.need for h in links]
     told = alternatives(names, needs, decision, -1 if reason else index)
     history = chosen.history
+    with clock("vertices"):
+        on = _on_vertices(measured, chosen)
+    chosen = chosen if on is None else _polished(chosen, on, measured)
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
     planes = [e for e in chosen.elements if e.operations.kind == "plane"]
     turns = [e for e in chosen.elements if e.operations.kind in ("axis", "improper")]
@@ -127,7 +133,7 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
         confidence=0.0 if reason else decision.probabilities[index],
         alternatives=tuple(told) if len(links) > 1 and not reason else (),
         group=chosen.group,
-        center=origin + scale * chosen.placed.center,
+        center=origin + scale * chosen.placed.center if on is None else on.center,
         planes=tuple(
             FoundPlane(
                 plane=_plane(e, origin, scale),
@@ -179,12 +185,37 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
         outlier_share=found.outlier_share,
         at_least=found.pool.at_least and not reason,
         clumps=len(measured.clumps),
+        exact=None if on is None else Exact(miss=on.miss, faces=on.faces, point_group=on.finite.name),
         sample=found.sample,
         even_sample=len(measured.shape.points) if len(measured.shape.points) < measured.count else None,
         origin=origin,
         scale=scale,
         timings=clock.seconds,
     )
+
+
+def _on_vertices(measured: Measured, chosen: Hypothesis) -> OnVertices | None:
+    """Where the vertices of a mesh put the group that was decided, if it maps them onto one another."""
+    if measured.shape.faces is None:
+        return None
+    origin, scale = measured.moments.center, measured.moments.scale
+    return on_vertices(measured.shape, chosen.group, origin + scale * chosen.placed.center)
+
+
+def _polished(chosen: Hypothesis, on: OnVertices, measured: Measured) -> Hypothesis:
+    """The group and its elements where the vertices put them, with the misses that decided."""
+    center = (on.center - measured.moments.center) / measured.moments.scale
+    turn = on.group.frame.T @ chosen.group.frame
+
+    def turned(element: Element) -> Element:
+        own = element.operations
+        matrices = tuple(turn @ m @ turn.T for m in own.matrices)
+        return replace(
+            element, center=center, operations=replace(own, direction=turn @ own.direction, matrices=matrices)
+        )
+
+    placed = Placed(group=on.group, center=center)
+    return replace(chosen, placed=placed, elements=tuple(turned(e) for e in chosen.elements))
 
 
 def _confidence(element: Element, links: Sequence[Hypothesis], decision: Decision) -> float:

@@ -50,6 +50,9 @@ def detection_record(
         **_answer(d),
         "at_least": bool(d.at_least),
         "outliers": {"count": len(d.outliers), "clumps": int(d.clumps), "share": number(d.outlier_share)},
+        "exact": None
+        if d.exact is None
+        else {"miss": number(d.exact.miss), "faces": d.exact.faces, "point_group": d.exact.point_group},
         "sample": None if d.sample is None else {"points": d.sample.points, "of": d.sample.of},
         "even_sample": d.even_sample,
         "planes": [
