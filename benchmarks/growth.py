@@ -185,6 +185,7 @@ def drawn(rows: Sequence[Row], path: Path = PICTURE) -> None:
     """The rows on logarithmic axes, a field for each quantity, with the power laws that fit them."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator
 
     names = list(dict.fromkeys(row.sweep for row in rows))
     figure = Figure(figsize=(4.2 * len(names), 3.8), layout="constrained")
@@ -197,7 +198,16 @@ def drawn(rows: Sequence[Row], path: Path = PICTURE) -> None:
                 slope, start = np.polyfit(np.log(row.sizes), np.log(row.seconds), 1)
                 axes.loglog(row.sizes, np.exp(start) * np.power(row.sizes, slope), ":", color=line.get_color())
         axes.set_xlabel(name)
-        axes.set_ylabel("processor time [s]")
+        # Powers of ten where there are some, else the sizes themselves.
+        sizes = sorted({size for r in rows if r.sweep == name for size in r.sizes})
+        if sizes[-1] < 100 * sizes[0]:
+            axes.set_xticks(sizes, labels=[f"{size:g}" for size in sizes])
+            axes.minorticks_off()
+        seconds = [s for r in rows if r.sweep == name for s in r.seconds]
+        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if max(seconds) < 100 * min(seconds) else (1,)))
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter("")
+        axes.set_ylabel("processor time [s]" if name == names[0] else "")
         axes.grid(which="both", alpha=0.25)
         axes.legend(fontsize=8)
     path.parent.mkdir(parents=True, exist_ok=True)
