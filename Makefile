@@ -6,6 +6,9 @@ PYTHON ?=
 # More for pytest, such as PYTEST_ARGS="-m slow" or PYTEST_ARGS="tests/test_axis.py -k phase".
 PYTEST_ARGS ?=
 
+# More for the benchmarks: BENCH_ARGS=--full goes to the ends of every range, in half an hour instead of minutes.
+BENCH_ARGS ?=
+
 VENV := .venv
 PY := $(VENV)/bin/python
 READY := $(VENV)/.ready
@@ -27,8 +30,8 @@ demo: $(READY) ## find, refine and show symmetries
 test: lint ## lint, then the test suite
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(PY) -m pytest -n 2 $(PYTEST_ARGS)
 
-bench: $(READY) ## measure against the stored baseline
-	@$(PY) -m benchmarks.run
+bench: $(READY) ## measure against the stored baseline, and how cost grows; BENCH_ARGS=--full: all of it
+	@$(PY) -m benchmarks.run $(BENCH_ARGS)
 
 reproduce: $(READY) ## the paper's experiments beside the baseline, in minutes; the report, the README's table
 	@$(PY) -m experiments.studies.reproduce

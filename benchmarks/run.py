@@ -1,19 +1,27 @@
-"""`make bench`: every benchmark beside its target and the stored figure (`--store` keeps them, `--gate` compares)."""
+"""`make bench`: every benchmark beside its target and the stored figure (`--store` keeps them, `--gate` compares).
+
+Some minutes; `--full` (`make bench BENCH_ARGS=--full`) goes to the ends of every range: 10,000,000 points in memory,
+100,000,000 in chunks, 1,000,000 faces, all objects, and peers as far as patience lasts.
+"""
 
 import argparse
 import sys
 
-from benchmarks import alignment, detection
+from benchmarks import alignment, detection, everyday, growth
 from benchmarks.metric import regressions, report, store
 
 
 def main() -> int:
     """Run, print, and return 1 if gated and something got slower."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--full", action="store_true", help="to the ends of every range, which takes half an hour")
     parser.add_argument("--store", action="store_true", help="keep these figures for later comparisons")
     parser.add_argument("--gate", action="store_true", help="fail where a figure is worse than the stored one")
     options = parser.parse_args()
-    found = [*detection.metrics(), *alignment.metrics()]
+    full = options.full
+    found = [
+        *detection.metrics(), *everyday.metrics(full=full), *growth.metrics(full=full), *alignment.metrics()
+    ]  # fmt: skip
     report(found)
     if options.store:
         store(found)

@@ -31,16 +31,18 @@ if TYPE_CHECKING:
     from symrefine.load import load as load
     from symrefine.load import load_depth as load_depth
     from symrefine.load import load_frames as load_frames
+    from symrefine.load import stream as stream
     from symrefine.ntuples.derive import derive as derive
     from symrefine.poses.canonicalizer import Canonicalizer as Canonicalizer
     from symrefine.poses.distance import symmetric_distance as symmetric_distance
     from symrefine.shape import Shape as Shape
+    from symrefine.stream import Stream as Stream
 
     __version__: str
 
 # Where each public name comes from.
 _HOMES = {
-    "symrefine.load": ("load", "load_frames", "load_depth"),
+    "symrefine.load": ("load", "load_frames", "load_depth", "stream"),
     "symrefine.front.verbs": ("detect", "align", "report"),
     "symrefine.front.made": ("symmetrize", "complete", "export"),
     "symrefine.front.space": ("Detection",),
@@ -53,6 +55,7 @@ _HOMES = {
     "symrefine.poses.canonicalizer": ("Canonicalizer",),
     "symrefine.poses.distance": ("symmetric_distance",),
     "symrefine.shape": ("Shape",),
+    "symrefine.stream": ("Stream",),
     "symrefine.geometry": ("Plane", "Axis"),
     "symrefine.groups": ("PointGroup", "point_group"),
     "symrefine.errors": ("SymrefineError", "InputError", "DegenerateShapeError"),

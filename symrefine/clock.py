@@ -7,7 +7,10 @@ from contextvars import ContextVar
 
 # Called with the name of a stage when it begins, and once more, with its seconds, when it has ended.
 Watcher = Callable[[str, float | None], None]
+# Called with how many points a stage has been through, and of how many.
+Counter = Callable[[int, int], None]
 _watcher: ContextVar[Watcher | None] = ContextVar("watcher", default=None)
+_counter: ContextVar[Counter | None] = ContextVar("counter", default=None)
 
 
 class Clock:
@@ -28,13 +31,21 @@ class Clock:
 
 
 @contextmanager
-def watched(by: Watcher) -> Iterator[None]:
-    """Tell `by` of every stage that any clock of this thread times meanwhile."""
-    token = _watcher.set(by)
+def watched(by: Watcher, *, counting: Counter | None = None) -> Iterator[None]:
+    """Tell `by` of every stage that any clock of this thread times meanwhile, and `counting` of points gone through."""
+    watcher, counter = _watcher.set(by), _counter.set(counting)
     try:
         yield
     finally:
-        _watcher.reset(token)
+        _watcher.reset(watcher)
+        _counter.reset(counter)
+
+
+def passed(points: int, of: int) -> None:
+    """Tell whoever wants to know how many points the stage that is under way has been through."""
+    counting = _counter.get()
+    if counting is not None:
+        counting(points, of)
 
 
 def _nobody(_stage: str, _seconds: float | None) -> None:

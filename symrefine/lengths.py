@@ -3,16 +3,18 @@
 import numpy as np
 
 from symrefine.detection.measure import Outliers, is_few
+from symrefine.detection.sketch import MANY, is_large, sampled, sketched
 from symrefine.errors import InputError
 from symrefine.geometry import LARGEST_TOLERANCE, Array, check_tolerance, tight_diagonal
 from symrefine.plane.outline import smallest_diagonal
 from symrefine.shape import Shape
+from symrefine.stream import Stream
 from symrefine.surface.sampling import sampling
 from symrefine.units import METRES, OF_FILE, read_length
 
 
 def relative_tolerance(
-    asked: float | str, shape: Shape, *, units: str | None = None, outliers: Outliers = "auto"
+    asked: float | str, shape: Shape | Stream, *, units: str | None = None, outliers: Outliers = "auto"
 ) -> float:
     """A tolerance as the fraction of the diagonal that detections take.
 
@@ -30,6 +32,8 @@ def relative_tolerance(
         if units is not None:
             raise InputError(f"units are {units!r}, for a tolerance with a unit, such as 0.5mm; {asked:g} has none")
         return float(asked)
+    if isinstance(shape, Stream):
+        shape = sketched(shape).sample if shape.count > MANY else shape.held()
     value, unit = read_length(asked)
     length = value if unit == OF_FILE else value * METRES[unit] / METRES[_unit(asked, shape, units)]
     diagonal = object_diagonal(shape, outliers=outliers)
@@ -72,7 +76,12 @@ def object_diagonal(shape: Shape, *, outliers: Outliers = "auto") -> float:
 
 
 def body(shape: Shape, *, outliers: Outliers = "auto") -> Array:
-    """The points [K, 3] of a shape without those that belong to no surface, if outliers are looked for ("auto")."""
+    """The points [K, 3] of a shape without those that belong to no surface, if outliers are looked for ("auto").
+
+    Of very many points a sample stands for all.
+    """
+    if is_large(shape):
+        shape = sampled(shape)
     points = heavy(shape)
     if shape.faces is not None or is_few(shape):
         return points

@@ -70,7 +70,7 @@ class Shape:
         if self.viewpoint is not None:
             object.__setattr__(self, "viewpoint", _viewpoint(self.viewpoint, points.shape, self.source))
         object.__setattr__(self, "measure", _measure(self.measure, self.faces, self.source))
-        if np.ptp(points, axis=0).max() == 0.0:
+        if (points[-1] == points[0]).all() and (points == points[0]).all():
             raise DegenerateShapeError(
                 f"{self.source}: all {len(points)} points coincide; a shape needs at least two distinct points"
             )
@@ -124,8 +124,8 @@ def _matrix(values: ArrayLike, name: str, source: str) -> Array:
         raise InputError(f"{source}: {name} have shape {array.shape}; expected [N, n] with n >= 2")
     if len(array) == 0:
         raise InputError(f"{source}: no {name}; expected at least two distinct points")
-    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
-    if bad.size:
+    if not np.isfinite(array).all():
+        bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
         raise InputError(
             f"{source}: {bad.size} of {len(array)} {name} hold NaN or infinity, the first in row {bad[0]}; "
             "remove those rows"

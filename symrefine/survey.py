@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from symrefine.detection.measure import is_few
+from symrefine.detection.sketch import is_large, sampled
 from symrefine.errors import DegenerateShapeError
 from symrefine.geometry import Array, ReadOnly
 from symrefine.lengths import heavy, object_diagonal
@@ -128,7 +129,7 @@ def survey(shape: Shape) -> Survey:
         repeated=len(shape.points) - len(places),
         spread=_spread(shape),
         mesh=None if shape.faces is None else _mesh(shape, shape.faces),
-        cloud=_cloud(heavy(shape)) if kind == "cloud" else None,
+        cloud=_cloud(shape) if kind == "cloud" else None,
         classes=None if shape.labels is None else tuple(np.unique(shape.labels, return_counts=True)[1].tolist()),
         viewpoints=np.empty((0, 3)) if shape.viewpoint is None else np.unique(shape.viewpoint, axis=0),
         normals=shape.normals is not None,
@@ -170,13 +171,16 @@ def _is_solid(shape: Shape) -> bool:
     return True
 
 
-def _cloud(points: Array) -> Cloud:
+def _cloud(shape: Shape) -> Cloud:
+    """How a cloud was sampled; of very many points a sample tells, in numbers of all."""
+    some = sampled(shape) if is_large(shape) else shape
+    points, each = heavy(some), len(shape.points) / len(some.points)
     found = sampling(points, np.random.default_rng(0), outliers=True)
     kept = points[found.kept]
     kept = (kept - kept.mean(axis=0)) / kept.std()
     return Cloud(
-        strays=len(found.strays),
-        clumps=tuple(len(clump) for clump in found.clumps),
+        strays=round(each * len(found.strays)),
+        clumps=tuple(round(each * len(clump)) for clump in found.clumps),
         parts=count_parts(kept, np.random.default_rng(0)),
         even=found.shares is None,
         volume=fills_volume(kept, Tree(kept), np.random.default_rng(0)),

@@ -16,9 +16,12 @@ from symrefine.errors import InputError, SymrefineError, about, meant, one_line
 if TYPE_CHECKING:
     from symrefine.load import Frames
     from symrefine.shape import Shape
+    from symrefine.stream import Stream
 
 # What is written for the path of a file that comes on stdin, and what it is called afterwards.
 STDIN, NAME = "-", "stdin"
+# Options that say what of a file is read, and how.
+_READING = ("intrinsics", "depth_scale", "mask", "viewpoint", "measure", "labels", "weights", "frame")
 # Objects of one file that are taken at once: their records, of some ten kilobytes each, are kept for one array.
 FRAMES = 10_000
 
@@ -97,13 +100,13 @@ class Object:
 
     file: str
     name: str
-    found: "Shape | Exception"
+    found: "Shape | Stream | Exception"
     frame: int | None = None
     frames: int = 1
     load_s: float = 0.0
 
     @property
-    def shape(self) -> "Shape":
+    def shape(self) -> "Shape | Stream":
         """Its shape.
 
         Raises:
@@ -114,7 +117,7 @@ class Object:
         return self.found
 
 
-def objects(names: Sequence[str], suffix: str | None, read: Callable[[str], "Frames[Shape]"]) -> Iterator[Object]:
+def objects(names: Sequence[str], suffix: str | None, read: Callable[[str], Any]) -> Iterator[Object]:
     """Every object in the files that names stand for, each read as it is asked for, by a function of a path.
 
     What cannot be read does not end the others. The file of stdin is there until the next object is asked for.
@@ -127,9 +130,9 @@ def objects(names: Sequence[str], suffix: str | None, read: Callable[[str], "Fra
             yield Object(file=name, name=name, found=error)
 
 
-def _objects_in(file: str, called: str, read: Callable[[str], "Frames[Shape]"]) -> Iterator[Object]:
+def _objects_in(file: str, called: str, read: Callable[[str], Any]) -> Iterator[Object]:
     """Every object in one file, which people call something else if it holds what came on stdin."""
-    frames: Frames[Shape] | None = None
+    frames: Any = None
     number = 0
     while frames is None or number < len(frames):
         clock = Clock()
@@ -148,7 +151,7 @@ def _objects_in(file: str, called: str, read: Callable[[str], "Frames[Shape]"]) 
         number += 1
 
 
-def _made(frames: "Frames[Shape]", number: int, file: str, called: str) -> "Shape | Exception":
+def _made(frames: Any, number: int, file: str, called: str) -> "Shape | Stream | Exception":
     """One of the shapes in a file, under the name that people call that, or why there is none."""
     try:
         with _called(file, called):
@@ -158,12 +161,18 @@ def _made(frames: "Frames[Shape]", number: int, file: str, called: str) -> "Shap
         return error
 
 
-def scans(path: str, options: dict[str, Any], **picture: Any) -> "Frames[Shape]":
-    """The objects in a file as `detection_options` say, and `picture`: all, or the one that they choose."""
-    from symrefine.load import Frames, load, load_depth, load_frames
+def scans(
+    path: str, options: dict[str, Any], *, in_chunks: bool = False, **picture: Any
+) -> "Frames[Any]":
+    """The objects in a file as `detection_options` say, and `picture`: all, or the one that they choose.
 
-    known = ("intrinsics", "depth_scale", "mask", "viewpoint", "measure", "labels", "weights", "frame")
-    said = {name: given for name in known if (given := options.get(name)) is not None}
+    With `in_chunks` a cloud that is too large to hold is a stream, if nothing but its coordinates is asked for.
+    """
+    from symrefine.load import Frames, load, load_depth, load_frames, stream_if_large
+
+    said = {name: given for name in _READING if (given := options.get(name)) is not None}
+    if in_chunks and not said and not any(picture.values()) and (large := stream_if_large(path)) is not None:
+        return Frames("clouds", 1, lambda _: large)
     depth = {name: said.pop(name) for name in ("depth_scale", "mask") if name in said}
     if "intrinsics" in said:
         camera = said.pop("intrinsics")
@@ -182,9 +191,9 @@ def scans(path: str, options: dict[str, Any], **picture: Any) -> "Frames[Shape]"
     return Frames(found.what, len(found), lambda k: _seen(found[k], viewpoint))
 
 
-def read_scan(path: str, options: dict[str, Any], **picture: Any) -> "Shape":
-    """The one shape in a file as `detection_options` say, and `picture`; with a camera, what that saw."""
-    frames = scans(path, options, **picture)
+def read_scan(path: str, options: dict[str, Any], *, in_chunks: bool = False, **picture: Any) -> Any:
+    """The one shape in a file as `detection_options` say, and `picture`; with a camera, what that saw; see `scans`."""
+    frames = scans(path, options, in_chunks=in_chunks, **picture)
     with about(path):
         frames.check(None)
     return frames[0]

@@ -19,11 +19,13 @@ class Doing:
 
     def __init__(self, text: str, steps: int = 0, done: int = 0) -> None:
         self.text, self.stage, self.steps, self.done, self.begun = text, "", steps, done, perf_counter()
+        self.points, self.entered = "", perf_counter()
         self.changed: Callable[[], None] = lambda: None
 
     def __str__(self) -> str:
         steps = f"{self.done} of {self.steps}" if self.steps > 1 else ""
-        return ", ".join(part for part in (f"{self.text}: {self.stage}" if self.stage else self.text, steps) if part)
+        doing = f"{self.text}: {self.stage}" if self.stage else self.text
+        return ", ".join(part for part in (doing, self.points, steps) if part)
 
     def advance(self) -> None:
         """One more step is done."""
@@ -37,11 +39,17 @@ class Doing:
 
     def watch(self, stage: str, seconds: float | None) -> None:
         """Follow the stages, and tell of each that has ended where that is asked for."""
-        name = stage.replace("_", " ")
-        self.stage = "" if seconds is not None else name
+        name, points = stage.replace("_", " "), self.points
+        self.stage, self.points, self.entered = "" if seconds is not None else name, "", perf_counter()
         self.changed()
         if seconds is not None and is_verbose():
-            aside(f"symrefine: {name} {seconds:.2f} s")
+            aside(f"symrefine: {name} {seconds:.2f} s" + (f", {points}" if points else ""))
+
+    def count(self, points: int, of: int) -> None:
+        """Follow the points that a stage goes through, and how fast it does."""
+        rate = points / max(perf_counter() - self.entered, 1e-9)
+        self.points = f"{points:,} of {of:,} points, {rate:,.0f} points/s"
+        self.changed()
 
 
 @contextmanager
@@ -71,7 +79,7 @@ def _shown(doing: Doing) -> Iterator[None]:
     if is_quiet():
         yield
         return
-    with _live(doing) if sys.stderr.isatty() else _every_ten_seconds(doing), watched(doing.watch):
+    with _live(doing) if sys.stderr.isatty() else _every_ten_seconds(doing), watched(doing.watch, counting=doing.count):
         yield
     if is_verbose():
         aside(f"symrefine: {doing.text} {perf_counter() - doing.begun:.2f} s in all")

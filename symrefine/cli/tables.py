@@ -10,7 +10,18 @@ from rich.table import Table
 from symrefine.cli.rows import inversions, percentage, seconds
 from symrefine.front.lines import handedness, map_rows
 from symrefine.groups import point_group
-from symrefine.picture.words import DOUBLETS, TUPLES, evened, kind_name, meaning, planar_meaning, taken_out, turns_name
+from symrefine.picture.words import (
+    DOUBLETS,
+    TUPLES,
+    evened,
+    exactly,
+    kind_name,
+    meaning,
+    planar_meaning,
+    sampled,
+    taken_out,
+    turns_name,
+)
 
 Record = dict[str, Any]
 
@@ -32,14 +43,20 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
     yield f"{record['source']}: {headline(record)}"
     yield f"n-tuples {TUPLES[record['ntuples']['kind']]}"
     yield _place(record)
+    if record["exact"]:
+        yield exactly(record["exact"]["miss"], record["exact"]["faces"], record["exact"]["point_group"])
     if record["classes"]:
         yield f"labels: {_count(record['classes']['count'], 'class', 'classes')}"
-    out = record["outliers"]
-    yield from filter(None, (taken_out(out["count"], out["share"], out["clumps"]), evened(record["even_sample"])))
+    out, sample = record["outliers"], record["sample"]
+    of = None if sample is None else (sample["points"], sample["of"])
+    told = taken_out(out["count"], out["share"], out["clumps"]), sampled(of), evened(record["even_sample"])
+    yield from filter(None, told)
     if record["at_least"]:
         yield partial(record)
     yield from _apart(*_spatial(record))
     yield ""
+    if record["verified"]:
+        yield _verified(record["verified"])
     if record["planes"] or record["axes"] or record["inversion"] or record["near_misses"]:
         yield "Offsets in units of the file, misses in % of the diagonal; axes go through the centre."
     if record["near_misses"]:
@@ -49,6 +66,15 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
     if record["staircase"]:
         yield f"Group by tolerance: {staircase(record)}"
     yield f"{_count(record['iterations'], 'iteration')}, {seconds(record)} s"
+
+
+def _verified(said: Record) -> str:
+    """What all points say, one by one."""
+    misses = ", ".join(f"{name} {100 * said['residual'][name]:.3f}" for name in _RESIDUALS)
+    return (
+        f"All {said['points']:,} points, with their noise, moved by the worst element: {misses} %; "
+        f"{said['beyond']:,} miss by more than any point may."
+    )
 
 
 def partial(record: Record) -> str:

@@ -91,7 +91,18 @@ def detection_options(args: argparse.Namespace) -> dict[str, Any]:
 
 def reading_options(args: argparse.Namespace) -> dict[str, Any]:
     """What was chosen of the options that say how points were taken and what of the file counts, where given."""
-    how = ("frame", "outliers", "viewpoint", "intrinsics", "depth_scale", "mask", "units", "labels", "weights")
+    how = (
+        "frame",
+        "outliers",
+        "viewpoint",
+        "intrinsics",
+        "depth_scale",
+        "mask",
+        "units",
+        "labels",
+        "weights",
+        "verify",
+    )
     return {name: given for name in how if (given := getattr(args, name, None)) is not None}
 
 

@@ -11,8 +11,10 @@ from symrefine.decide.chain import Pool, chain, explore
 from symrefine.decide.hypotheses import Hypothesis
 from symrefine.decide.posterior import BEYOND, Decision, Link, decide
 from symrefine.detection.measure import Measured, Outliers, doubt, gather, measure
+from symrefine.detection.result import Sample
+from symrefine.detection.sketch import Sketch, is_large, set_apart, sketched
 from symrefine.geometry import Array, check_tolerance
-from symrefine.shape import Shape
+from symrefine.shape import Index, Shape
 from symrefine.surface.misses import TOLERANCE, disc_distances
 from symrefine.surface.surface import Surface
 from symrefine.surface.tree import Tree
@@ -20,12 +22,25 @@ from symrefine.surface.tree import Tree
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Examined:
-    """What a decision is made from: the table of needs as a chain of groups, each inside the next, C1 first."""
+    """What a decision is made from: the table of needs as a chain of groups, each inside the next, C1 first.
+
+    Attributes:
+        measured: the shape, or the sample that stands for it.
+        surface: what judges.
+        pool: everything that was tried.
+        links: of the chain.
+        outliers: indices of the points that are no part of the object, ascending.
+        outlier_share: of all points.
+        sample: how many points stand for how many, if they stand for more than themselves.
+    """
 
     measured: Measured
     surface: Surface
     pool: Pool
     links: tuple[Hypothesis, ...]
+    outliers: Index
+    outlier_share: float
+    sample: Sample | None
 
     def decided(self, tolerance: float) -> Decision:
         """The likeliest group of the chain at a tolerance."""
@@ -51,7 +66,7 @@ class Examined:
 
 
 def examined(
-    shape: Shape,
+    shape: Shape | Sketch,
     *,
     outliers: Outliers = "auto",
     tolerance: float = TOLERANCE,
@@ -65,6 +80,9 @@ def examined(
     """
     for t in (tolerance, *ladder):
         check_tolerance(t)
+    if isinstance(shape, Shape) and is_large(shape):
+        with clock("pass"):
+            shape = sketched(shape, seed)
     examine = partial(_examined, shape, outliers, tolerance, ladder, seed, clock)
     found = examine(apart=True, blobs=False)
     apart = not _has_parts_apart(found, tolerance)
@@ -84,7 +102,7 @@ def _has_parts_apart(found: Examined, tolerance: float) -> bool:
 
 
 def _examined(
-    shape: Shape,
+    given: Shape | Sketch,
     outliers: Outliers,
     tolerance: float,
     ladder: Sequence[float],
@@ -94,8 +112,12 @@ def _examined(
     apart: bool,
     blobs: bool,
 ) -> Examined:
+    sketch = given if isinstance(given, Sketch) else None
+    shape = given.sample if isinstance(given, Sketch) else given
     with clock("moments"):
-        measured = measure(shape, outliers=outliers, apart=apart, blobs=blobs)
+        whole = sketch.moments if sketch is not None and sketch.seen else None
+        measured = measure(shape, outliers=outliers, apart=apart, blobs=blobs, whole=whole)
+        out, share = set_apart(measured, sketch, outliers=outliers == "auto")
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed), tolerance)
     with clock("search"):
@@ -103,7 +125,15 @@ def _examined(
         steps = [t for t in sorted({tolerance, *ladder}) if t >= tolerance and not doubt(measured, surface, t)]
         pool = explore(surface, evidence, steps[0]) if steps else Pool()
         links = chain(surface, pool, BEYOND * max((tolerance, *ladder)))
-    return Examined(measured=measured, surface=surface, pool=pool, links=links)
+    return Examined(
+        measured=measured,
+        surface=surface,
+        pool=pool,
+        links=links,
+        outliers=out,
+        outlier_share=share,
+        sample=None if sketch is None else Sample(points=len(sketch.picked), of=sketch.count),
+    )
 
 
 def _belongs(found: Examined, clump: Array, tolerance: float) -> bool:

@@ -86,10 +86,22 @@ class Measured:
         return fixed_subspace(self.vectors)
 
 
-def measure(shape: Shape, *, outliers: Outliers = "auto", apart: bool = True, blobs: bool = False) -> Measured:
+def measure(
+    shape: Shape,
+    *,
+    outliers: Outliers = "auto",
+    apart: bool = True,
+    blobs: bool = False,
+    whole: Moments | None = None,
+) -> Measured:
     """Moments to order 8 and the n-tuples of them, of the points that belong to the object.
 
-    `apart` says whether clumps apart from the body count as outliers, `blobs` whether those do that touch it.
+    Args:
+        shape: of which only some points may belong to the object.
+        outliers: "auto" or "none": whether any are set apart.
+        apart: whether clumps apart from the body count as outliers.
+        blobs: whether those do that touch it.
+        whole: moments of all the points that `shape` is a sample of; they count where no point is set apart.
 
     Raises:
         InputError: another word for outliers.
@@ -103,7 +115,7 @@ def measure(shape: Shape, *, outliers: Outliers = "auto", apart: bool = True, bl
     if shape.faces is None and shape.weights is not None and not shape.weights.all():
         massive = np.flatnonzero(shape.weights > 0)
         shape = part(shape, massive)  # points of no mass are no part of the object
-    count = len(shape.points)
+    count, every = len(shape.points), shape
     if shape.faces is None and not is_few(shape):
         auto = outliers == "auto"
         seen = sampling(shape.points, np.random.default_rng(0), outliers=auto, apart=apart, blobs=blobs)
@@ -116,7 +128,10 @@ def measure(shape: Shape, *, outliers: Outliers = "auto", apart: bool = True, bl
         elif len(seen.kept) < len(massive):
             shape = part(shape, seen.kept)
     classes = _classes(shape)
-    moments = _moments(shape, classes, parts=0 if is_few(shape) or shape.faces is not None else PARTS)
+    if whole is not None and shape is every:
+        moments = whole
+    else:
+        moments = _moments(shape, classes, parts=0 if is_few(shape) or shape.faces is not None else PARTS)
     vectors = ntuples(moments)
     return Measured(
         shape=shape,
@@ -217,15 +232,28 @@ def _classes(shape: Shape) -> Index | None:
     return classes if classes.any() else None
 
 
+def masses(shape: Shape) -> Array:
+    """Masses [N] of the points of a cloud, where each class has a density of its own."""
+    classes = _classes(shape)
+    return _mass(shape) if classes is None else _mass(shape) * _density(classes)
+
+
+def _mass(shape: Shape) -> Array:
+    return np.ones(len(shape.points)) if shape.weights is None else shape.weights
+
+
+def _density(classes: Index) -> Array:
+    """Densities of classes [N]: multiples of the golden ratio modulo 1 keep any number of them apart."""
+    return np.asarray(0.5 + np.modf(0.6180339887498949 * (classes + 1))[0])
+
+
 def _moments(shape: Shape, classes: Index | None, parts: int) -> Moments:
     """Moments of the shape in which each class has a density of its own, so that they know one class from another."""
     if classes is None:
         return shape_moments(shape, ORDER, parts=parts)
-    # Multiples of the golden ratio modulo 1 keep any number of classes apart.
-    density = 0.5 + np.modf(0.6180339887498949 * (classes + 1))[0]
     if shape.faces is None:
-        own = np.ones(len(shape.points)) if shape.weights is None else shape.weights
-        return shape_moments(replace(shape, weights=own * density), ORDER, parts=parts)
+        return shape_moments(replace(shape, weights=_mass(shape) * _density(classes)), ORDER, parts=parts)
+    density = _density(classes)
     nodes, weights = mesh_nodes(replace(shape, measure="surface"), ORDER)
     heavier = weights * np.repeat(density, len(weights) // len(density))
     return shape_moments(Shape(points=shape.points[0] + nodes, weights=heavier), ORDER)
@@ -305,5 +333,4 @@ def _cloud(
     if shape.faces is not None:
         points, normals, face = sample_surface(shape, 2 * SAMPLES, rng)
         return points, normals, np.ones(len(points)), None if classes is None else classes[face]
-    weights = np.ones(len(shape.points)) if shape.weights is None else shape.weights
-    return shape.points, shape.normals, weights, classes
+    return shape.points, shape.normals, _mass(shape), classes

@@ -82,6 +82,44 @@ class Candidate:
     excess: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sample:
+    """How many points, drawn at random, stand for the surface of a cloud, and of how many."""
+
+    points: int
+    of: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Exact:
+    """That the group maps the vertices of a mesh onto one another: planes, axes and centre are those of the vertices.
+
+    Attributes:
+        miss: largest distance of an image to its counterpart, a fraction of the diagonal; rounding alone leaves 1e-15.
+        faces: whether triangles are mapped onto triangles as well; if not, a triangulation chose its diagonals.
+        point_group: what does so: the group, or the fold that a continuous one has in the vertices.
+    """
+
+    miss: float
+    faces: bool
+    point_group: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verified:
+    """What all points say, which were moved one by one, with whatever noise they have.
+
+    Attributes:
+        points: how many.
+        residual: the largest of every statistic over all elements; misses end at 5.55 tolerances.
+        beyond: how many points, of that element of which most, miss by more than 1.85 tolerances.
+    """
+
+    points: int
+    residual: Deviation
+    beyond: int
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Detection(ReadOnly):
     """Everything `detect` found, in the frame and units of the input.
@@ -110,10 +148,14 @@ class Detection(ReadOnly):
         points: [M, 3] the points the refinement used, normalised units.
         surface: what judged all candidates: these points with normals, noise, and where nobody looked.
         candidates: what was proposed and given up before a full fit, the nearest misses first.
-        outliers: indices, ascending, of the points that were taken as no part of the object.
+        outliers: indices, ascending, of the points that were taken as no part of the object; of a stream among those of
+            its sample.
         at_least: whether the surface has open borders beyond which nobody looked: the object may have more symmetry.
         clumps: how many groups of them stand apart from the body, the others being single strays.
         outlier_share: of all points.
+        exact: that and how exactly the group maps vertices of a mesh onto vertices, if it does; None of anything else.
+        sample: what stands for the surface where there are too many points to look at all of them; None where all do.
+        verified: what all points say, where they were asked.
         even_sample: how many points, more evenly spread, it was decided by where the density falls off; None where by
             all.
         timings: seconds by stage; everything else is a function of the input and the options alone.
@@ -144,8 +186,11 @@ class Detection(ReadOnly):
     outliers: Index
     outlier_share: float
     clumps: int
+    exact: Exact | None
+    sample: Sample | None
     even_sample: int | None
     at_least: bool
     origin: Array
     scale: float
+    verified: Verified | None = None
     timings: dict[str, float] = field(default_factory=dict)

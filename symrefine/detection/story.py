@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,10 +12,13 @@ from symrefine.decide.chain import Pool
 from symrefine.decide.hypotheses import Element, Hypothesis
 from symrefine.decide.posterior import NEAR, Decision, alternatives
 from symrefine.detection.examination import Examined, examined
-from symrefine.detection.measure import Outliers
-from symrefine.detection.result import Candidate, Detection, FoundAxis, FoundPlane, NearMiss, Step
+from symrefine.detection.measure import Measured, Outliers
+from symrefine.detection.result import Candidate, Detection, Exact, FoundAxis, FoundPlane, NearMiss, Step
+from symrefine.detection.sketch import Sketch
 from symrefine.errors import InputError
+from symrefine.fit.placed import Placed
 from symrefine.fit.refine import Iterate
+from symrefine.fit.vertices import OnVertices, on_vertices
 from symrefine.geometry import Array, Axis, Plane, cross_matrix, positive
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
@@ -24,7 +28,7 @@ LADDER = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08)
 
 
 def detect(
-    shape: Shape | ArrayLike,
+    shape: Shape | Sketch | ArrayLike,
     *,
     weights: ArrayLike | None = None,
     normals: ArrayLike | None = None,
@@ -38,7 +42,8 @@ def detect(
     """Point group, mirror planes and rotation axes of an object in 3-space, with what it misses each of them by.
 
     Args:
-        shape: a `Shape`, or points [N, 3].
+        shape: a `Shape`, points [N, 3], or the `Sketch` of a cloud too large to hold; of a cloud of more than 100,000
+            points a sketch is made, too.
         weights: [N] masses of the points; not with a `Shape`, which carries its own. Of up to 250 points those of
             different mass are different things, which no symmetry exchanges; of more, masses are a sampling density.
         normals: [N, 3] normals, any sign; estimated where absent. Not with a `Shape`.
@@ -71,20 +76,20 @@ def told(found: Examined, *, tolerance: float = TOLERANCE, ladder: Sequence[floa
 
 
 def _given(
-    shape: Shape | ArrayLike,
+    shape: Shape | Sketch | ArrayLike,
     weights: ArrayLike | None,
     normals: ArrayLike | None,
     labels: ArrayLike | None,
     viewpoint: ArrayLike | None,
-) -> Shape:
+) -> Shape | Sketch:
     """The shape in 3-space."""
-    if not isinstance(shape, Shape):
+    if not isinstance(shape, Shape | Sketch):
         shape = Shape.of(shape, weights=weights, normals=normals, labels=labels, viewpoint=viewpoint)
     elif not (weights is None and normals is None and labels is None and viewpoint is None):
         raise InputError(
             "weights, normals, labels and viewpoint belong to the Shape; give them there, or give an array of points"
         )
-    if shape.dim != 3:
+    if isinstance(shape, Shape) and shape.dim != 3:
         raise InputError(f"{shape.source}: detect takes 3-D shapes; {_elsewhere(shape.dim)}")
     return shape
 
@@ -115,7 +120,9 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
     names, needs = [h.group.name for h in links], [h.need for h in links]
     told = alternatives(names, needs, decision, -1 if reason else index)
     history = chosen.history
-    outliers = np.sort(np.concatenate([measured.strays, *(indices for indices, _ in measured.clumps)]))
+    with clock("vertices"):
+        on = _on_vertices(measured, chosen)
+    chosen = chosen if on is None else _polished(chosen, on, measured)
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
     planes = [e for e in chosen.elements if e.operations.kind == "plane"]
     turns = [e for e in chosen.elements if e.operations.kind in ("axis", "improper")]
@@ -126,7 +133,7 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
         confidence=0.0 if reason else decision.probabilities[index],
         alternatives=tuple(told) if len(links) > 1 and not reason else (),
         group=chosen.group,
-        center=origin + scale * chosen.placed.center,
+        center=origin + scale * chosen.placed.center if on is None else on.center,
         planes=tuple(
             FoundPlane(
                 plane=_plane(e, origin, scale),
@@ -174,15 +181,41 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
             )
             for start, need in sorted((*found.pool.looked, *found.pool.hopeless), key=lambda k: k[1])
         ),
-        outliers=outliers,
-        outlier_share=len(outliers) / (len(outliers) + measured.count),
+        outliers=found.outliers,
+        outlier_share=found.outlier_share,
         at_least=found.pool.at_least and not reason,
         clumps=len(measured.clumps),
+        exact=None if on is None else Exact(miss=on.miss, faces=on.faces, point_group=on.finite.name),
+        sample=found.sample,
         even_sample=len(measured.shape.points) if len(measured.shape.points) < measured.count else None,
         origin=origin,
         scale=scale,
         timings=clock.seconds,
     )
+
+
+def _on_vertices(measured: Measured, chosen: Hypothesis) -> OnVertices | None:
+    """Where the vertices of a mesh put the group that was decided, if it maps them onto one another."""
+    if measured.shape.faces is None:
+        return None
+    origin, scale = measured.moments.center, measured.moments.scale
+    return on_vertices(measured.shape, chosen.group, origin + scale * chosen.placed.center)
+
+
+def _polished(chosen: Hypothesis, on: OnVertices, measured: Measured) -> Hypothesis:
+    """The group and its elements where the vertices put them, with the misses that decided."""
+    center = (on.center - measured.moments.center) / measured.moments.scale
+    turn = on.group.frame.T @ chosen.group.frame
+
+    def turned(element: Element) -> Element:
+        own = element.operations
+        matrices = tuple(turn @ m @ turn.T for m in own.matrices)
+        return replace(
+            element, center=center, operations=replace(own, direction=turn @ own.direction, matrices=matrices)
+        )
+
+    placed = Placed(group=on.group, center=center)
+    return replace(chosen, placed=placed, elements=tuple(turned(e) for e in chosen.elements))
 
 
 def _confidence(element: Element, links: Sequence[Hypothesis], decision: Decision) -> float:

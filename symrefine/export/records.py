@@ -48,6 +48,10 @@ def detection_record(
         **_answer(d),
         "at_least": bool(d.at_least),
         "outliers": {"count": len(d.outliers), "clumps": int(d.clumps), "share": number(d.outlier_share)},
+        "exact": None
+        if d.exact is None
+        else {"miss": number(d.exact.miss), "faces": d.exact.faces, "point_group": d.exact.point_group},
+        "sample": None if d.sample is None else {"points": d.sample.points, "of": d.sample.of},
         "even_sample": d.even_sample,
         "planes": [
             _placed(p.plane, scale) | _held(p) | {"sigma": _sigma(p.sigma_rad, "offset", p.sigma)} | _covered(p)
@@ -74,6 +78,13 @@ def detection_record(
             {"kind": m.kind, "direction": _direction(m.direction), "point": numbers(m.point, scale), **_turned_down(m)}
             for m in d.near_misses
         ],
+        "verified": None
+        if d.verified is None
+        else {
+            "points": d.verified.points,
+            "residual": _residual(d.verified.residual),
+            "beyond": d.verified.beyond,
+        },
         "iterations": int(d.iterations),
         "undetermined": d.undetermined or None,
         "ntuples": {"kind": d.tuples.kind} | _sizes(d.tuples),

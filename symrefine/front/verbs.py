@@ -1,8 +1,9 @@
 """What can be asked of any object, and told: `detect`, `align`, `report`."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from numpy.typing import ArrayLike
 
@@ -10,7 +11,9 @@ from symrefine.errors import InputError
 from symrefine.front.answers import Found, check_kind
 from symrefine.front.asked import seed_of, told
 from symrefine.lengths import relative_tolerance
-from symrefine.load.objects import shape_of
+from symrefine.load.objects import shape_of, stream_of
+from symrefine.shape import Shape
+from symrefine.stream import Stream
 from symrefine.surface.misses import TOLERANCE
 
 # Each verb imports what it needs when it is used: who detects waits for no alignment.
@@ -36,12 +39,17 @@ def detect(
     units: str | None = None,
     ladder: Sequence[float] | None = None,
     seed: int = 0,
+    verify: Literal["sample", "all"] = "sample",
 ) -> "Detected":
     """The symmetry of an object: point group, mirrors and turns, how sure it is, and what it misses each of them by.
 
+    The surface of a cloud of more than 100,000 points is known by a sample of them, its moments by all. A `Stream` is
+    read in chunks, as are files of more than 1,000,000 points where that can be done (see `symrefine.stream`); the
+    `shape` of the answer is that sample then.
+
     Args:
-        shape: a path, points [N, n], `(vertices, faces)`, a `Shape`, or a mesh, a cloud or a molecule of trimesh,
-            Open3D, pyvista, ASE, pymatgen or torch (see `symrefine.load.objects.shape_of`).
+        shape: a path, points [N, n], `(vertices, faces)`, a `Shape`, a `Stream`, or a mesh, a cloud or a molecule of
+            trimesh, Open3D, pyvista, ASE, pymatgen or torch (see `symrefine.load.objects.shape_of`).
         weights: [N] masses of the points. Of up to 250 points those of different mass are different things, which no
             symmetry exchanges; of more, masses are a sampling density.
         normals: [N, n] normals, any sign; estimated where absent.
@@ -54,6 +62,8 @@ def detect(
             None.
         ladder: other tolerances to tell the group at, in space; those of the command line if None.
         seed: of the random choices (samples of a mesh, subsets of a cloud).
+        verify: "all": of a cloud in space all points are moved, one by one, by every element that was found, and what
+            they miss by is told as `Detection.verified`; it takes microseconds for each point and element.
 
     Returns:
         A `Detection` of an object in 3-space, a `PlanarDetection` of a picture or of points [N, 2], a
@@ -63,20 +73,23 @@ def detect(
         InputError: what is no such object, or cannot be used; tolerances outside (0, 0.2].
         DegenerateShapeError: the points do not spread.
     """
-    shape = shape_of(shape, weights=weights, normals=normals, labels=labels, viewpoint=viewpoint)
+    if verify not in ("sample", "all"):
+        raise InputError(f"verify is {verify!r}; expected 'sample' or 'all'")
+    beside: dict[str, Any] = {"weights": weights, "normals": normals, "labels": labels, "viewpoint": viewpoint}
+    large = stream_of(shape) if all(given is None for given in beside.values()) else None
+    shape = shape_of(shape, **beside) if large is None else large
     used = relative_tolerance(tolerance, shape, units=units, outliers=outliers)
     options = told(tolerance, units) | {"seed": (seed := seed_of(seed))}
-    if shape.dim == 3:
+    if not isinstance(shape, Shape) or shape.dim == 3:
         from symrefine.detection import story
-        from symrefine.front.space import Detection
 
         steps = story.LADDER if ladder is None else tuple(ladder)
-        found = story.detect(shape, outliers=outliers, ladder=steps, tolerance=used, seed=seed)
-        return Detection.of(found, shape=shape, options=options | {"outliers": outliers})
+        return _detect_in_space(shape, options | {"outliers": outliers}, used, steps, verify)
     given = {
         "labels are": shape.labels is not None,
         "a ladder is": ladder is not None,
         "outliers are": outliers != "auto",
+        "verification is": verify != "sample",
     }
     for name in (name for name, is_given in given.items() if is_given):
         raise InputError(
@@ -91,6 +104,49 @@ def detect(
     from symrefine.ndim import detect_nd
 
     return SubspaceDetection.of(detect_nd(shape, tolerance=used, seed=seed), shape=shape, options=options)
+
+
+def _detect_in_space(
+    given: "Shape | Stream", options: dict[str, Any], tolerance: float, ladder: Sequence[float], verify: str
+) -> "Detection":
+    """What is found in a shape or a stream, verified by all points where that is asked for."""
+    from symrefine.clock import Clock
+    from symrefine.detection import story
+    from symrefine.detection.sketch import MANY, Sketch, sketched
+    from symrefine.front.space import Detection
+
+    clock, seed = Clock(), options["seed"]
+    if isinstance(given, Stream) and given.count <= MANY:
+        given = given.held()
+    looked_at: Shape | Sketch
+    if isinstance(given, Shape):
+        looked_at = shape = given
+    else:
+        with clock("pass"):
+            looked_at = sketched(given, seed)
+        shape = looked_at.sample
+    found = story.detect(looked_at, ladder=ladder, outliers=options["outliers"], tolerance=tolerance, seed=seed)
+    found = replace(found, timings=clock.seconds | found.timings)
+    if verify == "all":
+        found, options = _verified(found, given), options | {"verify": verify}
+    return Detection.of(found, shape=shape, options=options)
+
+
+def _verified(found: Any, given: "Shape | Stream") -> Any:
+    """A detection with what all points say.
+
+    Raises:
+        InputError: the shape is no cloud, or has labels.
+    """
+    from symrefine.detection.verification import verified
+
+    if isinstance(given, Stream):
+        return verified(found, given)
+    if given.faces is not None or found.surface.cloud.body == "atoms":
+        raise InputError(f"{given.source}: --verify all is for clouds; all of this was looked at, leave it out")
+    if given.labels is not None:
+        raise InputError(f"{given.source}: --verify all knows of no labels; leave one of the two out")
+    return verified(found, Stream.of(given.points))
 
 
 def detect_in_space(

@@ -41,12 +41,25 @@ from symrefine.load.ply import read_ply
 from symrefine.load.scans import read_e57, read_las
 from symrefine.load.step import read_step
 from symrefine.load.stl import read_stl
+from symrefine.load.stream import stream, stream_if_large
 from symrefine.load.tables import read_npy, read_npz, read_table, read_xyz
 from symrefine.load.threemf import read_3mf
 from symrefine.load.volume_files import read_mrc, read_nifti, read_nrrd
 from symrefine.shape import Shape
 
-__all__ = ["IMAGES", "READERS", "SUFFIXES", "Frames", "load", "load_depth", "load_frames", "stem_of", "suffix_of"]
+__all__ = [
+    "IMAGES",
+    "READERS",
+    "SUFFIXES",
+    "Frames",
+    "load",
+    "load_depth",
+    "load_frames",
+    "stem_of",
+    "stream",
+    "stream_if_large",
+    "suffix_of",
+]
 
 # A reader gets the bytes of a file, its path where others lie beside it or another program reads it, and what the
 # caller wants beyond coordinates. It says what is wrong, not in which file. Of formats that can hold several objects it

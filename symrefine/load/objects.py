@@ -14,7 +14,9 @@ from symrefine.load import load
 from symrefine.load.content import Content, Polygons, Values, as_float64, check_distinct, check_finite, polygons
 from symrefine.load.mesh import mesh_arrays
 from symrefine.load.scene import flattened
+from symrefine.load.stream import STREAMED, stream_if_large
 from symrefine.shape import Shape
+from symrefine.stream import Stream
 
 _EXPECTED = (
     "a path, points [N, n], (vertices, faces), a Shape, or a mesh, a cloud or a molecule of trimesh, Open3D, pyvista, "
@@ -72,6 +74,19 @@ def shape_of(
     with about(name):
         _check_size(points)
     return Shape(points, **told, source=name)
+
+
+def stream_of(given: Any) -> Stream | None:
+    """What is read in chunks: a stream, the path of a cloud too large to hold, an array mapped from a file; else None.
+
+    Raises:
+        InputError: what `symrefine.load.stream` refuses of a large file.
+    """
+    if isinstance(given, Stream):
+        return given
+    if isinstance(given, np.memmap) and given.ndim == 2 and given.shape[1] == 3 and len(given) > STREAMED:
+        return Stream.of(given, source=str(given.filename or "array"))
+    return stream_if_large(given) if isinstance(given, str | PathLike) else None
 
 
 def _check_size(points: Any) -> None:

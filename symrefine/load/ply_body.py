@@ -54,7 +54,7 @@ def _read_binary(data: bytes, header: Header) -> dict[str, Rows]:
         elif element.has_lists:
             rows[element.name], offset = _unequal_rows(data, offset, element, header.byte_order)
         else:
-            raise _cut_off(element, (len(data) - offset) // _record(element, header.byte_order, []).itemsize)
+            raise _cut_off(element, (len(data) - offset) // row_type(element, header.byte_order, []).itemsize)
     if offset != len(data):
         raise InputError(
             f"{count(len(data) - offset, 'byte')} behind {_declared(header)}; "
@@ -68,14 +68,14 @@ def _equal_rows(data: bytes, offset: int, element: Element, byte_order: str) -> 
     lengths: list[int] = []
     for p in element.properties if element.count else []:
         if p.length_type:
-            start = offset + _record(element, byte_order, lengths, until=p.name).itemsize
+            start = offset + row_type(element, byte_order, lengths, until=p.name).itemsize
             length = np.dtype(byte_order + p.length_type)
             if start + length.itemsize > len(data):
                 return None
             lengths.append(int(np.frombuffer(data, length, count=1, offset=start)[0]))
             if not 0 <= lengths[-1] <= len(data):
                 return None
-    record = _record(element, byte_order, lengths)
+    record = row_type(element, byte_order, lengths)
     if element.count * record.itemsize > len(data) - offset:
         return None
     table = np.frombuffer(data, record, count=element.count, offset=offset) if element.count else np.empty(0, record)
@@ -84,7 +84,7 @@ def _equal_rows(data: bytes, offset: int, element: Element, byte_order: str) -> 
     return table if equal else None
 
 
-def _record(element: Element, byte_order: str, lengths: list[int], until: str = "") -> np.dtype[np.void]:
+def row_type(element: Element, byte_order: str, lengths: list[int], until: str = "") -> np.dtype[np.void]:
     """Layout of a row, given the lengths of its lists; optionally of its part before one property."""
     fields: list[tuple[str, str, tuple[int, ...]]] = []
     remaining = iter(lengths)

@@ -56,7 +56,7 @@ def read_las(data: bytes) -> Content:
         data = _unpacked(data)
     try:
         with laspy.open(io.BytesIO(data)) as reader:
-            _check_size(reader.header, len(data))
+            check_room(reader.header, len(data))
             cloud = reader.read()
             points = np.array(cloud.xyz, dtype=np.float64)
             fields = _las_fields(cloud)
@@ -110,9 +110,11 @@ def _unpacked(data: bytes) -> bytes:
     return done.stdout
 
 
-def _check_size(header: Any, size: int) -> None:
+def check_room(header: Any, size: int) -> None:
     """Refuse counts that the file has no room for, or too much: laspy reads what there is."""
     points, each = int(header.point_count), int(header.point_format.size)
+    if header.are_points_compressed:
+        return
     behind = [
         int(getattr(header, name, 0) or 0) for name in ("start_of_first_evlr", "start_of_waveform_data_packet_record")
     ]

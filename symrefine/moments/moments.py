@@ -88,15 +88,19 @@ def monomials(points: Array, order: int) -> Array:
     return out
 
 
-def raw_moments(points: Array, weights: Array, order: int) -> Array:
-    """Raw moments [K] of points [N, n] with weights [N], in the order of `exponents(n, order)`."""
+def raw_moments(points: Array, weights: Array, order: int, *, width: int = BLOCK) -> Array:
+    """Raw moments [K] of points [N, n] with weights [N], in the order of `exponents(n, order)`.
+
+    `width` is how many points of a block are added up in one product.
+    """
     a, b, lead = _split(points.shape[1], order)
     total = np.zeros((a.max() + 1, b.max() + 1))
     for start in range(0, len(points), BLOCK):
         block = points[start : start + BLOCK]
-        left = monomials(block[:, :lead], order)
+        left, right = monomials(block[:, :lead], order), monomials(block[:, lead:], order)
         left *= weights[start : start + BLOCK]
-        total += left @ monomials(block[:, lead:], order).T
+        for k in range(0, len(block), width):
+            total += left[:, k : k + width] @ right[:, k : k + width].T
     return total[a, b]
 
 
@@ -242,14 +246,14 @@ def _jackknife(points: Array, weights: Array, order: int, parts: int) -> tuple[A
 
     Interleaving after a fixed shuffle keeps the parts alike even where the file orders its points.
     """
-    sums = np.stack([raw_moments(points[part], weights[part], order) for part in _deal(len(points), parts)])
+    sums = np.stack([raw_moments(points[part], weights[part], order) for part in dealt(len(points), parts)])
     total = sums.sum(axis=0)
     rest = total - sums
     return total, recentred(rest / rest[:, :1], points.shape[1], order)
 
 
 @lru_cache(maxsize=2)
-def _deal(count: int, parts: int) -> list[NDArray[np.int64]]:
+def dealt(count: int, parts: int) -> list[NDArray[np.int64]]:
     """Indices of the points of each part, dealt in turn after a fixed shuffle."""
     turn = np.random.default_rng(0).permutation(count) % parts
     return [np.flatnonzero(turn == part) for part in range(parts)]
@@ -278,8 +282,13 @@ def _binomials(dim: int, order: int) -> tuple[NDArray[np.int64], NDArray[np.int6
 
 def recentred(values: Array, dim: int, order: int) -> Array:
     """Moments [..., K] of unit mass, each set about its own mean instead of the origin."""
-    starts, kept, shifts, coefficients = _binomials(dim, order)
-    powers = monomials(values[..., 1 : dim + 1].reshape(-1, dim), order).T.reshape(values.shape)
+    return shifted(values, values[..., 1 : dim + 1], order)
+
+
+def shifted(values: Array, origin: Array, order: int) -> Array:
+    """Moments [..., K] set about another origin [..., n]."""
+    starts, kept, shifts, coefficients = _binomials(origin.shape[-1], order)
+    powers = monomials(origin.reshape(-1, origin.shape[-1]), order).T.reshape(values.shape)
     return np.asarray(np.add.reduceat(coefficients * values[..., kept] * powers[..., shifts], starts, axis=-1))
 
 

@@ -147,9 +147,11 @@ def body_name(body: str) -> str:
 
 
 def scanned(detection: Detection) -> str:
-    """What the points lack: outliers among them, parts that were not seen; empty where there is nothing to say."""
+    """What is to be said of the points: how exact vertices are, outliers, parts that were not seen; or nothing."""
     d = detection
-    told = taken_out(len(d.outliers), d.outlier_share, d.clumps), evened(d.even_sample)
+    of = None if d.sample is None else (d.sample.points, d.sample.of)
+    exact = "" if d.exact is None else exactly(d.exact.miss, d.exact.faces, d.exact.point_group)
+    told = exact, taken_out(len(d.outliers), d.outlier_share, d.clumps), sampled(of), evened(d.even_sample)
     unseen = "Parts of the surface were not seen: there may be more." if d.at_least else ""
     return " ".join(said for said in (*(f"{t[:1].upper()}{t[1:]}." for t in told if t), unseen) if said)
 
@@ -165,6 +167,20 @@ def taken_out(outliers: int, share: float, clumps: int) -> str:
     """How many points were taken as no part of the object, if any: `1,214 points (6 %) taken as outliers`."""
     among = f", {count(clumps, 'clump')} among them" if clumps else ""
     return f"{outliers:,} points ({percent(share)}) taken as outliers{among}" if outliers else ""
+
+
+def exactly(miss: float, faces: bool, group: str) -> str:
+    """How exactly vertices are mapped onto vertices, and whether triangles are onto triangles."""
+    if faces:
+        return f"exact to {miss:.1g} of the diagonal: {group} maps vertices onto vertices, triangles onto triangles"
+    return (
+        f"exact to {miss:.1g} of the diagonal in its vertices, which {group} maps onto one another; not its triangles"
+    )
+
+
+def sampled(sample: tuple[int, int] | None) -> str:
+    """How many points were looked at, and of how many, where that was not all of them."""
+    return "" if sample is None else f"the surface is known by {sample[0]:,} of {sample[1]:,} points, drawn at random"
 
 
 def evened(sample: int | None) -> str:

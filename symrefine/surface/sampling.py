@@ -195,6 +195,19 @@ def _alone(around: Surroundings) -> Mask:
     return found
 
 
+def strays_beside(points: Array, around: Surroundings) -> Mask:
+    """Which of further points [N, 3] are far from a surface that some are known of, and in no plane with them."""
+    far = FAR * np.median(around.reach)
+    found = np.asarray(around.tree.query(points, 1, skip=AROUND // 2 - 1)[0][:, 0] > far)
+    if not found.any():
+        return found
+    away, near = around.tree.query(points[found], AROUND)
+    mean, normals, variances = planes_of(around.points, near)
+    across = np.abs(np.einsum("ni,ni->n", normals, points[found] - mean))
+    found[found] = (thickness_of(variances) > FLAT) | (across > FLAT * away[:, -1])
+    return found
+
+
 def _scattered(points: Array, box: Array) -> bool:
     """Whether most of points [N, 3] lie no closer together than random ones in a box of these sides [3] would."""
     neighbours = AROUND // 2

@@ -12,9 +12,9 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
+from symrefine.fit.action import Action
 from symrefine.geometry import Array
 from symrefine.shape import Index
-from symrefine.symmetrize.action import Action
 
 # More points, or larger groups, than this are left alone: it costs their product for each orbit.
 LARGEST, LARGEST_GROUP = 1500, 240

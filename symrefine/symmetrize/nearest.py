@@ -13,13 +13,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from symrefine.errors import DegenerateShapeError, InputError
+from symrefine.fit.action import Action, act, generators, mean_back
+from symrefine.fit.finite import finite_group
 from symrefine.fit.placed import Placed
-from symrefine.geometry import Array, ReadOnly, orthogonal_factor, tight_diagonal, unit
+from symrefine.fit.vertices import NEAR, Distinct, on_vertices, settled, towards
+from symrefine.geometry import Array, ReadOnly, tight_diagonal, unit
 from symrefine.groups import PointGroup
 from symrefine.shape import Index, Shape
 from symrefine.surface.skin import FEW
-from symrefine.symmetrize.action import Action, act, generators, mean_back
-from symrefine.symmetrize.finite import finite_group
 from symrefine.symmetrize.leftover import with_leftovers
 from symrefine.symmetrize.surface import Closest, closest_on
 
@@ -27,13 +28,10 @@ from symrefine.symmetrize.surface import Closest, closest_on
 # much of the usual distance between points (RMS, and the worst), and in a mesh some of whose vertices have none each by
 # no more than so much of the distance to the next vertex: chance finds a nearest vertex for everything.
 REACH, SPACED, WORST, OWN = 3.0, 0.5, 1.5, 0.25
-# An exact shape misses the place that detection found by no more than this; more images than this are not looked up.
-EXACT, LARGEST = 2e-3, 5_000_000
 # Times that counterparts are looked for, each about a better place, as long as that many have one.
 MATCHINGS, FEWEST = 4, 4
-# Rounds that fit the group's place to the points, and how many points that takes on a surface.
-ROUNDS, FITTED = 30, 2000
-_STILL = 1e-15
+# Points that the group's place is fitted to on a surface.
+FITTED = 2000
 # Copies of a point this near (of the diagonal) are one point.
 _SAME = 1e-9
 # No operation of any group fixes this direction: it marks the sector that is copied.
@@ -110,25 +108,16 @@ def symmetrize(
 
 
 def exact_place(shape: Shape, group: PointGroup, center: Array) -> tuple[PointGroup, Array]:
-    """Where the group of a shape stands exactly, if its points or vertices have it exactly; else what was given.
+    """Where the group of a shape stands exactly, if its points or vertices nearly have it; else what was given.
 
-    Detection places a group by samples of the surface, to about 1e-4; points that correspond know it to rounding.
+    Detection has looked already where they have it to rounding (see `symrefine.fit.vertices`): that changes nothing.
 
     Args:
         group: as found in the shape.
         center: [3] as found, input units.
     """
-    if group.name == "C1" or group.symbol.family in ("K", "Kh"):
-        return group, center
-    work = _start(shape, center, group, copied=False, seed=0)
-    finite = work.place.group
-    if finite.order * len(work.rows) > LARGEST:
-        return group, center
-    action = act(work.points, finite.operations(), work.labels, EXACT)
-    if not action.closed.all():
-        return group, center
-    made = work.by_vertices(action)
-    return PointGroup(name=group.name, frame=made.group.frame), made.center
+    found = on_vertices(shape, group, center, within=NEAR)
+    return (group, center) if found is None else (found.group, found.center)
 
 
 def _corresponds(points: Array, action: Action, few: bool) -> bool:
@@ -137,15 +126,6 @@ def _corresponds(points: Array, action: Action, few: bool) -> bool:
         return bool(action.closed.all())
     spacing = float(np.median(cKDTree(points).query(points, k=2)[0][:, 1]))
     return bool(np.sqrt(np.mean(action.miss**2)) <= SPACED * spacing and action.miss.max() <= WORST * spacing)
-
-
-def _towards(place: Placed, points: Array, wanted: Array) -> tuple[Placed, float]:
-    """The place to which the best rigid motion from `points` to `wanted` [N, 3] belongs, and how far it turns."""
-    a, b = points.mean(axis=0), wanted.mean(axis=0)
-    turn = orthogonal_factor((wanted - b).T @ (points - a), proper=True)
-    center = a + turn.T @ (place.center - b)
-    step = float(np.abs(turn - np.eye(3)).max() + np.abs(center - place.center).max())
-    return Placed(group=PointGroup(name=place.group.name, frame=place.group.frame @ turn), center=center), step
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -167,13 +147,7 @@ class _Work:
 
     def by_vertices(self, action: Action) -> Symmetrized:
         """Points that correspond: means over orbits, about the place that moves them least."""
-        place = self.place
-        for _ in range(ROUNDS):
-            wanted = self._means(action, place)
-            nearer, step = _towards(place, self.points, wanted)
-            if step < _STILL:
-                break
-            place = nearer
+        place = settled(self.points, action.images, self.place)
         wanted = self._means(action, place)
         made = replace(
             self.shape,
@@ -237,7 +211,7 @@ class _Work:
         place = self.place
         some = self.points[:: max(1, len(self.points) // FITTED)]
         for _ in range(4):
-            place, _ = _towards(place, some, _on_symmetric_surface(some, place, closest))
+            place, _ = towards(place, some, _on_symmetric_surface(some, place, closest))
         return place, _on_symmetric_surface(self.points, place, closest)
 
     def _even_weights(self, action: Action) -> Array | None:
@@ -261,19 +235,16 @@ class _Work:
 def _start(shape: Shape, center: Array, group: PointGroup, *, copied: bool, seed: int) -> _Work:
     """The distinct points (and labels) of a shape, in units of the diagonal about the centre of its group."""
     diagonal = tight_diagonal(shape.points)
-    local = (shape.points - center) / diagonal
-    of_points = shape.labels if shape.faces is None else None
-    key = local if of_points is None else np.column_stack([local, of_points])
-    _, rows, back = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    own = Distinct.of(shape, center, diagonal)
     return _Work(
         shape=shape,
         center=center,
         diagonal=diagonal,
-        points=local[rows],
-        rows=rows,
-        back=back.reshape(-1),
-        labels=None if of_points is None else of_points[rows],
-        place=Placed(group=finite_group(group, local[rows], copied=copied), center=np.zeros(3)),
+        points=own.points,
+        rows=own.rows,
+        back=own.back,
+        labels=own.labels,
+        place=Placed(group=finite_group(group, own.points, copied=copied), center=np.zeros(3)),
         rng=np.random.default_rng(seed),
     )
 
@@ -287,7 +258,7 @@ def _counterparts(work: _Work, reach: float) -> tuple[_Work, Action]:
         if action.closed.all() or action.closed.sum() < FEWEST:
             break
         wanted = place.center + action.mean(points - place.center, operations)
-        place, _ = _towards(place, points[action.closed], wanted[action.closed])
+        place, _ = towards(place, points[action.closed], wanted[action.closed])
     action = with_leftovers(points - place.center, place.group.operations(), action, work.labels, reach)
     return replace(work, place=place), action
 

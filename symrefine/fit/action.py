@@ -51,6 +51,32 @@ def act(points: Array, operations: Array, labels: Index | None, reach: float) ->
     return Action(images=images, closed=closed, miss=miss)
 
 
+def permutations(points: Array, operations: Array, labels: Index | None, reach: float) -> Index | None:
+    """Counterparts [K, N] of points that every operation permutes, up to `reach` away; None where one does not.
+
+    Only generators are looked up, the others follow from them.
+    """
+    tree, shifted = _labelled(points, labels)
+    images = np.empty((len(operations), len(points)), dtype=np.intp)
+    images[0] = np.arange(len(points))
+    known, found = [0], []
+    for h, table in generators(operations):
+        distance, own = tree.query(np.column_stack([points @ operations[h].T, shifted]))
+        if distance.max() > reach or not (np.bincount(own, minlength=len(points)) == 1).all():
+            return None
+        found.append((table, own))
+        waiting = list(known)
+        while waiting:
+            g = waiting.pop()
+            for table, own in found:
+                product = int(table[g])
+                if product not in known:
+                    images[product] = images[g][own]
+                    known.append(product)
+                    waiting.append(product)
+    return images
+
+
 def _labelled(points: Array, labels: Index | None) -> tuple[cKDTree, Array]:
     """A kd-tree in which other labels are far away, and the coordinate that makes them so."""
     size = 0.0 if labels is None else 4.0 * float(np.abs(points).max())

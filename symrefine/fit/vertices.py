@@ -1,0 +1,176 @@
+"""Vertices that a group maps onto vertices: they know its place to rounding, where samples know it to 1e-4.
+
+Exact or not is a matter of vertices, not of samples: all of them are asked, and, of a mesh, whether its triangles are
+mapped onto triangles as well. The same fit places the group for reports, exports and the nearest symmetric shape.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from symrefine.fit.action import generators, mean_back, permutations
+from symrefine.fit.finite import finite_group
+from symrefine.fit.placed import Placed
+from symrefine.geometry import Array, orthogonal_factor, tight_diagonal
+from symrefine.groups import PointGroup
+from symrefine.shape import Index, Shape
+
+# Rounds that fit a group's place to points that correspond, the step that counts as none, and that from which on steps
+# which no longer shrink are rounding.
+ROUNDS, STILL, ROUNDING = 30, 1e-15, 1e-12
+# An exact shape misses the place that detection found by no more than this; more images than this are not looked up.
+NEAR, LARGEST = 2e-3, 5_000_000
+# A shape is exact where no vertex misses its counterpart by more than what rounding to five digits leaves.
+ROUNDED = 1e-5
+# Vertices that are asked first, and rounds of these: where they have no counterparts the others are not asked.
+ASKED, GLANCES = 200, 6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Distinct:
+    """The distinct points (and labels) of a shape, in units of a diagonal about a centre.
+
+    `rows` [M] are those of the distinct points in the shape, `back` [N] tells which of them each point is.
+    """
+
+    points: Array
+    rows: Index
+    back: Index
+    labels: Index | None
+
+    @classmethod
+    def of(cls, shape: Shape, center: Array, diagonal: float) -> "Distinct":
+        """The labels of a cloud tell points apart, those of a mesh are of its faces."""
+        local = (shape.points - center) / diagonal
+        labels = shape.labels if shape.faces is None else None
+        key = local if labels is None else np.column_stack([local, labels])
+        _, rows, back = np.unique(key, axis=0, return_index=True, return_inverse=True)
+        return cls(
+            points=local[rows],
+            rows=rows,
+            back=back.reshape(-1),
+            labels=None if labels is None else labels[rows],
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OnVertices:
+    """Where the points of a shape put its group, which maps them onto one another.
+
+    Attributes:
+        group: where it stands.
+        center: [3] the point that its operations leave in place, input units.
+        finite: the operations that map the points: all of the group, or the fold that a continuous one has in them.
+        miss: the largest distance of an image to its counterpart, as a fraction of the diagonal.
+        faces: whether triangles are mapped onto triangles, with their labels; true where there are none.
+    """
+
+    group: PointGroup
+    center: Array
+    finite: PointGroup
+    miss: float
+    faces: bool
+
+
+def on_vertices(shape: Shape, group: PointGroup, center: Array, *, within: float = ROUNDED) -> OnVertices | None:
+    """Where the points of a shape, the vertices of a mesh, put its group, if it maps them onto one another.
+
+    Args:
+        shape: in 3-space.
+        group: as found in the shape; its place may be off by some thousandths of the diagonal.
+        center: [3] as found, input units.
+        within: by what fraction of the diagonal an image may miss its counterpart.
+
+    Returns:
+        None where some points have no counterpart, for C1, for all of space (K, Kh), and where there are too many
+        points for so many operations.
+    """
+    if group.name == "C1" or group.symbol.family in ("K", "Kh"):
+        return None
+    diagonal = tight_diagonal(shape.points)
+    own = Distinct.of(shape, center, diagonal)
+    place = Placed(group=finite_group(group, own.points, copied=False), center=np.zeros(3))
+    if place.group.order * len(own.rows) > LARGEST:
+        return None
+    glanced = _glanced(own, place, within)
+    if glanced is None:
+        return None
+    images = permutations(own.points - glanced.center, glanced.group.operations(), own.labels, NEAR)
+    if images is None:
+        return None
+    place = settled(own.points, images, glanced)
+    miss = _largest_miss(own.points - place.center, place.group.operations(), images)
+    if miss > within:
+        return None
+    return OnVertices(
+        group=PointGroup(name=group.name, frame=place.group.frame),
+        center=center + diagonal * place.center,
+        finite=place.group,
+        miss=miss,
+        faces=_maps_faces(shape, own.back, place.group.operations(), images),
+    )
+
+
+def settled(points: Array, images: Index, place: Placed) -> Placed:
+    """The place that moves points [N, 3] least, given the counterparts [K, N] of each under each operation."""
+    last = np.inf
+    for _ in range(ROUNDS):
+        local = points - place.center
+        wanted = place.center + mean_back((local[image] for image in images), place.group.operations())
+        nearer, step = towards(place, points, wanted)
+        if step < STILL or last <= step < ROUNDING:
+            break
+        place, last = nearer, step
+    return place
+
+
+def towards(place: Placed, points: Array, wanted: Array) -> tuple[Placed, float]:
+    """The place to which the best rigid motion from `points` to `wanted` [N, 3] belongs, and how far it turns."""
+    a, b = points.mean(axis=0), wanted.mean(axis=0)
+    turn = orthogonal_factor((wanted - b).T @ (points - a), proper=True)
+    center = a + turn.T @ (place.center - b)
+    step = float(np.abs(turn - np.eye(3)).max() + np.abs(center - place.center).max())
+    return Placed(group=PointGroup(name=place.group.name, frame=place.group.frame @ turn), center=center), step
+
+
+def _glanced(own: Distinct, place: Placed, within: float) -> Placed | None:
+    """The place that some of the points know already, if they have counterparts; several rounds, as none is matched."""
+    some = own.points[:: max(1, len(own.points) // ASKED)]
+    if len(some) == len(own.points):
+        return place
+    tree = cKDTree(own.points)
+    for _ in range(GLANCES):
+        operations, local = place.group.operations(), some - place.center
+        found = [tree.query(local @ g.T + place.center) for g in operations]
+        miss = max(float(distance.max()) for distance, _ in found)
+        if miss > NEAR:
+            return None
+        if miss <= within:
+            return place
+        back = [(own.points[near] - place.center) @ g for (_, near), g in zip(found, operations, strict=True)]
+        place, _ = towards(place, some, place.center + np.mean(back, axis=0))
+    # Noise of the vertices themselves is for all of them to judge.
+    return place if miss <= 2.0 * within else None
+
+
+def _largest_miss(points: Array, operations: Array, images: Index) -> float:
+    """Largest distance of an image of points [N, 3] about the centre to its counterpart."""
+    pairs = zip(operations, images, strict=True)
+    return max(float(np.linalg.norm(points @ g.T - points[image], axis=1).max()) for g, image in pairs)
+
+
+def _maps_faces(shape: Shape, back: Index, operations: Array, images: Index) -> bool:
+    """Whether triangles, each as often as it is there, are mapped onto triangles of the same label."""
+    if shape.faces is None:
+        return True
+    labels = np.zeros(len(shape.faces), dtype=np.int64) if shape.labels is None else shape.labels
+    own = _in_order(back[shape.faces], labels)
+    moved = (images[h][back[shape.faces]] for h, _ in generators(operations))
+    return all(bool((_in_order(faces, labels) == own).all()) for faces in moved)
+
+
+def _in_order(faces: Index, labels: Index) -> Index:
+    """Triangles with their labels [F, 4], as sets of corners, in one order."""
+    rows = np.column_stack([np.sort(faces, axis=1), labels])
+    return rows[np.lexsort(rows.T)]

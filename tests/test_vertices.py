@@ -1,0 +1,169 @@
+"""Meshes whose vertices a group maps onto one another: told so, in any pose and unit, and the same by every way out."""
+
+import numpy as np
+import pytest
+
+import symrefine
+from experiments.objects.group_shapes import DESIGNS
+from experiments.objects.group_shapes import shape as mesh_of
+from experiments.objects.parts import placed_group
+from experiments.objects.shapes import bottle, sample, table
+from symrefine.cli.tables import record_lines
+from symrefine.export.bop import decided
+from symrefine.fit.vertices import NEAR, ROUNDED, on_vertices
+from symrefine.geometry import random_orthogonal, rotation
+from symrefine.groups import PointGroup
+from symrefine.shape import Shape
+from symrefine.symmetrize import exact_place
+
+# Tessellated as symmetrically as they are built: the shafts of others have 48 sides, whatever the number of blades.
+EXACT = (
+    *("chair", "skew_box", "fan2", "fan8", "stool8", "gear12", "rotor3", "swirl4", "propeller3", "crossed4"),
+    *("caltrop", "snub_balls", "cube", "bossed_cube"),
+)
+WITH_FACES, WITHOUT = ("fan8", "caltrop", "cube"), ("chair", "gear12", "bossed_cube")
+BROKEN = ("fan5", "wheel7", "crossed5")
+
+
+def posed(name, seed=0, scale=1.0, away=0.0):
+    """A mesh in a pose, vertices and faces in another order, and its group as far off as samples leave it."""
+    mesh, (group, center) = mesh_of(name), placed_group(DESIGNS[name].parts())
+    rng = np.random.default_rng(seed)
+    turn, order = random_orthogonal(rng), rng.permutation(len(mesh.points))
+    there = away * rng.standard_normal(3)
+    faces = rng.permutation(np.argsort(order)[mesh.faces])
+    shape = Shape(scale * (mesh.points[order] @ turn.T + there), faces)
+    off = rotation([0.3, -0.5, 0.8], 2e-4)
+    near = PointGroup(name=group.name, frame=group.frame @ turn.T @ off)
+    truth = PointGroup(name=group.name, frame=group.frame @ turn.T)
+    return shape, near, scale * (turn @ center + there + 1e-4 * mesh.diagonal), truth
+
+
+@pytest.mark.parametrize("name", EXACT)
+@pytest.mark.parametrize(("scale", "away"), [(1.0, 0.0), (1e-3, 3.0), (1e4, 100.0)])
+def test_vertices_know_the_place_of_their_group_to_rounding(name, scale, away):
+    shape, near, center, truth = posed(name, len(name), scale, away)
+    found = on_vertices(shape, near, center)
+    rounding = 1e-14 * (1.0 + away)
+    assert found is not None
+    assert found.miss < rounding
+    assert found.group.distance_rad(truth.operations()).max() < 1e3 * rounding
+    moved = np.einsum("kij,nj->kni", found.finite.operations(), shape.points - found.center) + found.center
+    nearest = np.linalg.norm(moved[-1][:, None] - shape.points, axis=2).min(axis=1)
+    assert nearest.max() < 10.0 * rounding * shape.diagonal
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_tessellation_that_breaks_the_symmetry_is_not_exact(name):
+    shape, near, center, _ = posed(name)
+    assert on_vertices(shape, near, center) is None
+
+
+@pytest.mark.parametrize("name", [*WITH_FACES, *WITHOUT])
+def test_triangles_are_told_from_vertices(name):
+    """A square that is cut along a diagonal maps its corners onto its corners, but no triangle onto a triangle."""
+    shape, near, center, _ = posed(name)
+    found = on_vertices(shape, near, center)
+    assert found is not None
+    assert found.faces == (name in WITH_FACES)
+    turned_round = Shape(shape.points, shape.faces[:, ::-1])
+    assert on_vertices(turned_round, near, center).faces == found.faces
+
+
+@pytest.mark.parametrize("name", WITH_FACES)
+def test_doubled_faces_are_exact_only_if_all_are_doubled(name):
+    shape, near, center, _ = posed(name)
+    twice = Shape(shape.points, np.concatenate([shape.faces, shape.faces]))
+    assert on_vertices(twice, near, center).faces
+    one_twice = Shape(shape.points, np.concatenate([shape.faces, shape.faces[:1]]))
+    assert not on_vertices(one_twice, near, center).faces
+    split = Shape(
+        np.concatenate([shape.points, shape.points]), np.concatenate([shape.faces, shape.faces + len(shape.points)])
+    )
+    assert on_vertices(split, near, center).faces
+
+
+def test_labels_of_faces_count():
+    shape, near, center, _ = posed("cube")
+    alike = Shape(shape.points, shape.faces, labels=np.full(len(shape.faces), 7))
+    assert on_vertices(alike, near, center).faces
+    one_other = Shape(shape.points, shape.faces, labels=(np.arange(len(shape.faces)) == 3).astype(int))
+    assert not on_vertices(one_other, near, center).faces
+
+
+@pytest.mark.parametrize("name", ["chair", "fan8", "caltrop"])
+def test_noise_of_vertices_is_told_or_too_much(name):
+    shape, near, center, _ = posed(name)
+    size, rng = shape.diagonal, np.random.default_rng(1)
+    one = np.unique(shape.points, axis=0, return_inverse=True)[1].ravel()  # parts that touch share places
+    for noise in (1e-7, 1e-3):
+        noisy = Shape(shape.points + noise * size * rng.standard_normal(shape.points.shape)[one], shape.faces)
+        found = on_vertices(noisy, near, center)
+        if noise < ROUNDED:
+            assert noise < found.miss < 20.0 * noise
+        else:
+            assert found is None
+    place = exact_place(shape, near, center)
+    bent = shape.points.copy()
+    bent[5] += 0.2 * NEAR * size
+    moved = Shape(bent, shape.faces)
+    assert on_vertices(moved, near, center) is None
+    # What exports may still place by its vertices.
+    assert np.linalg.norm(exact_place(moved, near, center)[1] - place[1]) < NEAR * size
+
+
+def test_what_has_no_group_or_all_of_space_is_not_looked_at():
+    assert on_vertices(table(), PointGroup(name="C1"), np.zeros(3)) is None
+    assert on_vertices(table(), PointGroup(name="Kh"), np.zeros(3)) is None
+
+
+def test_a_lathed_mesh_has_the_fold_of_its_rings():
+    shape = bottle()
+    tilted = PointGroup(name="Cinfv", frame=rotation([1.0, 0.4, 0.0], 1e-4))
+    found = on_vertices(shape, tilted, shape.points.mean(axis=0) + 1e-4)
+    assert found is not None
+    assert found.group.name == "Cinfv"
+    assert found.finite.is_finite
+    assert found.miss < 1e-14
+    np.testing.assert_allclose(np.abs(found.group.frame[2]), [0.0, 0.0, 1.0], atol=1e-13)
+
+
+@pytest.mark.parametrize("name", ["chair", "fan8", "caltrop"])
+def test_report_nearest_shape_and_export_agree_to_the_last_digit(name):
+    shape, _, _, truth = posed(name, 3, 40.0, 2.0)
+    found = symrefine.detect(shape)
+    assert found.point_group == DESIGNS[name].group
+    assert found.exact is not None
+    assert found.exact.miss < 1e-13
+    size = found.diagonal
+    made = symrefine.symmetrize(shape, found)
+    assert made.largest < 1e-13
+    group, center = decided(found, shape)
+    for other, there in ((made.group, made.center), (group, center)):
+        np.testing.assert_allclose(other.operations(), found.group.operations(), atol=1e-12)
+        np.testing.assert_allclose(there, found.center, atol=1e-12 * size)
+    assert found.group.distance_rad(truth.operations()).max() < 1e-11
+    for plane in found.planes:
+        moved = plane.plane.reflect(shape.points)
+        assert np.linalg.norm(moved[:, None] - shape.points, axis=2).min(axis=1).max() < 1e-12 * size
+    for turn in found.axes:
+        matrix = rotation(turn.axis.direction, 2.0 * np.pi / turn.order)
+        if not turn.improper:
+            moved = (shape.points - turn.axis.point) @ matrix.T + turn.axis.point
+            assert np.linalg.norm(moved[:, None] - shape.points, axis=2).min(axis=1).max() < 1e-12 * size
+
+
+def test_the_record_and_the_table_say_how_exact():
+    found = symrefine.detect(table())
+    record = found.to_dict()
+    assert record["exact"]["miss"] < 1e-14
+    assert record["exact"] | {"miss": 0.0} == {"miss": 0.0, "faces": False, "point_group": "C4v"}
+    told = "\n".join(line for line in record_lines(record) if isinstance(line, str))
+    assert "of the diagonal in its vertices, which C4v maps onto one another" in told
+
+
+def test_noisy_meshes_and_clouds_are_not_exact():
+    mesh, rng = table(), np.random.default_rng(0)
+    noisy = Shape(mesh.points + 1e-3 * mesh.diagonal * rng.standard_normal(mesh.points.shape), mesh.faces)
+    assert symrefine.detect(noisy).exact is None
+    assert symrefine.detect(sample(mesh, 3000, 0.0, rng)).exact is None
