@@ -391,7 +391,7 @@ def test_complete_marks_what_it_inferred(scans, capsys):
         assert made["inferred"].sum() == record["inferred"] > 1000
         assert len(made["points"]) == record["seen"] + record["inferred"]
     assert invoke(["complete", str(scans / "cut.xyz"), "-o", str(scans / "full.ply")]) == 0
-    assert "points seen" in capsys.readouterr().out
+    assert "points where nobody looked" in capsys.readouterr().out
     again = load(scans / "full.ply", labels="inferred")
     assert again.labels.sum() == record["inferred"]
 

@@ -6,6 +6,7 @@ into the page. Takes a minute; but for the seconds that the commands take, the s
 
 import argparse
 import io
+import re
 import shlex
 import subprocess
 import sys
@@ -193,7 +194,8 @@ def said(command: str, folder: Path) -> str:
     done = subprocess.run(
         [sys.executable, "-m", name, *arguments], cwd=folder, capture_output=True, text=True, check=True
     )
-    return done.stdout.partition("\n\n")[0].strip()
+    # Seconds would differ from one building to the next.
+    return re.sub(r"; [0-9.e+]+ s$", "", done.stdout.partition("\n\n")[0].strip(), flags=re.MULTILINE)
 
 
 def painted(path: Path) -> bytes:
