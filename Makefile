@@ -16,7 +16,7 @@ LOG := .make/setup.log
 SHELL := /bin/sh
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test bench reproduce docs wheel lint lock clean
+.PHONY: help setup demo test bench fuzz reproduce docs wheel lint lock clean
 
 help: ## what each target does
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST)
@@ -32,6 +32,9 @@ test: lint ## lint, then the test suite
 
 bench: $(READY) ## measure against the stored baseline, and how cost grows; BENCH_ARGS=--full: all of it
 	@$(PY) -m benchmarks.run $(BENCH_ARGS)
+
+fuzz: $(READY) ## damage 100,000 files of every format, configs and command lines, and read them
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m experiments.studies.fuzz
 
 reproduce: $(READY) ## the paper's experiments beside the baseline, in minutes; the report, the README's table
 	@$(PY) -m experiments.studies.reproduce

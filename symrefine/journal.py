@@ -62,7 +62,7 @@ def opened(path: Path, keys: Sequence[str], *, busy: str, rows_of: str, other: s
         try:
             rows = [json.loads(line) for line in whole]
             [row[key] for row in rows for key in keys]
-        except (ValueError, KeyError) as error:
+        except (ValueError, KeyError, RecursionError) as error:
             raise InputError(f"{path}: is damaged: {error}; name {other}") from None
         if rest:
             os.ftruncate(stream.fileno(), len(data) - len(rest))

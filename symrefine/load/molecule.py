@@ -76,6 +76,8 @@ def _frames(lines: dict[int, str], last: int) -> list[tuple[Line, list[Line]]]:
     frames = []
     head = 1
     while head <= last:
+        if not NATURAL.fullmatch(lines[head]):
+            raise InputError(f"line {head}: {shorten(lines[head])}; expected the number of atoms, alone")
         size = int(lines[head])
         atoms = range(head + 2, head + 2 + size)
         missing = next((line for line in atoms if line not in lines), None)

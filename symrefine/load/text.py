@@ -140,7 +140,8 @@ def parse_numbers(line: Line, layout: str) -> list[float]:
             return [float(field) for field in fields]
     except ValueError:
         pass
-    column, field = next((k, field) for k, field in enumerate(fields, start=1) if not is_number(field))
+    wrong = ((k, field) for k, field in enumerate(fields, start=1) if not is_number(field))
+    column, field = next(wrong, (1, text))  # all are numbers where white space between them is none of ASCII
     raise InputError(f"line {number}, column {column}: {shorten(field)} is not a number; expected {layout}")
 
 

@@ -107,6 +107,9 @@ def read_mrc(data: bytes, wanted: Wanted) -> Frames[Content]:
         raise InputError(
             f"has {' x '.join(map(str, sizes[0]))} voxels, which {len(data)} bytes cannot hold; not a MRC file?"
         )
+    extended = min(abs(int.from_bytes(data[92:96], order, signed=True)) for order in ("little", "big"))
+    if extended > len(data):
+        raise InputError(f"has an extended header of {extended} bytes, which {len(data)} cannot hold; not a MRC file?")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
