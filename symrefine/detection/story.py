@@ -67,7 +67,25 @@ def told(found: Examined, *, tolerance: float = TOLERANCE, ladder: Sequence[floa
     with clock("decide"):
         decision = found.decided(tolerance)
         steps = tuple(_step(found, t) for t in sorted(ladder))
-    return _report(found, decision, tolerance, steps, clock)
+    reason = found.doubt(tolerance)
+    return _report(found, decision, 0 if reason else decision.index, reason, tolerance, steps, clock.seconds)
+
+
+def chosen(detection: Detection, point_group: str) -> Detection:
+    """What is told if a person says that another group of the chain is meant: its elements, where it fits best.
+
+    Args:
+        point_group: Schoenflies symbol, one of those in `Detection.choices`.
+
+    Raises:
+        InputError: no group of the chain.
+    """
+    found, tolerance = detection.examined, detection.tolerance
+    names = [link.group.name for link in found.links]
+    if point_group not in names:
+        raise InputError(f"point_group is {point_group!r}; expected one of {', '.join(names)}")
+    index, decision = names.index(point_group), found.decided(tolerance)
+    return _report(found, decision, index, "", tolerance, detection.staircase, detection.timings)
 
 
 def _given(
@@ -106,11 +124,18 @@ def _step(found: Examined, tolerance: float) -> Step:
     return Step(tolerance=tolerance, point_group=name, undetermined=undetermined)
 
 
-def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[Step, ...], clock: Clock) -> Detection:
+def _report(
+    found: Examined,
+    decision: Decision,
+    index: int,
+    reason: str,
+    tolerance: float,
+    steps: tuple[Step, ...],
+    timings: dict[str, float],
+) -> Detection:
+    """What is told where the group of the chain with that index is the answer, or none is for a reason."""
     measured, surface, links = found.measured, found.surface, found.links
     origin, scale = measured.moments.center, measured.moments.scale
-    reason = found.doubt(tolerance)
-    index = 0 if reason else decision.index
     chosen = links[index]
     names, needs = [h.group.name for h in links], [h.need for h in links]
     told = alternatives(names, needs, decision, -1 if reason else index)
@@ -181,7 +206,8 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
         even_sample=len(measured.shape.points) if len(measured.shape.points) < measured.count else None,
         origin=origin,
         scale=scale,
-        timings=clock.seconds,
+        timings=timings,
+        examined=found,
     )
 
 
