@@ -176,6 +176,14 @@ def positive(text: str) -> float:
     return value
 
 
+def probability(text: str) -> float:
+    """A number above 0 and at most 1."""
+    value = _float(text)
+    if not 0.0 < value <= 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a probability above 0 and at most 1, such as 0.95")
+    return value
+
+
 def natural(text: str, first: int = 0) -> int:
     """An integer from `first`."""
     if not (text.isascii() and text.isdigit() and int(text) >= first):
