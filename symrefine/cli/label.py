@@ -67,6 +67,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Detect what is new, apply what was decided, write the labels, tell what is left."""
+    from symrefine.study.work import one_thread_each
+
+    one_thread_each()  # so that one worker gives the same bytes as several
     from symrefine.export.bop import models_of
     from symrefine.review.decisions import read_decisions
     from symrefine.review.labels import labelled, merged
