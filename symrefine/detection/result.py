@@ -119,6 +119,7 @@ class Detection(ReadOnly):
             all.
         timings: seconds by stage; everything else is a function of the input and the options alone.
         examined: what it was decided from, with the chain of groups.
+        textured: what of it the texture keeps: the same for the shape with its texture, where it has one.
     """
 
     point_group: str
@@ -152,6 +153,7 @@ class Detection(ReadOnly):
     scale: float
     timings: dict[str, float] = field(default_factory=dict)
     examined: Examined = field(repr=False)
+    textured: "Detection | None" = None
 
     def choices(self, tolerance: float | None = None) -> tuple[Alternative, ...]:
         """Every group that a person may choose instead, C1 first, each inside the next, as likely as at a tolerance.

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,7 +60,14 @@ def detect(
     """
     data, clock = _given(shape, weights, normals, labels, viewpoint), Clock()
     found = examined(data, outliers=outliers, tolerance=tolerance, ladder=ladder, seed=seed, clock=clock)
-    return told(found, tolerance=tolerance, ladder=ladder, clock=clock)
+    if data.texture is None:
+        return told(found, tolerance=tolerance, ladder=ladder, clock=clock)
+    from symrefine.detection.textured import textured
+
+    limit = max((tolerance, *ladder))
+    kept = textured(found, data, tolerance=tolerance, limit=limit, seed=seed, clock=clock)
+    both = (told(each, tolerance=tolerance, ladder=ladder, clock=clock) for each in (found, kept))
+    return replace(next(both), textured=next(both))
 
 
 def told(found: Examined, *, tolerance: float = TOLERANCE, ladder: Sequence[float] = (), clock: Clock) -> Detection:

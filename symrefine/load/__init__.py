@@ -143,7 +143,7 @@ def load(
             `material_index`), a field of .pcd, a titled column of .csv or .txt (numbers or texts), an array of .npz
             ([F] for faces, [N] for points), `material` for what `usemtl` names in .obj, or `color` for the colours of
             vertices or faces (.ply, .obj, .off, .glb, and columns red green blue). Colours closer than about a quarter
-            of the scale become one class (see `symrefine.load.colours`). A face whose vertices have labels takes that
+            of the scale become one class (see `symrefine.texture`). A face whose vertices have labels takes that
             of two corners, or of the first where all differ. Elements if None, for molecules.
         weights: a property, column or array of numbers that are the masses of the points of a cloud.
         frame: which of several molecules, models or volumes in one file, from 0; None where there is one.
