@@ -48,6 +48,8 @@ if TYPE_CHECKING:
 UNDETERMINED, REFUSED = 3, 2
 # Options whose files are of one object.
 _OF_ONE = ("bop", "recording", "report", "picture")
+# The labels that are no field of a file, but the colours of its images.
+TEXTURE = "texture"
 HELP = "find the planes, axes and point group of a mesh, cloud or picture"
 DESCRIPTION = (
     "Find the mirror planes, rotation axes and point group of the mesh or point cloud in PATH (.ply .stl .obj .off "
@@ -211,12 +213,14 @@ def examine(
         shape = read_scan(path, options, threshold=threshold, invert=invert)
     if threshold is not None or invert or (shape.dim == 2 and suffix_of(Path(path)) in IMAGES):
         options = options | {"threshold": threshold, "invert": invert}
-    found = detect(
+    found: Any = detect(
         shape,
         outliers=outliers,
         tolerance=relative_tolerance(options["tolerance"], shape, units=options.get("units"), outliers=outliers),
         seed=options["seed"],
     )
+    if options.get("labels") == TEXTURE:
+        found = found.textured
     found = replace(found, options=options)
     return shape, found, found.to_dict(load_s=clock.seconds["load"])
 
@@ -225,8 +229,10 @@ def read_scan(path: str, options: dict[str, Any], **picture: Any) -> "Shape":
     """The shape in a file as `detection_options` say, and `picture`: a depth image, or a cloud that a camera saw."""
     from symrefine.load import load, load_depth
 
-    known = ("intrinsics", "depth_scale", "mask", "viewpoint", "measure", "labels", "weights", "frame")
+    known = ("intrinsics", "depth_scale", "mask", "viewpoint", "measure", "labels", "weights", "frame", "texture")
     said = {name: given for name in known if (given := options.get(name)) is not None}
+    if said.get("labels") == TEXTURE:
+        said = {name: given for name, given in said.items() if name != "labels"} | {"texture": True}
     depth = {name: said.pop(name) for name in ("depth_scale", "mask") if name in said}
     if "intrinsics" in said:
         camera = said.pop("intrinsics")

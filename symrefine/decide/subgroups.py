@@ -22,7 +22,10 @@ def subgroup_chain(group: PointGroup, needs: Array) -> list[tuple[PointGroup, fl
     table, here = _products(operations), np.arange(len(operations)) == 0
     found: list[tuple[PointGroup, float]] = []
     while not here.all():
-        beyond = [_closed(table, here | (np.arange(len(here)) == k)) for k in np.flatnonzero(~here)]
+        left = np.flatnonzero(~here)
+        # One more operation, or all that need no more than some.
+        more = [np.arange(len(here)) == k for k in left] + [needs <= level for level in np.unique(needs[left])]
+        beyond = [_closed(table, here | members) for members in more]
         here = min(beyond, key=lambda members: (float(needs[members].max()), -int(members.sum())))
         whole = group if here.all() else identify(operations[here])
         found.append((whole, float(needs[here].max())))

@@ -25,6 +25,8 @@ def summary(record: Record) -> list[str]:
         "near misses": _near(record),
         "asked": _asked(record),
     }
+    if record.get("textured"):
+        told |= {"with texture": answer(record["textured"])}
     return [f"{record['source']}: {answer(record)}", *(f"  {name:<{LABEL}}{text}" for name, text in told.items())]
 
 

@@ -72,7 +72,10 @@ def detect(
 
         steps = story.LADDER if ladder is None else tuple(ladder)
         found = story.detect(shape, outliers=outliers, ladder=steps, tolerance=tolerance, seed=seed)
-        return Detection.of(found, shape=shape, options=options | {"outliers": outliers})
+        told = options | {"outliers": outliers}
+        if found.textured is not None:
+            found = replace(found, textured=Detection.of(found.textured, shape=shape, options=told))
+        return Detection.of(found, shape=shape, options=told)
     given = {
         "labels are": shape.labels is not None,
         "a ladder is": ladder is not None,

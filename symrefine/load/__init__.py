@@ -66,23 +66,25 @@ _OPTIONS = {
     "fields": "labels and weights apply to meshes, clouds and molecules only",
     "frame": "a frame is chosen of molecules and volumes only",
     "grey": "threshold and invert apply to pictures and volumes only",
+    "texture": "textures are read of meshes only",
 }
 
+_PAINTED = ("fields", "texture")
 _MESHES_AND_CLOUDS = {
     ".3mf": _Format(lambda data, *_: read_3mf(data)),
     ".csv": _Format(lambda data, _, wanted: read_table(data, wanted.fields)),
     ".dae": _Format(lambda data, *_: read_dae(data)),
     ".e57": _Format(lambda data, path, _: read_e57(data, path), unit="m"),
-    ".glb": _Format(lambda data, path, _: read_glb(data, path), unit="m"),
-    ".gltf": _Format(lambda data, path, _: read_gltf(data, path), unit="m"),
+    ".glb": _Format(lambda data, path, wanted: read_glb(data, path, texture=wanted.texture), _PAINTED, "m"),
+    ".gltf": _Format(lambda data, path, wanted: read_gltf(data, path, texture=wanted.texture), _PAINTED, "m"),
     ".las": _Format(lambda data, *_: read_las(data)),
     ".laz": _Format(lambda data, *_: read_las(data)),
     ".npy": _Format(lambda data, *_: read_npy(data)),
     ".npz": _Format(lambda data, _, wanted: read_npz(data, wanted.fields)),
-    ".obj": _Format(lambda data, *_: read_obj(data)),
+    ".obj": _Format(lambda data, path, wanted: read_obj(data, path if wanted.texture else None), _PAINTED),
     ".off": _Format(lambda data, *_: read_off(data)),
     ".pcd": _Format(lambda data, path, _: read_pcd(data, path)),
-    ".ply": _Format(lambda data, *_: read_ply(data)),
+    ".ply": _Format(lambda data, path, wanted: read_ply(data, path if wanted.texture else None), _PAINTED),
     ".step": _Format(lambda data, path, _: read_step(data, path), unit="m"),
     ".stl": _Format(lambda data, *_: read_stl(data)),
     ".stp": _Format(lambda data, path, _: read_step(data, path), unit="m"),
@@ -124,6 +126,7 @@ def load(
     frame: int | None = None,
     threshold: Threshold | None = None,
     invert: bool = False,
+    texture: bool = False,
 ) -> Shape:
     """Shape in a file: a mesh if it has faces, else a cloud with its normals where the file has them.
 
@@ -134,7 +137,7 @@ def load(
     a scene become one shape in the frame of the scene.
 
     Molecules (.xyz with an element before each x y z, .mol, .sdf, .pdb, .cif) give their elements as labels.
-    Other labels, and colours, are read only where they are asked for; images of textures never are.
+    Other labels, and colours, are read only where they are asked for; images of textures by `texture`.
 
     Args:
         path: file whose suffix is one of `SUFFIXES`, in any case, and may be followed by `.gz`.
@@ -150,6 +153,8 @@ def load(
         threshold: of a picture or a volume: grey value from 0 (its darkest) to 1 that makes it binary, or "otsu"; it is
             taken as it is if None.
         invert: of a picture or a volume: exchange object and background.
+        texture: of a mesh (.obj, .ply, .glb, .gltf): what its faces show, with the images beside it or in it; `detect`
+            then also tells the group of the shape with its texture.
 
     Raises:
         InputError: the file is missing, unreadable, not what its suffix says, incomplete, contradicts itself, holds
@@ -166,11 +171,13 @@ def load(
     source, file = str(path), Path(path)
     with about(source):
         named = [name for name in (labels, weights) if name is not None]
-        wanted = Wanted(fields=named, frame=frame, measure=measure, threshold=threshold, invert=invert)
+        wanted = Wanted(fields=named, frame=frame, measure=measure, threshold=threshold, invert=invert, texture=texture)
         content = _content(file, wanted)
         check_finite(content)
         check_distinct(content)
         kind = _FORMATS[suffix_of(file)]
+        if texture and content.paint is None:
+            raise InputError("has no faces, so no texture; leave it out for clouds")
         arrays = _arrays(content, None if "measure" in kind.takes else measure, labels, weights, source)
     # Labels that count unasked are elements, and lengths between them angstroms.
     elements = labels is None and content.labels is not None
@@ -203,6 +210,7 @@ def _check_options(kind: _Format, wanted: Wanted) -> None:
         "fields": bool(wanted.fields),
         "frame": wanted.frame is not None,
         "grey": wanted.threshold is not None or wanted.invert,
+        "texture": wanted.texture,
     }
     for group, said in given.items():
         if said and group not in kind.takes:
