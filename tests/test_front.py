@@ -403,5 +403,5 @@ def test_the_front_page_shows_promises_only():
 
 def test_schemas_stand_beside_the_code():
     assert {p.name.split(".")[0] for p in Path(str(files("symrefine"))).glob("schema/*.json")} == {
-        "detection", "detection2d", "detection_nd", "alignment"
+        "detection", "detection2d", "detection_nd", "alignment", "decisions", "labels"
     }  # fmt: skip

@@ -373,3 +373,23 @@ def test_only_meshes_with_images_have_a_texture(tmp_path: Path) -> None:
     (tmp_path / "a.ply").write_text(write_ply(tmp_path, BOX, plain).read_text().replace("TextureFile", "Author"))
     with pytest.raises(InputError, match="has no texture: the header has no line 'comment TextureFile NAME'"):
         load(tmp_path / "a.ply", texture=True)
+
+
+def test_a_data_set_is_labelled_with_its_textures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Shape and texture side by side for a person, or the texture alone; another image is another object."""
+    folder = tmp_path / "models"
+    folder.mkdir()
+    write_obj(folder, BOX, dot((0, 0, 0.2), 0.15)).rename(folder / "obj_000001.obj")
+    told: dict[str, dict[str, list[object]]] = {}
+    for name, option in (("both", ["--texture"]), ("alone", ["--labels", "texture"])):
+        out = tmp_path / name
+        assert invoke(["label", str(folder), "--out", str(out), "--accept", "0.5", *option]) == 0
+        told[name] = json.loads((out / "models_info.json").read_text())["1"]
+    assert len(told["both"]["symmetries_discrete"]) == 3
+    assert len(told["alone"]["symmetries_discrete"]) == 1
+    assert "With its texture it is C2v." in (tmp_path / "both" / "review.html").read_text()
+    capsys.readouterr()
+    Image.new("RGB", (64, 64), (200, 120, 40)).save(folder / "side 5.png")
+    again = ["label", str(folder), "--out", str(tmp_path / "alone"), "--accept", "0.5", "--labels", "texture"]
+    assert invoke(again) == 0
+    assert "D2h" in capsys.readouterr().out

@@ -40,8 +40,8 @@ DESCRIPTION = (
 )
 # Of a group that was not found: the least probability that is worth a word.
 _WORTH = 0.01
-# Number, directory, file in it, folder of the labels, options of `detect`, millimetres in a unit.
-Job = tuple[int, str, str, str, dict[str, Any], float]
+# What names an object, its folder, and that of the labels.
+Job = tuple["Row", str, str]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,15 +73,15 @@ def run(args: argparse.Namespace) -> int:
     from symrefine.export.bop import models_of
     from symrefine.review.decisions import read_decisions
     from symrefine.review.labels import labelled, merged
-    from symrefine.review.store import DECISIONS, head, opened
+    from symrefine.review.store import DECISIONS, heads, opened
 
     models, out = models_of(Path(args.dir)), Path(args.out)
-    heads = {n: head(n, path, detection_options(args), float(args.scale or 1.0)) for n, path in models.items()}
+    asked = heads(models, detection_options(args), float(args.scale or 1.0))
     given = read_decisions(Path(args.decisions)) if args.decisions else {}
-    _check(args.decisions, given, heads)
+    _check(args.decisions, given, asked)
     with opened(out) as held:
         kept = read_decisions(out / DECISIONS) if (out / DECISIONS).is_file() else {}
-        rows = _detected(args, heads, held)
+        rows = _detected(args, asked, held)
         _check(args.decisions, given, rows)
         decisions = merged(_fitting(kept, rows, out / DECISIONS), given)
         labels = labelled(rows, decisions, args.accept)
@@ -110,7 +110,7 @@ def _fitting(kept: "Decisions", rows: "Rows", place: Path) -> "Decisions":
     return {number: decision for number, decision in kept.items() if not told[number]}
 
 
-def _detected(args: argparse.Namespace, heads: "Rows", held: "Journal") -> "Rows":
+def _detected(args: argparse.Namespace, asked: "Rows", held: "Journal") -> "Rows":
     """The rows of all objects; those that still tell of their files are not made again."""
     from symrefine.review.store import ROWS, holds
     from symrefine.study.work import in_processes
@@ -119,11 +119,11 @@ def _detected(args: argparse.Namespace, heads: "Rows", held: "Journal") -> "Rows
     if held.torn:
         note(f"{out / ROWS}: the last row is incomplete; it is removed and done again")
     latest: dict[int, Any] = {row["object"]: row for row in held.rows}
-    rows: dict[int, Row] = {n: latest[n] for n, row in heads.items() if holds(out, latest.get(n), row)}
-    todo = [row for number, row in heads.items() if number not in rows]
-    jobs = [(row["object"], args.dir, row["file"], args.out, row["options"], row["scale"]) for row in todo]
+    rows: dict[int, Row] = {n: latest[n] for n, row in asked.items() if holds(out, latest.get(n), row)}
+    todo = [row for number, row in asked.items() if number not in rows]
+    jobs = [(row, args.dir, args.out) for row in todo]
     print_lines(_line(row) for row in rows.values())
-    with progress("detecting", len(heads), len(rows)) as advance:
+    with progress("detecting", len(asked), len(rows)) as advance:
         for row in in_processes(examine_model, jobs, args.workers):
             with naming(str(out / ROWS)):
                 held.append(row)
@@ -140,18 +140,17 @@ def examine_model(job: Job) -> "Row":
     from symrefine.cli.detect import examine
     from symrefine.detection.result import Detection
     from symrefine.review.objects import examined
-    from symrefine.review.store import head, place_of_picture
+    from symrefine.review.store import place_of_picture
 
-    number, folder, name, out, options, scale = job
-    path = Path(folder, name)
-    row = head(number, path, options, scale)
+    row, folder, out = job
+    path = Path(folder, row["file"])
     if row["error"] is not None:
         return row
     try:
-        shape, found, _ = examine(str(path), options)
+        shape, found, _ = examine(str(path), row["options"])
         if not isinstance(found, Detection):
             raise InputError(f"{path}: points have {shape.dim} coordinates; labels are for objects in space")
-        kept = examined(found, shape, scale=scale)
+        kept = examined(found, shape, scale=row["scale"])
         for k, picture in enumerate(kept.pictures):
             with whole(place_of_picture(Path(out), row, k)) as draft:
                 draft.write_bytes(picture)

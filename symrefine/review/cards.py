@@ -1,11 +1,12 @@
 """The page of a review from what is kept: those that are open first, as many as one page takes."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
 from symrefine.errors import one_line
+from symrefine.picture.words import symbol
 from symrefine.report.review import Card, Option, review_page
 from symrefine.review.decisions import SCHEMA, Decision, Decisions
 from symrefine.review.labels import Label, Labels
@@ -34,7 +35,6 @@ def page_text(folder: str, out: Path, rows: Mapping[int, Row], decisions: Decisi
 
 
 def _card(out: Path, row: Row, decision: Decision | None, label: Label | None) -> Card:
-    at_least = "Not all of it was seen: there may be more." if row["at_least"] else ""
     options = [
         Option(
             **{name: choice[name] for name in _OF_CHOICE},
@@ -49,10 +49,18 @@ def _card(out: Path, row: Row, decision: Decision | None, label: Label | None) -
         sha256=str(row["sha256"]),
         state="open" if label is None else "decided" if label.by == "person" else "accepted",
         answer=row["answer"],
-        doubt=row["doubt"] or at_least,
+        doubt=row["doubt"] or " ".join(_remarks(row)),
         tolerance=row["tolerance"],
         tolerances=row["tolerances"],
         likely=[None if None in at else cast("list[float]", list(at)) for at in likely],
         options=options,
         decision=None if decision is None else asdict(decision),
     )
+
+
+def _remarks(row: Row) -> Iterator[str]:
+    """What one should know before one decides."""
+    if row["at_least"]:
+        yield "Not all of it was seen: there may be more."
+    if row["textured"] not in (None, row["answer"]):
+        yield f"With its texture it is {symbol(str(row['textured']))}."

@@ -41,6 +41,7 @@ class Row(TypedDict):
         object: its number.
         answer: the group that was found, None where nothing was decided for the reason in `doubt`.
         at_least: whether there may be more than was seen.
+        textured: the group of the shape with its texture, where one was read beside the shape.
         tolerances: at which the groups are told how likely they are.
         choices: groups each inside the next, C1 first.
     """
@@ -56,6 +57,7 @@ class Row(TypedDict):
     confidence: float
     doubt: str
     at_least: bool
+    textured: str | None
     tolerance: float
     tolerances: list[float]
     choices: list[Choice]
@@ -87,6 +89,7 @@ def examined(found: Detection, shape: Shape, *, scale: float) -> Examined:
         "confidence": number(found.confidence),
         "doubt": found.undetermined,
         "at_least": bool(found.at_least),
+        "textured": None if found.textured is None else found.textured.point_group,
         "tolerance": number(found.tolerance),
         "tolerances": [number(t) for t in steps],
         "choices": choices,

@@ -1,13 +1,16 @@
 """The folder of the labels of a data set: what was found in each object is kept there, and found again."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from hashlib import file_digest, sha256
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, cast
 
 from symrefine import journal
 from symrefine.errors import InputError
 from symrefine.files import check_target
+from symrefine.load import IMAGES
 from symrefine.review.objects import Row
 
 # Rows that nothing is done twice for, what a person decided, the results, and pictures.
@@ -44,22 +47,41 @@ def opened(out: Path) -> Iterator[journal.Journal]:
         yield held
 
 
-def head(number: int, path: Path, options: dict[str, Any], scale: float) -> Row:
-    """What names an object: its number, file and content, the options, the version; nothing is known of it yet.
+def heads(models: Mapping[int, Path], options: dict[str, Any], scale: float) -> dict[int, Row]:
+    """What names objects: number, file and content, the options, the version; nothing is known of them yet.
 
     Args:
-        options: of its detection.
-        scale: millimetres in one unit of the file.
+        models: files by number, of one folder.
+        options: of the detection. Where textures count, the content is that of the images beside the models too.
+        scale: millimetres in one unit of the files.
     """
-    from hashlib import file_digest
-    from importlib.metadata import version
+    looks = _looks(next(iter(models.values())).parent) if is_textured(options) else []
+    return {number: _head(number, path, options, scale, looks) for number, path in models.items()}
 
+
+def is_textured(options: Mapping[str, Any]) -> bool:
+    """Whether textures count."""
+    return bool(options.get("texture")) or options.get("labels") == "texture"
+
+
+def _looks(folder: Path) -> list[str]:
+    """Digests of all files of a folder that a texture may come from."""
+    known = (*IMAGES, ".mtl", ".bin")
+    return [_digest(path) for path in sorted(folder.iterdir()) if path.suffix.lower() in known and path.is_file()]
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as stream:
+        return file_digest(stream, "sha256").hexdigest()
+
+
+def _head(number: int, path: Path, options: dict[str, Any], scale: float, looks: list[str]) -> Row:
     row: dict[str, Any] = {"object": number, "file": path.name, "sha256": None, "error": None}
     row |= {"version": version("symrefine"), "options": options, "scale": scale}
-    row |= {"answer": None, "confidence": 0.0, "doubt": "", "choices": []}
+    row |= {"answer": None, "confidence": 0.0, "doubt": "", "textured": None, "choices": []}
     try:
-        with path.open("rb") as stream:
-            row["sha256"] = file_digest(stream, "sha256").hexdigest()
+        own = _digest(path)
+        row["sha256"] = sha256("".join([own, *looks]).encode()).hexdigest() if looks else own
     except OSError as error:
         row["error"] = f"{path}: cannot be read: {error.strerror}"
     return cast("Row", row)
