@@ -393,3 +393,18 @@ def test_a_data_set_is_labelled_with_its_textures(tmp_path: Path, capsys: pytest
     again = ["label", str(folder), "--out", str(tmp_path / "alone"), "--accept", "0.5", "--labels", "texture"]
     assert invoke(again) == 0
     assert "D2h" in capsys.readouterr().out
+
+
+def test_pictures_show_the_texture() -> None:
+    from matplotlib.image import imread
+
+    from symrefine.picture.draw import picture_png
+
+    blue = box(CUBE, dot((0, 0, 0), 2.0))
+    found = detect(blue)
+    shares = []
+    for given in (blue, replace(blue, texture=None)):
+        pixels = imread(BytesIO(picture_png(found, given, width=300, height=225, title=False)))
+        shares.append(float((pixels[..., 2] > 2.0 * pixels[..., 0] + 0.02).mean()))
+    assert shares[0] > 0.15
+    assert shares[1] < 0.05

@@ -20,8 +20,9 @@ from symrefine.texture import COLOUR_TOLERANCE, Texture, corner_weights
 # Samples next to a place whose triangles it may lie on; samples that are asked for a colour around a place: of 8,000 as
 # many as lie within a tenth of the diagonal, beyond which nothing is told apart.
 FACES, AROUND = 3, 192
-# Samples that tell which operations are hopeless.
-GLANCE = 250
+# Samples that tell which operations are hopeless, and of how many operations the worst they allow for: a few samples
+# miss by chance.
+GLANCE, CHANCES = 250, 1000
 _NO_NOISE = np.empty(0)
 
 
@@ -70,7 +71,7 @@ class Painted(ReadOnly):
         """
         seen = [self._misses(m, GLANCE) for m in motions]
         return [
-            miss if needs(miss, _NO_NOISE) > bound else self._misses(m, sources)
+            miss if needs(miss, _NO_NOISE, tests=CHANCES) > bound else self._misses(m, sources)
             for m, miss in zip(motions, seen, strict=True)
         ]
 
