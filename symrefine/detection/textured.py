@@ -27,7 +27,8 @@ from symrefine.texture import colour_classes, corner_weights
 
 # Samples of a textured surface of revolution in which marks are looked for.
 MARKED = 20000
-# Operations of the largest group whose subgroups are looked through: those of an icosahedron, and of folds up to 30.
+# Operations of the largest group whose subgroups are looked through: those of an icosahedron, and of folds up to 30. Of
+# more, as of endless ones, samples that are labelled by their colours tell what is left.
 MOST = 120
 # Elements that tell how a group is best turned about an axis of revolution.
 FEW = 4
@@ -47,14 +48,13 @@ def textured(found: Examined, shape: Shape, *, tolerance: float, limit: float, s
     rng = np.random.default_rng(seed)
     with clock("texture"):
         painted = _painted(found, shape, rng)
-        endless = [h.placed for h in found.links[1:] if not h.group.is_finite]
-        if found.links[found.decided(tolerance).index].group.is_finite:
-            finite = [h.placed for h in found.links[1:] if h.group.is_finite and h.group.order <= MOST]
-        else:
-            finite, marked = _marked(found, painted, shape, endless[-1], tolerance, rng)
-            endless = [*marked, *endless]
+        few = [h.placed for h in found.links[1:] if h.group.order <= MOST]
+        many = [h.placed for h in found.links[1:] if h.group.order > MOST]
+        if found.links[found.decided(tolerance).index].group.order > MOST:
+            few, marked = _marked(found, painted, shape, many[-1], tolerance, rng)
+            many = [*marked, *many]
         links = [NOTHING]
-        for placed in [*(_chain(found, painted, finite[-1]) if finite else []), *endless]:
+        for placed in [*(_chain(found, painted, few[-1]) if few else []), *many]:
             link = _told(found, painted, placed)
             links.append(replace(link, need=max(link.need, links[-1].need)))
     return replace(found, links=_within(links, BEYOND * limit), pool=replace(found.pool, small=()))
@@ -114,7 +114,7 @@ def _within(links: list[Hypothesis], limit: float) -> tuple[Hypothesis, ...]:
 def _marked(
     found: Examined, painted: Painted, shape: Shape, whole: Placed, tolerance: float, rng: np.random.Generator
 ) -> tuple[list[Placed], list[Placed]]:
-    """Finite and endless groups that colours leave of an endless one: of samples whose labels are their colours."""
+    """Groups of few and of many operations that colours leave of many: of samples whose labels are their colours."""
     if _told(found, painted, whole).need <= exact_need(found.surface.floor):
         return [], []
     assert shape.texture is not None
@@ -129,8 +129,8 @@ def _marked(
         for h in seen.links[1:]
         if is_subgroup(h.group, whole.group, SAME_RAD)
     ]
-    finite = [_turned(painted, p, whole) for p in inside if p.group.is_finite and p.group.order <= MOST]
-    return finite[-1:], [p for p in inside if not p.group.is_finite]
+    few = [_turned(painted, p, whole) for p in inside if p.group.order <= MOST]
+    return few[-1:], [p for p in inside if p.group.order > MOST]
 
 
 def _turned(painted: Painted, placed: Placed, whole: Placed) -> Placed:
