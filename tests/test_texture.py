@@ -351,6 +351,43 @@ def test_what_is_missing_is_refused_in_one_line(case: str, tmp_path: Path, capsy
     load(tmp_path / "box.obj")  # the shape is whole
 
 
+@pytest.mark.parametrize("case", ["no image", "torn image", "cut image", "other coordinates"])
+def test_what_gltf_lacks_is_refused(case: str, tmp_path: Path) -> None:
+    """trimesh would leave it out without a word."""
+    trimesh = pytest.importorskip("trimesh")
+    for name, data in trimesh.load_scene(write_glb(tmp_path, BOX, plain)).export(file_type="gltf").items():
+        (tmp_path / name).write_bytes(data)
+    path = tmp_path / "model.gltf"
+    tree = json.loads(path.read_text())
+    Image.new("RGB", (8, 8), "red").save(tmp_path / "side.png")
+    for image in tree["images"]:
+        image.pop("bufferView", None)
+        image |= {"uri": "side.png"}
+    path.write_text(json.dumps(tree))
+    texture = load(path, texture=True).texture
+    assert texture is not None
+    assert {tuple(pixels.reshape(-1, 3).max(axis=0)) for pixels in texture.images} == {(255, 0, 0)}
+    if case == "no image":
+        (tmp_path / "side.png").unlink()
+        said = "image 0, 'side.png': no such file beside it"
+    elif case == "torn image":
+        (tmp_path / "side.png").write_bytes((tmp_path / "side.png").read_bytes()[:40])
+        said = "an image of its textures cannot be read"
+    elif case == "cut image":
+        grain = np.random.default_rng(0).integers(255, size=(64, 64, 3), dtype=np.uint8)
+        Image.fromarray(grain).save(tmp_path / "side.png")
+        data = (tmp_path / "side.png").read_bytes()
+        (tmp_path / "side.png").write_bytes(data[: len(data) // 2])
+        said = "is damaged"
+    else:
+        tree["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["texCoord"] = 1
+        path.write_text(json.dumps(tree))
+        said = "material 0 places its image by other coordinates"
+    with pytest.raises(InputError, match=said):
+        load(path, texture=True)
+    assert load(path).texture is None
+
+
 def test_images_are_bounded_before_they_are_decoded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_obj(tmp_path, BOX, plain)
     monkeypatch.setattr(paint, "LARGEST", 5 * 64 * 64)

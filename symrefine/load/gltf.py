@@ -57,6 +57,8 @@ def _read(data: bytes, text: bytes, kind: str, path: Path, *, texture: bool) -> 
     except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
         reason = str(error) or "its parts contradict one another"
         raise InputError(f"glTF cannot be read: {type(error).__name__}: {shorten(reason, 80)}") from None
+    if texture:
+        _check_images(tree, scene)
     return flattened(scene, texture=texture)
 
 
@@ -121,6 +123,16 @@ def _check_textures(tree: Json, folder: Path) -> None:
         place = primitive["attributes"].get("TEXCOORD_0")
         if isinstance(place, int) and place < len(accessors) and accessors[place].get("componentType") != _FLOAT:
             raise InputError(f"accessor {place} holds texture coordinates, but not as floats")
+
+
+def _check_images(tree: Json, scene: Any) -> None:
+    """Refuse images that trimesh could not open, and left out without a word."""
+    shown = [("baseColorTexture" in (m.get("pbrMetallicRoughness") or {})) for m in _objects(tree, "materials")]
+    primitives = [p for mesh in _objects(tree, "meshes") for p in _objects(mesh, "primitives")]
+    asked = sum(isinstance(m := p.get("material"), int) and m < len(shown) and shown[m] for p in primitives)
+    materials = [getattr(getattr(part, "visual", None), "material", None) for part in scene.geometry.values()]
+    if sum(getattr(m, "baseColorTexture", None) is not None for m in materials) < asked:
+        raise InputError("an image of its textures cannot be read; expected .png or .jpg, whole")
 
 
 def _objects(owner: Json, key: str) -> list[Json]:
