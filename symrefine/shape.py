@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symrefine.errors import DegenerateShapeError, InputError, about
 from symrefine.geometry import Array, numbers, read_only, unmasked
+from symrefine.texture import Texture
 
 Measure = Literal["points", "surface", "solid"]
 Index = NDArray[np.integer[Any]]
@@ -31,6 +32,7 @@ class Shape:
         viewpoint: [3] or [N, 3] place of the camera that saw the points of a cloud, or each of them; 64 places at most.
             Beside the outline of what it saw it saw that there is nothing: not for what the edge of a picture cuts off.
         measure: "points" for a cloud; "surface" (if None) or "solid" for a mesh: what carries the mass.
+        texture: what colours the triangles of a mesh; the shape has a group without it, and one with it.
         unit: of its lengths, one of `symrefine.units.METRES`, where the source says so.
         elements: whether the labels are atomic numbers.
         source: where the data came from, for messages.
@@ -48,6 +50,7 @@ class Shape:
     labels: Index | None = None
     viewpoint: Array | None = None
     measure: Measure = None  # type: ignore[assignment]  # never None once made
+    texture: Texture | None = None
     unit: str | None = None
     elements: bool = False
     source: str = "array"
@@ -67,6 +70,10 @@ class Shape:
         if self.labels is not None:
             count, what = (len(points), "point") if self.faces is None else (len(self.faces), "face")
             object.__setattr__(self, "labels", _labels(self.labels, count, what, self.source))
+        if self.texture is not None and len(self.texture.image) != (0 if self.faces is None else len(self.faces)):
+            raise InputError(
+                f"{self.source}: texture has {len(self.texture.image)} triangles; expected those of the mesh"
+            )
         if self.viewpoint is not None:
             object.__setattr__(self, "viewpoint", _viewpoint(self.viewpoint, points.shape, self.source))
         object.__setattr__(self, "measure", _measure(self.measure, self.faces, self.source))

@@ -18,7 +18,7 @@ from symrefine import Detection, Shape, detect
 from symrefine.detection import story
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import line_angle_rad, random_orthogonal
-from symrefine.groups import point_group
+from symrefine.groups import is_subgroup, point_group
 from symrefine.moments.quadrature import sample_surface
 
 SLOW = pytest.mark.slow
@@ -694,3 +694,39 @@ def test_mirrors_through_an_axis_do_not_crowd_out_the_one_across_it():
     """Seven mirrors at equal angles leave the spectrum no room to propose the eighth."""
     case = groups.Case(shape="wheel7", noise_rel=0.005, seed=2)
     assert detect(groups.posed(case)[0]).point_group == "D7h"
+
+
+def test_what_a_person_chooses_instead_has_its_operations():
+    """A box almost square: whatever is chosen of its chain has a place, and each group is inside the next."""
+    points = sample(join([box((0, 0, 0), (1.0, 0.97, 0.5))]), 6000, 0.001, np.random.default_rng(1))
+    found = detect(points)
+    names = [c.point_group for c in found.choices()]
+    assert names == ["C1", "D2h", "D4h"]
+    assert sum(c.probability for c in found.choices()) == pytest.approx(1.0)
+    assert found.choices(0.0025)[2].probability < found.choices(0.08)[2].probability
+    chosen = [found.chosen(name) for name in names]
+    assert [(c.point_group, len(c.operations()), len(c.planes)) for c in chosen] == [
+        ("C1", 1, 0),
+        ("D2h", 8, 3),
+        ("D4h", 16, 5),
+    ]
+    assert all(is_subgroup(a.group, b.group, math.radians(3.0)) for a, b in pairwise(chosen))
+    same = found.chosen(found.point_group)
+    np.testing.assert_array_equal(same.operations(), found.operations())
+    assert same.to_dict() == found.to_dict()
+    # The four-fold axis is met by what misses it least: the operations that are chosen take the box almost onto itself.
+    moved = [points @ m[:3, :3].T + m[:3, 3] for m in chosen[2].operations()]
+    assert max(cKDTree(points).query(p)[0].mean() for p in moved) < 0.03
+    with pytest.raises(InputError, match="expected one of C1, D2h, D4h"):
+        found.chosen("D6h")
+
+
+def test_where_nothing_is_decided_a_person_may_decide():
+    """Noise hides what the cloud has; who knows it can say so."""
+    noisy = sample(table(), 1500, 0.02, np.random.default_rng(0))
+    found = detect(noisy, tolerance=0.01)
+    assert found.undetermined
+    assert "C1" in [c.point_group for c in found.choices()]
+    chosen = found.chosen(found.choices()[-1].point_group)
+    assert not chosen.undetermined
+    assert len(chosen.operations()) == chosen.group.order

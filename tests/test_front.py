@@ -457,5 +457,6 @@ def test_the_front_page_shows_promises_only():
 
 def test_schemas_stand_beside_the_code():
     assert {p.name.split(".")[0] for p in Path(str(files("symrefine"))).glob("schema/*.json")} == {
-        "detection", "detection2d", "detection_nd", "alignment", "symmetrized", "completed", "info"
+        "detection", "detection2d", "detection_nd", "alignment", "symmetrized", "completed", "info",
+        "decisions", "labels",
     }  # fmt: skip

@@ -19,7 +19,7 @@ from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.load import load
-from symrefine.load.colours import NEAR, colour_classes
+from symrefine.texture import COLOUR_TOLERANCE, colour_classes
 
 RED, GREEN, BLUE, YELLOW, WHITE, BLACK = (
     (200, 30, 30), (30, 160, 40), (20, 40, 190), (230, 220, 50), (240, 240, 240), (15, 15, 15)
@@ -451,7 +451,7 @@ def test_damage_never_shows_as_a_foreign_error(tmp_path: Path) -> None:
 
 
 def test_colours_apart_by_more_than_the_limit_are_classes() -> None:
-    for distance, classes in ((0.95 * NEAR, 1), (1.05 * NEAR, 2)):
+    for distance, classes in ((0.95 * COLOUR_TOLERANCE, 1), (1.05 * COLOUR_TOLERANCE, 2)):
         colours = np.repeat([[50.0, 60, 70], [50, 60, 70 + distance]], [70, 30], axis=0)
         assert len(set(colour_classes(colours, np.ones(100)))) == classes
 

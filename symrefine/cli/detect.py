@@ -8,7 +8,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from symrefine.cli.inputs import STDIN, Object, expanded, failure, objects, read_scan, scans
+from symrefine.cli.inputs import STDIN, TEXTURE, Object, expanded, failure, objects, read_scan, scans
 from symrefine.cli.outputs import (
     STDOUT,
     check_beside,
@@ -247,7 +247,7 @@ def detected(
     is_flat = isinstance(shape, Shape) and shape.dim == 2
     if threshold is not None or invert or (is_flat and suffix_of(Path(file)) in IMAGES):
         options = options | {"threshold": threshold, "invert": invert}
-    found = detect(
+    found: Any = detect(
         shape,
         outliers=options.get("outliers", "auto"),
         tolerance=options["tolerance"],
@@ -255,6 +255,8 @@ def detected(
         seed=options["seed"],
         verify=options.get("verify", "sample"),
     )
+    if options.get("labels") == TEXTURE:
+        found = found.textured
     return replace(found, options=options)
 
 

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 # What is written for the path of a file that comes on stdin, and what it is called afterwards.
 STDIN, NAME = "-", "stdin"
 # Options that say what of a file is read, and how.
-_READING = ("intrinsics", "depth_scale", "mask", "viewpoint", "measure", "labels", "weights", "frame")
+_READING = ("intrinsics", "depth_scale", "mask", "viewpoint", "measure", "labels", "weights", "frame", "texture")
+# The labels that are no field of a file, but the colours of its images.
+TEXTURE = "texture"
 # Objects of one file that are taken at once: their records, of some ten kilobytes each, are kept for one array.
 FRAMES = 10_000
 
@@ -161,9 +163,7 @@ def _made(frames: Any, number: int, file: str, called: str) -> "Shape | Stream |
         return error
 
 
-def scans(
-    path: str, options: dict[str, Any], *, in_chunks: bool = False, **picture: Any
-) -> "Frames[Any]":
+def scans(path: str, options: dict[str, Any], *, in_chunks: bool = False, **picture: Any) -> "Frames[Any]":
     """The objects in a file as `detection_options` say, and `picture`: all, or the one that they choose.
 
     With `in_chunks` a cloud that is too large to hold is a stream, if nothing but its coordinates is asked for.
@@ -171,6 +171,8 @@ def scans(
     from symrefine.load import Frames, load, load_depth, load_frames, stream_if_large
 
     said = {name: given for name in _READING if (given := options.get(name)) is not None}
+    if said.get("labels") == TEXTURE:
+        said = {name: given for name, given in said.items() if name != "labels"} | {"texture": True}
     if in_chunks and not said and not any(picture.values()) and (large := stream_if_large(path)) is not None:
         return Frames("clouds", 1, lambda _: large)
     depth = {name: said.pop(name) for name in ("depth_scale", "mask") if name in said}

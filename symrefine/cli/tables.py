@@ -41,6 +41,7 @@ def record_lines(record: Record) -> Iterator[Table | str]:
 def detection_lines(record: Record) -> Iterator[Table | str]:
     """Everything a table can say about one detection."""
     yield f"{record['source']}: {headline(record)}"
+    yield from textured(record)
     yield f"n-tuples {TUPLES[record['ntuples']['kind']]}"
     yield _place(record)
     if record["exact"]:
@@ -143,6 +144,15 @@ def otherwise(record: Record) -> str:
         + (f", forgiving {100 * a['forgiven']:.2g} %" if a["forgiven"] else "")
         for a in record["alternatives"]
     )
+
+
+def textured(record: Record) -> Iterator[str]:
+    """What the texture keeps of the group, where one was read."""
+    if kept := record.get("textured"):
+        sure = "" if kept["undetermined"] else f", confidence {kept['confidence']:.2f}"
+        others = f"; or {otherwise(kept)}" if kept["alternatives"] else ""
+        name = f"undetermined: {kept['undetermined']}" if kept["undetermined"] else kept["point_group"]
+        yield f"with its texture: {name}{sure}{others}"
 
 
 def planar_lines(record: Record) -> Iterator[Table | str]:

@@ -102,6 +102,7 @@ def reading_options(args: argparse.Namespace) -> dict[str, Any]:
         "labels",
         "weights",
         "verify",
+        "texture",
     )
     return {name: given for name in how if (given := getattr(args, name, None)) is not None}
 
@@ -114,7 +115,15 @@ def add_class_options(parser: argparse.ArgumentParser) -> None:
         help="classes that every symmetry must keep, from the file: a property of .ply or .pcd (label, class, "
         "material_index), a titled column of .csv or .txt (numbers or texts), an array of .npz, `material` for the "
         "usemtl of .obj, or `color` for the colours of vertices or faces, where colours closer than a quarter of the "
-        "scale are one class and images of textures are not read (default: none, but the elements of molecules)",
+        "scale are one class, or `texture` for the images that --texture reads, with which alone the group is then "
+        "told (default: none, but the elements of molecules)",
+    )
+    parser.add_argument(
+        "--texture",
+        action="store_true",
+        default=None,
+        help="read the images of an .obj (map_Kd of its .mtl), .ply (TextureFile) or glTF, and tell the group of the "
+        "shape with its texture beside that of the shape: colours within a quarter of the scale are the same",
     )
     parser.add_argument(
         "--weights",
@@ -184,6 +193,14 @@ def positive(text: str) -> float:
     value = _float(text)
     if not 0.0 < value < math.inf:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
+    return value
+
+
+def probability(text: str) -> float:
+    """A number above 0 and at most 1."""
+    value = _float(text)
+    if not 0.0 < value <= 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a probability above 0 and at most 1, such as 0.95")
     return value
 
 

@@ -130,6 +130,11 @@ def fitted(surface: Surface, start: Placed, *, before: int = 0) -> Hypothesis:
     return min(found, _placed(surface, start, history[:1], before), key=lambda h: h.need)
 
 
+def judged(surface: Surface, placed: Placed) -> Hypothesis:
+    """A group judged where it stands."""
+    return _placed(surface, placed, (), 0)
+
+
 def _placed(surface: Surface, placed: Placed, history: tuple[Iterate, ...], before: int) -> Hypothesis:
     """A group judged where a fit put it."""
     parts = _Parts.of(placed)

@@ -9,7 +9,7 @@ import numpy as np
 from symrefine.clock import Clock
 from symrefine.decide.chain import Pool, chain, explore
 from symrefine.decide.hypotheses import Hypothesis
-from symrefine.decide.posterior import BEYOND, Decision, Link, decide
+from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide
 from symrefine.detection.measure import Measured, Outliers, doubt, gather, measure
 from symrefine.detection.result import Sample
 from symrefine.detection.sketch import Sketch, is_large, set_apart, sketched
@@ -46,6 +46,11 @@ class Examined:
         """The likeliest group of the chain at a tolerance."""
         known = [Link(need=h.need, lone_mirror=h.group.name == "Cs") for h in self.links[1:]]
         return decide(known, tolerance, self.surface.floor)
+
+    def choices(self, tolerance: float) -> tuple[Alternative, ...]:
+        """Every group of the chain, C1 first, as likely as at a tolerance."""
+        found = zip(self.links, self.decided(tolerance).probabilities, strict=True)
+        return tuple(Alternative(point_group=h.group.name, probability=p, forgiven=h.need) for h, p in found)
 
     def order(self, tolerance: float) -> float:
         """Order of the group that is decided, 0 if none is."""

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from symrefine.decide.posterior import Alternative
+from symrefine.detection.examination import Examined
 from symrefine.fit.refine import Iterate
 from symrefine.geometry import Array, Axis, Plane, ReadOnly
 from symrefine.groups import PointGroup
@@ -159,6 +160,8 @@ class Detection(ReadOnly):
         even_sample: how many points, more evenly spread, it was decided by where the density falls off; None where by
             all.
         timings: seconds by stage; everything else is a function of the input and the options alone.
+        examined: what it was decided from, with the chain of groups.
+        textured: what of it the texture keeps: the same for the shape with its texture, where it has one.
     """
 
     point_group: str
@@ -194,3 +197,13 @@ class Detection(ReadOnly):
     scale: float
     verified: Verified | None = None
     timings: dict[str, float] = field(default_factory=dict)
+    examined: Examined = field(repr=False)
+    textured: "Detection | None" = None
+
+    def choices(self, tolerance: float | None = None) -> tuple[Alternative, ...]:
+        """Every group that a person may choose instead, C1 first, each inside the next, as likely as at a tolerance.
+
+        Args:
+            tolerance: one of the staircase; that of the answer if None.
+        """
+        return self.examined.choices(self.tolerance if tolerance is None else tolerance)

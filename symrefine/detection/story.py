@@ -64,7 +64,14 @@ def detect(
     """
     data, clock = _given(shape, weights, normals, labels, viewpoint), Clock()
     found = examined(data, outliers=outliers, tolerance=tolerance, ladder=ladder, seed=seed, clock=clock)
-    return told(found, tolerance=tolerance, ladder=ladder, clock=clock)
+    if not isinstance(data, Shape) or data.texture is None:
+        return told(found, tolerance=tolerance, ladder=ladder, clock=clock)
+    from symrefine.detection.textured import textured
+
+    limit = max((tolerance, *ladder))
+    kept = textured(found, data, tolerance=tolerance, limit=limit, seed=seed, clock=clock)
+    both = (told(each, tolerance=tolerance, ladder=ladder, clock=clock) for each in (found, kept))
+    return replace(next(both), textured=next(both))
 
 
 def told(found: Examined, *, tolerance: float = TOLERANCE, ladder: Sequence[float] = (), clock: Clock) -> Detection:
@@ -72,7 +79,26 @@ def told(found: Examined, *, tolerance: float = TOLERANCE, ladder: Sequence[floa
     with clock("decide"):
         decision = found.decided(tolerance)
         steps = tuple(_step(found, t) for t in sorted(ladder))
-    return _report(found, decision, tolerance, steps, clock)
+    reason = found.doubt(tolerance)
+    return _report(found, decision, 0 if reason else decision.index, reason, tolerance, steps, clock)
+
+
+def chosen(detection: Detection, point_group: str) -> Detection:
+    """What is told if a person says that another group of the chain is meant: its elements, where it fits best.
+
+    Args:
+        point_group: Schoenflies symbol, one of those in `Detection.choices`.
+
+    Raises:
+        InputError: no group of the chain.
+    """
+    found, tolerance = detection.examined, detection.tolerance
+    names = [link.group.name for link in found.links]
+    if point_group not in names:
+        raise InputError(f"point_group is {point_group!r}; expected one of {', '.join(names)}")
+    index, decision = names.index(point_group), found.decided(tolerance)
+    told = _report(found, decision, index, "", tolerance, detection.staircase, Clock())
+    return replace(told, timings=detection.timings)
 
 
 def _given(
@@ -111,11 +137,18 @@ def _step(found: Examined, tolerance: float) -> Step:
     return Step(tolerance=tolerance, point_group=name, undetermined=undetermined)
 
 
-def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[Step, ...], clock: Clock) -> Detection:
+def _report(
+    found: Examined,
+    decision: Decision,
+    index: int,
+    reason: str,
+    tolerance: float,
+    steps: tuple[Step, ...],
+    clock: Clock,
+) -> Detection:
+    """What is told where the group of the chain with that index is the answer, or none is for a reason."""
     measured, surface, links = found.measured, found.surface, found.links
     origin, scale = measured.moments.center, measured.moments.scale
-    reason = found.doubt(tolerance)
-    index = 0 if reason else decision.index
     chosen = links[index]
     names, needs = [h.group.name for h in links], [h.need for h in links]
     told = alternatives(names, needs, decision, -1 if reason else index)
@@ -191,6 +224,7 @@ def _report(found: Examined, decision: Decision, tolerance: float, steps: tuple[
         origin=origin,
         scale=scale,
         timings=clock.seconds,
+        examined=found,
     )
 
 

@@ -11,6 +11,7 @@ which `bop_toolkit` samples a continuous symmetry.
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,8 @@ from symrefine.units import EVERYDAY_M, METRES
 
 Entry = dict[str, Any]
 
+# Object 1 is obj_000001.ply.
+_NAME = re.compile(r"obj_([0-9]{1,9})")
 # Points whose distances are formed at once.
 _BLOCK = 512
 _SNAP = 1e-3
@@ -133,6 +136,27 @@ def read_models_info(path: Path) -> dict[str, Entry]:
     if not isinstance(data, dict) or not all(isinstance(entry, dict) for entry in data.values()):
         raise InputError(f"{path}: is there already and is no models_info.json: expected an object for each object id")
     return data
+
+
+def models_of(folder: Path) -> dict[int, Path]:
+    """The models of a folder by their number, as BOP names them: object 1 is obj_000001.ply. What else is there stays.
+
+    Raises:
+        InputError: no such folder, no such model, or two of one object.
+    """
+    from symrefine.load import READERS, stem_of, suffix_of
+
+    if not folder.is_dir():
+        raise InputError(f"{folder}: {'is a file, not a' if folder.exists() else 'no such'} directory")
+    models: dict[int, Path] = {}
+    for path in sorted(p for p in folder.iterdir() if suffix_of(p) in READERS and p.is_file()):
+        if match := _NAME.fullmatch(stem_of(path)):
+            other = models.setdefault(int(match[1]), path)
+            if other != path:
+                raise InputError(f"{path}: is object {int(match[1])}, and so is {other.name}; keep one of them")
+    if not models:
+        raise InputError(f"{folder}: no model in it; object 1 is obj_000001.ply, or of another suffix that can be read")
+    return dict(sorted(models.items()))
 
 
 def diameter(points: Array) -> float:

@@ -53,6 +53,32 @@ def detection_record(
         else {"miss": number(d.exact.miss), "faces": d.exact.faces, "point_group": d.exact.point_group},
         "sample": None if d.sample is None else {"points": d.sample.points, "of": d.sample.of},
         "even_sample": d.even_sample,
+        **_elements(d),
+        "staircase": _staircase(d),
+        # `excess` is the miss over what the tolerance allows, the worst of its statistics.
+        "near_misses": [
+            {"kind": m.kind, "direction": _direction(m.direction), "point": numbers(m.point, scale), **_turned_down(m)}
+            for m in d.near_misses
+        ],
+        "iterations": int(d.iterations),
+        "verified": None
+        if d.verified is None
+        else {
+            "points": d.verified.points,
+            "residual": _residual(d.verified.residual),
+            "beyond": d.verified.beyond,
+        },
+        "undetermined": d.undetermined or None,
+        "textured": None if d.textured is None else _textured(d.textured),
+        "ntuples": {"kind": d.tuples.kind} | _sizes(d.tuples),
+        "timings": seconds(d.timings, load_s),
+    }
+
+
+def _elements(d: "Detection") -> Record:
+    """Planes, axes and the inversion."""
+    scale = d.diagonal
+    return {
         "planes": [
             _placed(p.plane, scale) | _held(p) | {"sigma": _sigma(p.sigma_rad, "offset", p.sigma)} | _covered(p)
             for p in d.planes
@@ -72,24 +98,22 @@ def detection_record(
         "inversion": bool(d.inversion),
         "inversion_residual": None if d.inversion_residual is None else _residual(d.inversion_residual),
         "inversion_confidence": None if d.inversion_confidence is None else number(d.inversion_confidence),
-        "staircase": [{"tolerance": number(s.tolerance), "point_group": s.point_group} for s in d.staircase],
-        # `excess` is the miss over what the tolerance allows, the worst of its statistics.
-        "near_misses": [
-            {"kind": m.kind, "direction": _direction(m.direction), "point": numbers(m.point, scale), **_turned_down(m)}
-            for m in d.near_misses
-        ],
-        "verified": None
-        if d.verified is None
-        else {
-            "points": d.verified.points,
-            "residual": _residual(d.verified.residual),
-            "beyond": d.verified.beyond,
-        },
-        "iterations": int(d.iterations),
-        "undetermined": d.undetermined or None,
-        "ntuples": {"kind": d.tuples.kind} | _sizes(d.tuples),
-        "timings": seconds(d.timings, load_s),
     }
+
+
+def _textured(d: "Detection") -> Record:
+    """What is told of a shape with its texture: the group, and what of the shape's elements its colours keep."""
+    answer = _answer(d)
+    return {
+        **{name: answer[name] for name in ("point_group", "confidence", "alternatives", "center")},
+        **_elements(d),
+        "staircase": _staircase(d),
+        "undetermined": d.undetermined or None,
+    }
+
+
+def _staircase(d: "Detection") -> list[Record]:
+    return [{"tolerance": number(s.tolerance), "point_group": s.point_group} for s in d.staircase]
 
 
 def planar_record(

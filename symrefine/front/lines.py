@@ -26,7 +26,8 @@ def summary(record: Record) -> list[str]:
     if "matrix" in record:
         return list(_aligned(record))
     told = _made(record) if "found" in record else _completed(record) if "inferred" in record else _detected(record)
-    lines = {**told, "asked": _asked(record)}
+    painted = {"with texture": answer(record["textured"])} if record.get("textured") else {}
+    lines = {**told, **painted, "asked": _asked(record)}
     return [
         f"{printable(record['source'])}: {answer(record)}",
         *(f"  {name:<{LABEL}}{text}" for name, text in lines.items()),

@@ -70,6 +70,19 @@ class Detection(Found, BareDetection):
 
         return canonical(self, self.shape).matrix(1.0)
 
+    def chosen(self, point_group: str) -> "Detection":
+        """The answer if a person says that another group is meant: its elements and operations, where it fits best.
+
+        Args:
+            point_group: one of those in `choices()`: C1, and groups each inside the next.
+
+        Raises:
+            InputError: no such group.
+        """
+        from symrefine.detection import story
+
+        return Detection.of(story.chosen(self, point_group), shape=self.shape, options=self.options)
+
     def show(self) -> Any:
         """Open the recording in the viewer of rerun, or inline in a notebook.
 

@@ -129,6 +129,8 @@ def _detect_in_space(
     found = replace(found, timings=clock.seconds | found.timings)
     if verify == "all":
         found, options = _verified(found, given), options | {"verify": verify}
+    if found.textured is not None:
+        found = replace(found, textured=Detection.of(found.textured, shape=shape, options=options))
     return Detection.of(found, shape=shape, options=options)
 
 

@@ -81,23 +81,25 @@ _OPTIONS = {
     "fields": "labels and weights apply to meshes, clouds and molecules only",
     "frame": "a frame is chosen of molecules and volumes only",
     "grey": "threshold and invert apply to pictures and volumes only",
+    "texture": "textures are read of meshes only",
 }
 
+_PAINTED = ("fields", "texture")
 _MESHES_AND_CLOUDS = {
     ".3mf": _Format(lambda data, *_: read_3mf(data)),
     ".csv": _Format(lambda data, _, wanted: read_table(data, wanted.fields)),
     ".dae": _Format(lambda data, *_: read_dae(data)),
     ".e57": _Format(lambda data, path, _: read_e57(data, path), unit="m"),
-    ".glb": _Format(lambda data, path, _: read_glb(data, path), unit="m"),
-    ".gltf": _Format(lambda data, path, _: read_gltf(data, path), unit="m"),
+    ".glb": _Format(lambda data, path, wanted: read_glb(data, path, texture=wanted.texture), _PAINTED, "m"),
+    ".gltf": _Format(lambda data, path, wanted: read_gltf(data, path, texture=wanted.texture), _PAINTED, "m"),
     ".las": _Format(lambda data, *_: read_las(data)),
     ".laz": _Format(lambda data, *_: read_las(data)),
     ".npy": _Format(lambda data, *_: read_npy(data)),
     ".npz": _Format(lambda data, _, wanted: read_npz(data, wanted.fields)),
-    ".obj": _Format(lambda data, *_: read_obj(data)),
+    ".obj": _Format(lambda data, path, wanted: read_obj(data, path if wanted.texture else None), _PAINTED),
     ".off": _Format(lambda data, *_: read_off(data)),
     ".pcd": _Format(lambda data, path, _: read_pcd(data, path)),
-    ".ply": _Format(lambda data, *_: read_ply(data)),
+    ".ply": _Format(lambda data, path, wanted: read_ply(data, path if wanted.texture else None), _PAINTED),
     ".step": _Format(lambda data, path, _: read_step(data, path), unit="m"),
     ".stl": _Format(lambda data, *_: read_stl(data)),
     ".stp": _Format(lambda data, path, _: read_step(data, path), unit="m"),
@@ -139,6 +141,7 @@ def load(
     frame: int | None = None,
     threshold: Threshold | None = None,
     invert: bool = False,
+    texture: bool = False,
 ) -> Shape:
     """Shape in a file: a mesh if it has faces, else a cloud with its normals where the file has them.
 
@@ -149,7 +152,7 @@ def load(
     a scene become one shape in the frame of the scene.
 
     Molecules (.xyz with an element before each x y z, .mol, .sdf, .pdb, .cif) give their elements as labels.
-    Other labels, and colours, are read only where they are asked for; images of textures never are.
+    Other labels, and colours, are read only where they are asked for; images of textures by `texture`.
 
     Args:
         path: file whose suffix is one of `SUFFIXES`, in any case, and may be followed by `.gz`.
@@ -158,7 +161,7 @@ def load(
             `material_index`), a field of .pcd, a titled column of .csv or .txt (numbers or texts), an array of .npz
             ([F] for faces, [N] for points), `material` for what `usemtl` names in .obj, or `color` for the colours of
             vertices or faces (.ply, .obj, .off, .glb, and columns red green blue). Colours closer than about a quarter
-            of the scale become one class (see `symrefine.load.colours`). A face whose vertices have labels takes that
+            of the scale become one class (see `symrefine.texture`). A face whose vertices have labels takes that
             of two corners, or of the first where all differ. Elements if None, for molecules.
         weights: a property, column or array of numbers that are the masses of the points of a cloud.
         frame: which of several molecules, models or volumes in one file, from 0; None where there is one. `load_frames`
@@ -166,6 +169,8 @@ def load(
         threshold: of a picture or a volume: grey value from 0 (its darkest) to 1 that makes it binary, or "otsu"; it is
             taken as it is if None.
         invert: of a picture or a volume: exchange object and background.
+        texture: of a mesh (.obj, .ply, .glb, .gltf): what its faces show, with the images beside it or in it; `detect`
+            then also tells the group of the shape with its texture.
 
     Raises:
         InputError: the file is missing, unreadable, not what its suffix says, incomplete, contradicts itself, holds
@@ -175,10 +180,10 @@ def load(
     """
     if frame is not None and (isinstance(frame, bool) or not isinstance(frame, int)):
         raise InputError(f"frame is {frame!r}; expected a whole number from 0, or None")
-    wanted = _wanted(measure, labels, weights, threshold, invert)
+    wanted = _wanted(measure, labels, weights, threshold, invert, texture)
     with about(str(path)):
         content = _contents(Path(path), wanted, is_chosen=frame is not None).chosen(frame)
-    return _shape(content, Path(path), measure, labels, weights, source=str(path))
+    return _shape(content, Path(path), wanted, labels, weights, source=str(path))
 
 
 def load_frames(
@@ -189,6 +194,7 @@ def load_frames(
     weights: str | None = None,
     threshold: Threshold | None = None,
     invert: bool = False,
+    texture: bool = False,
 ) -> Frames[Shape]:
     """Every object in a file: molecules one after the other, models, volumes of a series; one of any other file.
 
@@ -202,7 +208,7 @@ def load_frames(
     Raises:
         InputError: as `load`; what is wrong with one of several objects is told when that is asked for.
     """
-    source, wanted = str(path), _wanted(measure, labels, weights, threshold, invert)
+    source, wanted = str(path), _wanted(measure, labels, weights, threshold, invert, texture)
     with about(source):
         contents = _contents(Path(path), wanted)
 
@@ -210,7 +216,7 @@ def load_frames(
         name = source if len(contents) == 1 else f"{source}#{number}"
         with about(name):
             content = contents[number]
-        return _shape(content, Path(path), measure, labels, weights, source=name)
+        return _shape(content, Path(path), wanted, labels, weights, source=name)
 
     return Frames(contents.what, len(contents), shape)
 
@@ -221,6 +227,7 @@ def _wanted(
     weights: str | None,
     threshold: Threshold | None,
     invert: bool,
+    texture: bool,
 ) -> Wanted:
     """What a caller wants of a file beyond coordinates."""
     if measure not in (None, "surface", "solid"):
@@ -228,7 +235,7 @@ def _wanted(
     if threshold not in (None, "otsu") and not (isinstance(threshold, int | float) and 0.0 < threshold < 1.0):
         raise InputError(f"threshold is {threshold}; expected a grey value between 0 (black) and 1 (white), or 'otsu'")
     named = [name for name in (labels, weights) if name is not None]
-    return Wanted(fields=named, measure=measure, threshold=threshold, invert=invert)
+    return Wanted(fields=named, measure=measure, threshold=threshold, invert=invert, texture=texture)
 
 
 def _contents(file: Path, wanted: Wanted, *, is_chosen: bool = False) -> Frames[Content]:
@@ -255,14 +262,16 @@ def _contents(file: Path, wanted: Wanted, *, is_chosen: bool = False) -> Frames[
 
 
 def _shape(
-    content: Content, file: Path, measure: str | None, labels: str | None, weights: str | None, *, source: str
+    content: Content, file: Path, wanted: Wanted, labels: str | None, weights: str | None, *, source: str
 ) -> Shape:
     """The shape that a content of a file is."""
     kind = _FORMATS[suffix_of(file)]
     with about(source):
         check_finite(content)
         check_distinct(content)
-        arrays = _arrays(content, None if "measure" in kind.takes else measure, labels, weights, source)
+        if wanted.texture and content.paint is None:
+            raise InputError("has no faces, so no texture; leave it out for clouds")
+        arrays = _arrays(content, None if "measure" in kind.takes else wanted.measure, labels, weights, source)
     # Labels that count unasked are elements, and lengths between them angstroms.
     elements = labels is None and content.labels is not None
     return Shape(
@@ -276,6 +285,7 @@ def _check_options(kind: _Format, wanted: Wanted, *, is_chosen: bool) -> None:
         "fields": bool(wanted.fields),
         "frame": is_chosen,
         "grey": wanted.threshold is not None or wanted.invert,
+        "texture": wanted.texture,
     }
     for group, said in given.items():
         if said and group not in kind.takes:

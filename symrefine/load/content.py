@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.shape import LARGEST, Index
+from symrefine.texture import Pixels
 
 # Values of any kind, one for each point or face: numbers, texts, or the three of a colour.
 Values = NDArray[Any]
@@ -30,12 +31,14 @@ class Wanted:
         measure: "solid" for the voxels of a volume, else its surface.
         threshold: grey value that makes a picture or a volume binary, or how to find it; None leaves it as it is.
         invert: exchange object and background of a picture or a volume.
+        texture: what the faces show, which images beside the file may hold.
     """
 
     fields: Collection[str] = ()
     measure: Literal["surface", "solid"] | None = None
     threshold: Threshold | None = None
     invert: bool = False
+    texture: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -60,6 +63,23 @@ class Polygons:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Paint:
+    """What faces show.
+
+    Args:
+        images: [H, W, 3] each, 0 to 255.
+        uv: [sum of counts, 2] of the corners of the faces in their order, v upwards over the image.
+        image: [F] which image a face shows; -1 where it is of one colour.
+        plain: [F, 3] that colour, 0 to 255.
+    """
+
+    images: tuple[Pixels, ...]
+    uv: Array
+    image: Index
+    plain: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Content:
     """Points, normals and faces of one file, not yet checked against one another.
 
@@ -77,6 +97,7 @@ class Content:
         first_index: number the format gives its first vertex (1 in OBJ), for messages.
         viewpoint: [3] or [N, 3] where the sensor stood, in the frame of the points, or None.
         unit: of its lengths, where the file says so, one of `symrefine.units.METRES`.
+        paint: what the faces show, where that was asked for.
         split: the format repeats a vertex for each face or each attribute (STL, glTF).
     """
 
@@ -93,6 +114,7 @@ class Content:
     viewpoint: Array | None = None
     unit: str | None = None
     split: bool = False
+    paint: Paint | None = None
 
     def name(self, kind: Literal["point", "face"], row: int) -> str:
         """A point or a face as a message calls it: `point 7 (line 12)`, numbered as the format does."""

@@ -4,6 +4,7 @@ import io
 import json
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 from symrefine.errors import InputError
 from symrefine.load.content import Content
@@ -20,8 +21,8 @@ _HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_")
 Json = dict[str, Any]
 
 
-def read_glb(data: bytes, path: Path) -> Content:
-    """Content of a .glb file: the default scene, every node in its place."""
+def read_glb(data: bytes, path: Path, *, texture: bool = False) -> Content:
+    """Content of a .glb file: the default scene, every node in its place; its textures where they are wanted."""
     if not data.startswith(_MAGIC):
         raise InputError(f"not a GLB file: begins with {data[:8]!a}; expected {_MAGIC!a}")
     if len(data) < 20:
@@ -33,27 +34,32 @@ def read_glb(data: bytes, path: Path) -> Content:
         raise InputError(f"the header gives {length} bytes, the file has {len(data)}: cut off or added to")
     if data[16:20] != _JSON or 20 + json_length > length:
         raise InputError("the first chunk is no whole JSON text; the file is damaged")
-    return _read(data, data[20 : 20 + json_length], "glb", path)
+    return _read(data, data[20 : 20 + json_length], "glb", path, texture=texture)
 
 
-def read_gltf(data: bytes, path: Path) -> Content:
-    """Content of a .gltf file: the default scene, every node in its place; buffers are found beside it."""
-    return _read(data, data, "gltf", path)
+def read_gltf(data: bytes, path: Path, *, texture: bool = False) -> Content:
+    """Content of a .gltf file: the default scene, every node in its place; buffers and images are found beside it."""
+    return _read(data, data, "gltf", path, texture=texture)
 
 
-def _read(data: bytes, text: bytes, kind: str, path: Path) -> Content:
-    _check_tree(_parse(text))
+def _read(data: bytes, text: bytes, kind: str, path: Path, *, texture: bool) -> Content:
+    tree = _parse(text)
+    _check_tree(tree)
+    if texture:
+        _check_textures(tree, path.parent)
     import trimesh  # here, for it takes half a second
 
     try:
         scene = trimesh.load_scene(
             io.BytesIO(data), file_type=kind, resolver=trimesh.resolvers.FilePathResolver(str(path.absolute())),
-            process=False, skip_materials=True,
+            process=False, skip_materials=not texture,
         )  # fmt: skip
     except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
         reason = str(error) or "its parts contradict one another"
         raise InputError(f"glTF cannot be read: {type(error).__name__}: {shorten(reason, 80)}") from None
-    return flattened(scene)
+    if texture:
+        _check_images(tree, scene)
+    return flattened(scene, texture=texture)
 
 
 def _parse(text: bytes) -> Json:
@@ -114,6 +120,35 @@ def _referred(tree: Json, key: str, number: Any, what: str) -> Json:
     if not _is_whole(number, 0) or number >= len(things):
         raise InputError(f"{what} {number!r}; expected one of {len(things)} {key}")
     return things[number]
+
+
+def _check_textures(tree: Json, folder: Path) -> None:
+    """Refuse what trimesh leaves out of textures without a word."""
+    for number, image in enumerate(_objects(tree, "images")):
+        uri = image.get("uri")
+        if isinstance(uri, str) and not uri.startswith("data:") and not (folder / unquote(uri)).is_file():
+            raise InputError(f"image {number}, {shorten(uri)}: no such file beside it")
+    for number, material in enumerate(_objects(tree, "materials")):
+        shown = (material.get("pbrMetallicRoughness") or {}).get("baseColorTexture") or {}
+        if shown.get("texCoord", 0) != 0 or "KHR_texture_transform" in (shown.get("extensions") or {}):
+            raise InputError(
+                f"material {number} places its image by other coordinates; save it with TEXCOORD_0 as it is"
+            )
+    accessors = _objects(tree, "accessors")
+    for primitive in (p for mesh in _objects(tree, "meshes") for p in _objects(mesh, "primitives")):
+        place = primitive["attributes"].get("TEXCOORD_0")
+        if isinstance(place, int) and place < len(accessors) and accessors[place].get("componentType") != _FLOAT:
+            raise InputError(f"accessor {place} holds texture coordinates, but not as floats")
+
+
+def _check_images(tree: Json, scene: Any) -> None:
+    """Refuse images that trimesh could not open, and left out without a word."""
+    shown = [("baseColorTexture" in (m.get("pbrMetallicRoughness") or {})) for m in _objects(tree, "materials")]
+    primitives = [p for mesh in _objects(tree, "meshes") for p in _objects(mesh, "primitives")]
+    asked = sum(isinstance(m := p.get("material"), int) and m < len(shown) and shown[m] for p in primitives)
+    materials = [getattr(getattr(part, "visual", None), "material", None) for part in scene.geometry.values()]
+    if sum(getattr(m, "baseColorTexture", None) is not None for m in materials) < asked:
+        raise InputError("an image of its textures cannot be read; expected .png or .jpg, whole")
 
 
 def _objects(owner: Json, key: str) -> list[Json]:

@@ -134,7 +134,7 @@ def open_image(data: bytes, suffix: str) -> "Image":
             if kind == "PNG":
                 Image.open(io.BytesIO(data), formats=[kind]).verify()  # the checksums of all chunks
             image = Image.open(io.BytesIO(data), formats=[kind])
-            _check(image)
+            check_size(image)
             image.load()
             return ImageOps.exif_transpose(image)
     except InputError:
@@ -147,7 +147,8 @@ def open_image(data: bytes, suffix: str) -> "Image":
         raise InputError(f"not a whole {kind} image: {shorten(str(error), 80)}") from None
 
 
-def _check(image: "Image") -> None:
+def check_size(image: "Image") -> None:
+    """Refuse an image that is too large, or several, before it is decoded."""
     width, height = image.size
     if width * height > LARGEST:
         raise InputError(f"{width} x {height} pixels; at most {LARGEST:,} pixels: scale it down")

@@ -6,9 +6,9 @@ import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
-from symrefine.load.colours import colour_classes
 from symrefine.load.content import Content, Values, are_whole
 from symrefine.shape import Index
+from symrefine.texture import colour_classes
 
 
 def point_classes(content: Content, name: str) -> Index:

@@ -9,6 +9,7 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.content import Content, Polygons
 from symrefine.load.labels import triangle_classes
+from symrefine.load.paint import texture_of
 from symrefine.load.polygons import negligible, triangulate
 from symrefine.shape import Index
 
@@ -44,7 +45,10 @@ def mesh_arrays(content: Content, faces: Polygons, labels: str | None, source: s
         source, len(used), int((~flat).sum()), int(flat.sum()), len(points) - len(used),
     )  # fmt: skip
     classes = None if labels is None else triangle_classes(content, labels, owner[~flat], corners[~flat])
-    return {"points": points[used], "faces": compact.reshape(-1, 3), "labels": classes}
+    arrays = {"points": points[used], "faces": compact.reshape(-1, 3), "labels": classes}
+    if content.paint is None:
+        return arrays
+    return arrays | {"texture": texture_of(content.paint, faces, corners[~flat], owner[~flat])}
 
 
 def _check_range(content: Content, faces: Polygons) -> None:

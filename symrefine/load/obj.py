@@ -2,12 +2,15 @@
 
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.content import Content, polygons
+from symrefine.load.paint import Material, painted, read_materials
 from symrefine.load.text import Line, count, numbered_lines, parse_table, shorten
 
 # Looks, names and smoothing: nothing of the shape.
@@ -16,11 +19,14 @@ _IGNORED = frozenset("vt o g s usemap mtllib lod".split())
 _CORNERS = re.compile(r"(\s+[+-]?[0-9]{1,18}(/[+-]?[0-9]*){0,2})+")
 
 
-def read_obj(data: bytes) -> Content:
+def read_obj(data: bytes, path: Path | None = None) -> Content:
     """Content of an OBJ file.
 
     Fields are `color`, behind the coordinates of the points, and `material`, the name after `usemtl` for each face.
-    Textures are not read.
+
+    Args:
+        data: of the file.
+        path: of the file, if its textures are wanted: materials and images are found beside it.
     """
     vertices: list[Line] = []
     normals: list[Line] = []
@@ -53,7 +59,7 @@ def read_obj(data: bytes) -> Content:
     if of_points and len(normals) != len(vertices):
         told = count(len(normals), "normal")
         raise InputError(f"{told} (vn) for {len(vertices)} points (v); expected as many")
-    return Content(
+    content = Content(
         points=table[:, :3],
         normals=parse_table(of_points, columns=(3,), layout="vn x y z") if of_points else None,
         faces=polygons(corners for _, corners in faces) if faces else None,
@@ -63,6 +69,45 @@ def read_obj(data: bytes) -> Content:
         face_lines=[number for number, _ in faces],
         first_index=1,
     )
+    return content if path is None else _painted(content, materials, data, path.parent)
+
+
+def _painted(content: Content, materials: list[str], data: bytes, folder: Path) -> Content:
+    """The content with what its faces show, whose materials are named; files of materials lie in a folder."""
+    if content.faces is None:
+        return content
+    places: list[Line] = []
+    shown: list[int] = []
+    known: dict[str, Material] = {}
+    for number, text in _statements(numbered_lines(data, comment="#")):
+        keyword, _, rest = text.replace("\t", " ").partition(" ")
+        if keyword == "vt":
+            places.append((number, rest))
+        elif keyword == "mtllib":
+            known |= read_materials(folder / rest.strip())
+        elif keyword == "f":
+            shown += _shown((number, rest), len(places))
+    uv = np.append(_places(places), [[np.nan, np.nan]], axis=0)[shown]
+    return replace(content, paint=painted(materials, known, uv, content.faces))
+
+
+def _places(lines: list[Line]) -> Array:
+    """Texture coordinates [M, 2]; the third of a solid texture says nothing of an image."""
+    if not lines:
+        return np.empty((0, 2))
+    return parse_table(lines, columns=(2, 3), layout="vt u v")[:, :2]
+
+
+def _shown(line: Line, places: int) -> list[int]:
+    """Texture coordinates of the corners of a face, counted from 0; -1 for a corner without."""
+    number, text = line
+    found = []
+    for field in text.split():
+        index = int((field.split("/") + [""])[1] or 0)
+        if index > places or index < -places:
+            raise InputError(f"line {number}: a corner refers to texture coordinates {index}; there are {places} here")
+        found.append(index - 1 if index > 0 else places + index if index < 0 else -1)
+    return found
 
 
 def _statements(lines: Iterable[Line]) -> Iterator[Line]:

@@ -1,25 +1,34 @@
 """Polygon files (PLY), text and binary in either byte order."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
-from symrefine.load.content import Content, Polygons, Values, are_whole, as_float64
+from symrefine.load.content import Content, Paint, Polygons, Values, are_whole, as_float64
+from symrefine.load.paint import read_images
 from symrefine.load.ply_body import Rows, read_rows
-from symrefine.load.ply_header import Element, parse_header
+from symrefine.load.ply_header import Element, Header, parse_header
 
 _COORDINATES = ("x", "y", "z")
 _NORMAL = ("nx", "ny", "nz")
 _CORNERS = ("vertex_indices", "vertex_index")
 _COLOUR = ("red", "green", "blue")
+_TEXTURE = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _PLACE = frozenset({*_COORDINATES, *_NORMAL})
 
 
-def read_ply(data: bytes) -> Content:
+def read_ply(data: bytes, path: Path | None = None) -> Content:
     """Content of a PLY file; edges and camera data are not part of a shape.
 
     Fields are the properties of vertices and faces that are no coordinates, normals or lists, and `color` for red,
     green and blue.
+
+    Args:
+        data: of the file.
+        path: of the file, if its texture is wanted: the images that `comment TextureFile` names lie beside it.
     """
     header = parse_header(data)
     elements = {element.name: element for element in header.elements}
@@ -29,7 +38,7 @@ def read_ply(data: bytes) -> Content:
     corners = _corner_property(face) if face is not None and face.count else ""
     rows = read_rows(data, header)
     vertices = rows["vertex"]
-    return Content(
+    content = Content(
         points=_stack(vertices, _COORDINATES),
         normals=_stack(vertices, _NORMAL) if not corners and set(_NORMAL) <= _scalars(vertex) else None,
         faces=_polygons(rows["face"], corners) if corners else None,
@@ -38,6 +47,48 @@ def read_ply(data: bytes) -> Content:
         point_lines=vertices.lines,
         face_lines=rows["face"].lines if corners else None,
     )
+    if path is None or content.faces is None:
+        return content
+    return replace(content, paint=_paint(header, vertices, rows["face"], content.faces, path.parent))
+
+
+def _paint(header: Header, vertices: Rows, faces: Rows, polygons: Polygons, folder: Path) -> Paint:
+    """What the faces show, as MeshLab writes it: an image for each number, coordinates of corners or of vertices.
+
+    Raises:
+        InputError: no image, no coordinates, or numbers of images that are not there.
+    """
+    named = [comment.split(maxsplit=1)[1:] for comment in header.comments if comment.startswith("TextureFile")]
+    names = [word.strip() for words in named for word in words]
+    if not names:
+        raise InputError("has no texture: the header has no line 'comment TextureFile NAME'")
+    number = faces.columns["texnumber"].values.astype(np.int64) if "texnumber" in faces.columns else None
+    image = np.zeros(len(polygons), dtype=np.int64) if number is None else number
+    if len(image) and not 0 <= int(image.min()) <= int(image.max()) < len(names):
+        raise InputError(f"texnumber from {image.min()} to {image.max()}; there are {len(names)} images, from 0")
+    uv = _coordinates(vertices, faces, polygons)
+    plain = np.full((len(polygons), 3), 255.0)
+    return Paint(images=read_images([folder / name for name in names]), uv=uv, image=image, plain=plain)
+
+
+def _coordinates(vertices: Rows, faces: Rows, polygons: Polygons) -> Array:
+    """Texture coordinates [sum of counts, 2] of the corners of the faces."""
+    if "texcoord" in faces.columns:
+        column = faces.columns["texcoord"]
+        if column.counts is None or (column.counts != 2 * polygons.counts).any():
+            raise InputError("texcoord of faces is no list of two numbers for each corner")
+        uv = as_float64(column.values).reshape(-1, 2)
+    else:
+        pair = next((pair for pair in _TEXTURE if set(pair) <= set(vertices.columns)), None)
+        if pair is None:
+            told = " or ".join(" ".join(pair) for pair in _TEXTURE)
+            raise InputError(
+                f"has an image and no texture coordinates; expected {told} of vertices, or texcoord of faces"
+            )
+        uv = _stack(vertices, pair)[polygons.corners]
+    if not np.isfinite(uv).all():
+        raise InputError("texture coordinates are not finite")
+    return uv
 
 
 def _check_elements(elements: dict[str, Element], vertex: Element) -> None:

@@ -38,12 +38,13 @@ class Element:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Header:
-    """Byte order ("" for text, "<" or ">"), elements in their order, and where the rows begin."""
+    """Byte order ("" for text, "<" or ">"), elements in their order, where the rows begin, and the comments."""
 
     byte_order: str
     elements: list[Element]
     size: int
     lines: int
+    comments: list[str] = field(default_factory=list)
 
 
 def parse_header(data: bytes) -> Header:
@@ -69,7 +70,8 @@ def parse_header(data: bytes) -> Header:
     for element in elements:
         if not element.properties:
             raise InputError(f"the header gives element '{element.name}' no properties")
-    return Header(byte_order=byte_order, elements=elements, size=size, lines=len(lines) + 1)
+    comments = [line[8:] for line in lines if line.startswith("comment ")]
+    return Header(byte_order=byte_order, elements=elements, size=size, lines=len(lines) + 1, comments=comments)
 
 
 def _byte_order(lines: list[str]) -> str:

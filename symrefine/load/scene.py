@@ -6,19 +6,21 @@ import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
-from symrefine.load.content import Content, Polygons, Values
+from symrefine.load.content import Content, Paint, Polygons, Values
+from symrefine.load.paint import decoded
 from symrefine.load.text import count
 from symrefine.shape import Index
 
 
-def flattened(scene: Any) -> Content:
+def flattened(scene: Any, *, texture: bool = False) -> Content:
     """All triangles of a scene, or all points if it has no triangles, in the frame of the scene.
 
-    The field `color` is that of the vertices, where all parts have it; textures and materials are not read.
+    The field `color` is that of the vertices, where all parts have it; `texture` says whether images are wanted.
     """
     meshes: list[tuple[Array, Index]] = []
     clouds: list[Array] = []
     colours: list[Values] = []
+    looks: list[_Look] = []
     lines = 0
     for node in scene.graph.nodes_geometry:
         with np.errstate(all="ignore"):  # points that are not finite are refused by name later
@@ -30,6 +32,7 @@ def flattened(scene: Any) -> Content:
             # A mirroring node turns the triangles inside out; their order must follow.
             faces = np.asarray(part.faces, dtype=np.int64)
             meshes.append((points, faces[:, ::-1] if np.linalg.det(to_scene[:3, :3]) < 0 else faces))
+            looks += [_look(part, meshes[-1][1])] if texture else []
         elif hasattr(part, "entities"):
             lines += 1
         else:
@@ -50,6 +53,42 @@ def flattened(scene: Any) -> Content:
         faces=Polygons(corners=joined.ravel(), counts=np.full(len(joined), 3)),
         point_fields=fields,
         split=True,
+        paint=_paint(looks) if texture else None,
+    )
+
+
+# Texture coordinates [3 T, 2] of the corners of a part, the image of Pillow that it shows or None, and its colour [3].
+_Look = tuple[Array, Any, Array]
+
+
+def _look(part: Any, faces: Index) -> _Look:
+    visual = part.visual
+    material, uv = getattr(visual, "material", None), getattr(visual, "uv", None)
+    image = getattr(material, "baseColorTexture", None)
+    plain = np.full(3, 255.0) if material is None else np.asarray(material.main_color, dtype=np.float64)[:3]
+    if image is None:
+        return np.full((faces.size, 2), np.nan), None, plain
+    if uv is None or len(uv) != len(part.vertices) or not np.isfinite(uv).all():
+        raise InputError("a part shows an image and has no texture coordinates (TEXCOORD_0) for it")
+    return np.asarray(uv, dtype=np.float64)[faces.ravel()], image, plain
+
+
+def _paint(looks: list[_Look]) -> Paint:
+    """What the parts show; an image that several show stands once.
+
+    Raises:
+        InputError: no image, or images that are damaged or too large.
+    """
+    images = list({id(image): image for _, image, _ in looks if image is not None}.values())
+    if not images:
+        raise InputError("has no texture: no material has an image (baseColorTexture) that can be read")
+    shown = [next((k for k, known in enumerate(images) if known is image), -1) for _, image, _ in looks]
+    counts = [len(uv) // 3 for uv, _, _ in looks]
+    return Paint(
+        images=decoded(images),
+        uv=np.concatenate([uv for uv, _, _ in looks]),
+        image=np.repeat(shown, counts),
+        plain=np.repeat([plain for _, _, plain in looks], counts, axis=0),
     )
 
 

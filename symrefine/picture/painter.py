@@ -14,6 +14,7 @@ from symrefine.picture.raster import Raster
 from symrefine.picture.scene import Line, Quad, Scene
 from symrefine.picture.surface import Surface
 from symrefine.shape import Index
+from symrefine.texture import corner_weights
 
 # The picture is painted this many times larger and averaged.
 FINER = 2
@@ -108,10 +109,24 @@ def _lit(raster: Raster, depth: Array, surface: Surface, camera: Camera) -> Arra
     light = np.full(len(normals), AMBIENT)
     for lamp, power in LIGHTS:
         light += power * np.clip(normals @ unit(lamp), 0.0, None)
-    colours = np.clip(surface.colours * light[:, None] * 1.08, 0.0, 1.0)
+    numbers = raster.numbers()[seen]
+    colours = surface.colours[numbers] if surface.texture is None else _shown(surface, depth, numbers, camera)
     picture = np.ones((*seen.shape, 3))
-    picture[seen] = colours[raster.numbers()[seen]] * _crease(depth, surface.depth_scale)[seen][:, None]
+    lit = np.clip(colours * light[numbers, None] * 1.08, 0.0, 1.0)
+    picture[seen] = lit * _crease(depth, surface.depth_scale)[seen][:, None]
     return picture
+
+
+def _shown(surface: Surface, depth: Array, numbers: Index, camera: Camera) -> Array:
+    """Colours [n, 3], 0 to 1, that a texture gives the pixels in which something is seen, given the faces there [n]."""
+    assert surface.texture is not None
+    assert surface.faces is not None
+    height, width = depth.shape
+    rows, columns = np.nonzero(np.isfinite(depth))
+    x, y = columns + 0.5 - 0.5 * width, 0.5 * height - rows - 0.5
+    rays = np.column_stack([x, y, np.full(len(x), -camera.focal(height))]) @ camera.frame / camera.focal(height)
+    places = camera.eye + depth[rows, columns, None] * rays
+    return surface.texture.colours(numbers, corner_weights(places, surface.points[surface.faces[numbers]])) / 255.0
 
 
 def _crease(depth: Array, scale: float) -> Array:

@@ -10,6 +10,7 @@ from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.picture.palette import OBJECT, OUTLIER
 from symrefine.picture.scene import Quad, Scene
 from symrefine.shape import Index, Shape
+from symrefine.texture import Texture
 
 # Points of a cloud that are painted, and the fewest whose neighbourhoods say anything about normals.
 MOST_POINTS, FEWEST_FOR_NORMALS, NEIGHBOURS = 40000, 300, 40
@@ -30,6 +31,7 @@ class Surface(ReadOnly):
         faces: [F, 3], or None for a cloud.
         radius: of each point of a cloud.
         depth_scale: steps in depth of this size look like the edge of something.
+        texture: what the faces show instead of their colours, or None.
     """
 
     points: Array
@@ -38,6 +40,7 @@ class Surface(ReadOnly):
     faces: Index | None
     radius: float
     depth_scale: float
+    texture: Texture | None = None
 
 
 def make_surface(shape: Shape, scene: Scene) -> Surface:
@@ -62,7 +65,15 @@ def make_surface(shape: Shape, scene: Scene) -> Surface:
         corners, scale = shape.points - stage.center, 0.03 * stage.diagonal
         _, normals = triangle_areas_and_normals(corners, shape.faces)
         plain = _plain(len(normals))
-        return Surface(points=corners, normals=normals, colours=plain, faces=shape.faces, radius=0.0, depth_scale=scale)
+        return Surface(
+            points=corners,
+            normals=normals,
+            colours=plain,
+            faces=shape.faces,
+            radius=0.0,
+            depth_scale=scale,
+            texture=shape.texture,
+        )
     every = shape.points - stage.center if scene.scan is None else scene.scan.points
     step = max(1, -(-len(every) // MOST_POINTS))
     points = every[::step]

@@ -26,12 +26,16 @@ class Page:
         sections: from top to bottom, as HTML; empty ones are left out.
         data: what the script draws from.
         turns: whether there is a model to turn.
+        style: a sheet beside that of all pages, from `assets`; empty if there is none.
+        script: that acts on the page, from `assets`.
     """
 
     title: str
     sections: tuple[str, ...]
     data: Mapping[str, Any] = field(default_factory=dict)
     turns: bool = False
+    style: str = ""
+    script: str = "page.js"
 
 
 def plain(text: str) -> str:

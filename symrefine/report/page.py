@@ -14,21 +14,22 @@ from symrefine.shape import Shape
 def html_page(found: Found, shape: Shape) -> str:
     """The whole page; equal input gives equal pages."""
     if isinstance(found, PlanarDetection):
-        return _filled(flat.page(found, shape))
+        return filled(flat.page(found, shape))
     if isinstance(found, SubspaceDetection):
-        return _filled(projected.page(found, shape))
-    return _filled(space.page(found, shape))
+        return filled(projected.page(found, shape))
+    return filled(space.page(found, shape))
 
 
-def _filled(page: Page) -> str:
+def filled(page: Page) -> str:
     """The template with the content of a page; only what turns needs the library that turns it."""
-    scripts = [f"<script>{_asset('three.js')}</script>"] if page.turns else []
+    styles = ["page.css", page.style] if page.style else ["page.css"]
+    scripts = ["three.js", page.script] if page.turns else [page.script]
     return Template(_asset("page.html")).substitute(
         title=page.title,
-        style=_asset("page.css"),
+        style="".join(map(_asset, styles)),
         body="\n".join(section for section in page.sections if section),
         data=island(page.data),
-        scripts="\n".join([*scripts, f"<script>{_asset('page.js')}</script>"]),
+        scripts="\n".join(f"<script>{_asset(script)}</script>" for script in scripts),
     )
 
 

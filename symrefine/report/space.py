@@ -101,6 +101,9 @@ def _facts(d: Detection, shape: Shape) -> str:
         ("Tolerance", percent(d.tolerance)),
         ("Confidence", "none" if d.undetermined else f"{d.confidence:.2f}"),
     ]
+    if d.textured is not None:
+        sure = "" if d.textured.undetermined else f", {d.textured.confidence:.2f}"
+        pairs.append(("With its texture", f"{symbol(d.textured.point_group)}{sure}"))
     if said := scanned(d):
         pairs.append(("Scan", said))
     return facts(pairs)

@@ -1,0 +1,209 @@
+"""`symrefine label`: a folder of models to `models_info.json`, with a page on which a person decides the doubtful."""
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from symrefine.cli.inputs import failure
+from symrefine.cli.outputs import complain, is_quiet, note, print_lines, write_all
+from symrefine.cli.signs import progress
+from symrefine.cli.values import (
+    add_class_options,
+    add_detection_options,
+    add_frame_option,
+    add_scan_options,
+    count,
+    detection_options,
+    positive,
+    probability,
+)
+from symrefine.errors import InputError, one_line
+from symrefine.files import check_target, json_text, naming, text_writer, whole
+
+if TYPE_CHECKING:
+    from symrefine.journal import Journal
+    from symrefine.review.decisions import Decisions
+    from symrefine.review.labels import Labels
+    from symrefine.review.objects import Row
+
+    Rows = Mapping[int, Row]
+
+HELP = "label the symmetries of a data set: detect all, and have a person decide the doubtful ones on a page"
+DESCRIPTION = (
+    "Detect the symmetries of all models in DIR, named as BOP does (obj_000001.ply is object 1), and write to a "
+    "folder: models_info.json with the symmetries of all that are settled, labels.json with who settled them and what "
+    "is still open, and review.html, a page that needs no server, on which a person chooses the group of each object "
+    "and saves the choices as decisions.json. Run again with --decisions they are applied, and kept in the folder. An "
+    "object is settled where a person decided it, or its confidence is that of --accept; no other has an entry in "
+    "models_info.json. What was detected is not detected again."
+)
+# Of a group that was not found: the least probability that is worth a word.
+_WORTH = 0.01
+# What names an object, its folder, and that of the labels.
+Job = tuple["Row", str, str]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("dir", metavar="DIR", help="folder of models: obj_000001.ply is object 1")
+    parser.add_argument("--out", required=True, metavar="FOLDER", help="where the labels go; it is made if not there")
+    parser.add_argument("--decisions", metavar="FILE", help="apply these choices, saved from the page of the review")
+    parser.add_argument(
+        "--accept",
+        type=probability,
+        metavar="P",
+        help="settle objects of this confidence or more without a look, such as 0.95 (default: none)",
+    )
+    parser.add_argument("--scale", type=positive, metavar="X", help="millimetres in one unit of the files (default: 1)")
+    parser.add_argument(
+        "--workers", type=count, default=1, metavar="N", help="files done at the same time (default: %(default)s)"
+    )
+    add_class_options(parser)
+    add_frame_option(parser)
+    add_scan_options(parser)
+    add_detection_options(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Detect what is new, apply what was decided, write the labels, tell what is left."""
+    from symrefine.study.work import one_thread_each
+
+    one_thread_each()  # so that one worker gives the same bytes as several
+    from symrefine.export.bop import models_of
+    from symrefine.review.decisions import read_decisions
+    from symrefine.review.labels import labelled, merged
+    from symrefine.review.store import DECISIONS, heads, opened
+
+    models, out = models_of(Path(args.dir)), Path(args.out)
+    asked = heads(models, detection_options(args), float(args.scale or 1.0))
+    given = read_decisions(Path(args.decisions)) if args.decisions else {}
+    _check(args.decisions, given, asked)
+    with opened(out) as held:
+        kept = read_decisions(out / DECISIONS) if (out / DECISIONS).is_file() else {}
+        rows = _detected(args, asked, held)
+        _check(args.decisions, given, rows)
+        decisions = merged(_fitting(kept, rows, out / DECISIONS), given)
+        labels = labelled(rows, decisions, args.accept)
+        _write(args, rows, decisions, labels)
+    _tell(args, rows, labels)
+    return int(any(row["error"] is not None for row in rows.values()))
+
+
+def _check(name: str, given: "Decisions", rows: "Rows") -> None:
+    """Refuse a decision that does not fit its object."""
+    from symrefine.review.labels import trouble
+
+    for k, decision in enumerate(given.values()):
+        if told := trouble(decision, rows):
+            raise InputError(f"{name}: decisions[{k}].{told}")
+
+
+def _fitting(kept: "Decisions", rows: "Rows", place: Path) -> "Decisions":
+    """The decisions of before whose objects are as they were; tells of the others, which are open again."""
+    from symrefine.review.labels import trouble
+
+    told = {number: trouble(decision, rows) for number, decision in kept.items()}
+    for number, why in told.items():
+        if why:
+            note(f"{place}: object {number} is open again: {why}")
+    return {number: decision for number, decision in kept.items() if not told[number]}
+
+
+def _detected(args: argparse.Namespace, asked: "Rows", held: "Journal") -> "Rows":
+    """The rows of all objects; those that still tell of their files are not made again."""
+    from symrefine.review.store import ROWS, holds
+    from symrefine.study.work import in_processes
+
+    out = Path(args.out)
+    if held.torn:
+        note(f"{out / ROWS}: the last row is incomplete; it is removed and done again")
+    latest: dict[int, Any] = {row["object"]: row for row in held.rows}
+    rows: dict[int, Row] = {n: latest[n] for n, row in asked.items() if holds(out, latest.get(n), row)}
+    todo = [row for number, row in asked.items() if number not in rows]
+    jobs = [(row, args.dir, args.out) for row in todo]
+    print_lines(_line(row) for row in rows.values())
+    with progress("detecting", len(asked), len(rows)) as advance:
+        for row in in_processes(examine_model, jobs, args.workers):
+            with naming(str(out / ROWS)):
+                held.append(row)
+            rows[row["object"]] = row
+            if is_quiet() and row["error"] is not None:
+                complain(row["error"])
+            print_lines([_line(row)])
+            advance()
+    return dict(sorted(rows.items()))
+
+
+def examine_model(job: Job) -> "Row":
+    """The row of one object: what was found, or what was wrong with it; its pictures are written first."""
+    from symrefine.cli.detect import examine
+    from symrefine.detection.result import Detection
+    from symrefine.review.objects import examined
+    from symrefine.review.store import place_of_picture
+
+    row, folder, out = job
+    path = Path(folder, row["file"])
+    if row["error"] is not None:
+        return row
+    try:
+        shape, found, _ = examine(str(path), row["options"])
+        if not isinstance(found, Detection):
+            raise InputError(f"{path}: points have {shape.dim} coordinates; labels are for objects in space")
+        kept = examined(found, shape, scale=row["scale"])
+        for k, picture in enumerate(kept.pictures):
+            with whole(place_of_picture(Path(out), row, k)) as draft:
+                draft.write_bytes(picture)
+        return {**row, **kept.told}  # type: ignore[typeddict-item]
+    except Exception as error:  # noqa: BLE001 - one file must not end the others
+        return {**row, "error": failure(str(path), error)}
+
+
+def _write(args: argparse.Namespace, rows: "Rows", decisions: "Decisions", labels: "Labels") -> None:
+    """All results, or none of them."""
+    from symrefine.review.cards import page_text
+    from symrefine.review.decisions import decisions_text
+    from symrefine.review.labels import labels_text, models_info
+    from symrefine.review.store import DECISIONS, INFO, LABELS, PAGE
+
+    out = Path(args.out)
+    texts = {
+        DECISIONS: decisions_text(decisions),
+        INFO: json_text(models_info(labels)),
+        LABELS: labels_text(rows, labels, args.accept),
+        PAGE: page_text(args.dir, out, rows, decisions, labels),
+    }
+    for name in texts:
+        check_target(out / name)
+    write_all({str(out / name): text_writer(text) for name, text in texts.items()})
+
+
+def _line(row: "Row") -> str:
+    """What was found in an object, or what was wrong with it, and what else it may be."""
+    if row["error"] is not None:
+        return f"failed: {one_line(row['error'])}"
+    asked = row["tolerances"].index(row["tolerance"])
+    likely = {choice["point_group"]: choice["probabilities"][asked] or 0.0 for choice in row["choices"]}
+    others = [f"{name} {p:.2g}" for name, p in likely.items() if name != row["answer"] and p >= _WORTH]
+    told = f"  or {', '.join(others)}" if others else ""
+    return f"{row['answer'] or 'undetermined':<13}{row['confidence']:<7.3f}{one_line(row['file'])}{told}"
+
+
+def _tell(args: argparse.Namespace, rows: "Rows", labels: "Labels") -> None:
+    """How many are settled, by whom, and what is to be done with the others."""
+    from symrefine.export.bop import metres_doubt
+    from symrefine.review.store import INFO, LABELS, PAGE
+
+    by = [label.by for label in labels.values()]
+    failed = sum(row["error"] is not None for row in rows.values())
+    left = len(rows) - len(labels) - failed
+    settled = f"{len(labels)} settled ({by.count('confidence')} by confidence, {by.count('person')} by a person)"
+    parts = [f"{len(rows)} objects: {settled}", f"{left} to look at", f"{failed} failed" if failed else ""]
+    print_lines([", ".join(part for part in parts if part)])
+    print_lines(f"wrote {Path(args.out, name)}" for name in (INFO, LABELS, PAGE))
+    if left:
+        print_lines([f"open {Path(args.out, PAGE)}, choose, save, and run this again with --decisions"])
+    if labels and args.scale is None:
+        size, number = min((label.choice["entry"]["diameter"], number) for number, label in labels.items())
+        if doubt := metres_doubt(f"object {number}", size, "--scale"):
+            note(doubt)

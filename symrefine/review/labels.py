@@ -1,0 +1,124 @@
+"""What follows from what was found and what a person decided: the labels of a data set, and what is still open."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from symrefine.export.bop import Entry
+from symrefine.files import json_text
+from symrefine.review.decisions import Decision, Decisions
+from symrefine.review.objects import Choice, Row, choice_of
+
+SCHEMA = "symrefine.labels/1"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Label:
+    """The symmetry of an object, and who says so: a person, or a confidence that is high enough."""
+
+    row: Row
+    choice: Choice
+    by: Literal["person", "confidence"]
+    decision: Decision | None = None
+
+
+Labels = dict[int, Label]
+
+
+def trouble(decision: Decision, rows: Mapping[int, Row]) -> str:
+    """The field of a decision that does not fit what is there, and what would; empty where it fits.
+
+    Of rows without choices, of objects that are still to be examined, it is checked that they are the same.
+    """
+    row = rows.get(decision.object)
+    if row is None:
+        return f"object: is {decision.object}, which is not there; expected one of {_some(rows)}"
+    if row["sha256"] != decision.sha256:
+        return (
+            f"sha256: is not that of {row['file']}, which has changed since it was looked at; decide it again on the "
+            "new page"
+        )
+    names = [choice["point_group"] for choice in row["choices"]]
+    if names and decision.point_group is not None and decision.point_group not in names:
+        return f"point_group: is {decision.point_group!r}; expected one of {', '.join(names)}"
+    return ""
+
+
+def _some(rows: Mapping[int, Row]) -> str:
+    numbers = sorted(rows)
+    return ", ".join(map(str, numbers)) if len(numbers) <= 12 else f"{len(numbers)} from {numbers[0]} to {numbers[-1]}"
+
+
+def merged(before: Decisions, given: Decisions) -> Decisions:
+    """Decisions of before with others put in their place; what is taken back is gone."""
+    return {number: d for number, d in (before | given).items() if d.point_group is not None}
+
+
+def labelled(rows: Mapping[int, Row], decisions: Decisions, accept: float | None) -> Labels:
+    """The objects whose symmetry is settled; a person has the last word.
+
+    Args:
+        accept: confidence from which an object needs no look; None if all do.
+    """
+    labels: Labels = {}
+    for number, row in sorted(rows.items()):
+        decision = decisions.get(number)
+        said = row["answer"] if decision is None else decision.point_group
+        sure = decision is not None or (accept is not None and row["confidence"] >= accept)
+        if sure and said is not None and (choice := choice_of(row, said)):
+            labels[number] = Label(
+                row=row, choice=choice, by="confidence" if decision is None else "person", decision=decision
+            )
+    return labels
+
+
+def models_info(labels: Labels) -> dict[str, Entry]:
+    """The entries of BOP: of objects that are settled, and of no other.
+
+    An entry without symmetries would say that an object has none; without an entry a program stops there.
+    """
+    return {str(number): label.choice["entry"] for number, label in labels.items()}
+
+
+def labels_text(rows: Mapping[int, Row], labels: Labels, accept: float | None) -> str:
+    """`labels.json`: each label with who says so, and what is still open with the reason."""
+    left = {number: row for number, row in sorted(rows.items()) if number not in labels}
+    return json_text(
+        {
+            "schema": SCHEMA,
+            "version": next((row["version"] for row in rows.values()), None),
+            "accept": accept,
+            "objects": [_told(number, label) for number, label in labels.items()],
+            "open": [
+                {"object": number, "file": row["file"], "point_group": row["answer"], "why": why_open(row, accept)}
+                for number, row in left.items()
+            ],
+        }
+    )
+
+
+def _told(number: int, label: Label) -> dict[str, Any]:
+    row, choice, decision = label.row, label.choice, label.decision
+    return {
+        "object": number,
+        "file": row["file"],
+        "sha256": row["sha256"],
+        "point_group": choice["point_group"],
+        "rotations": choice["rotations"],
+        "mirrors_only_in_shape": bool(decision and decision.mirrors_only_in_shape),
+        "by": label.by,
+        "confidence": row["confidence"] if choice["point_group"] == row["answer"] else None,
+        "found": row["answer"],
+        "tolerance": decision.tolerance if decision else row["tolerance"],
+        "note": decision.note if decision else "",
+    }
+
+
+def why_open(row: Row, accept: float | None) -> str:
+    """Why an object has no label."""
+    if row["error"] is not None:
+        return row["error"]
+    if row["doubt"]:
+        return row["doubt"]
+    asked = "nobody looked at it" if accept is None else f"below {accept:g}, and nobody looked at it"
+    return f"confidence {row['confidence']:.6g}: {asked}"

@@ -1,0 +1,306 @@
+"""A data set labelled: what is settled and what is open, decisions applied, refused, kept and taken back."""
+
+import json
+import math
+import shutil
+from collections.abc import Callable
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+from experiments.objects.shapes import box, join, sample
+from symrefine.cli import invoke, label
+from symrefine.export.bop import bop_entry
+from symrefine.front.verbs import detect
+from symrefine.geometry import random_orthogonal
+from symrefine.load import load
+from symrefine.review.decisions import decisions_text, read_decisions
+from symrefine.shape import Shape
+
+Run = Callable[..., tuple[int, str, str]]
+RESULTS = ("decisions.json", "models_info.json", "labels.json", "review.html", "objects.jsonl")
+
+
+def ply(shape: Shape) -> str:
+    assert shape.faces is not None
+    head = f"ply\nformat ascii 1.0\nelement vertex {len(shape.points)}\nproperty double x\nproperty double y\n"
+    head += f"property double z\nelement face {len(shape.faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    rows = [" ".join(map(repr, map(float, p))) for p in shape.points] + [f"3 {a} {b} {c}" for a, b, c in shape.faces]
+    return head + "\n".join(rows) + "\n"
+
+
+def turned(shape: Shape, seed: int) -> Shape:
+    rng = np.random.default_rng(seed)
+    return Shape(shape.points @ random_orthogonal(rng).T * 80.0 + rng.normal(size=3) * 100.0, shape.faces)
+
+
+def square() -> Shape:
+    """A box whose sides differ by 3 %: D4h to one who forgives it, else D2h."""
+    return turned(join([box((0, 0, 0), (1.0, 0.97, 0.4))]), 1)
+
+
+def wedge() -> Shape:
+    """No symmetry that one could doubt."""
+    corners = np.array([[0, 0, 0], [70, 0, 0], [15, 30, 0], [40, -10, 20.0]])
+    return Shape(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+
+
+@pytest.fixture(scope="module")
+def models(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three objects, and things beside them that are no models."""
+    folder = tmp_path_factory.mktemp("data") / "models"
+    folder.mkdir()
+    made = {1: turned(join([box((0, 0, 0), (1.0, 0.7, 0.4))]), 2), 4: square(), 12: wedge()}
+    for number, shape in made.items():
+        (folder / f"obj_{number:06d}.ply").write_text(ply(shape))
+    (folder / "obj_000004.png").write_text("a texture")
+    (folder / "models_info.json").write_text("{}")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def first(models: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The labels of a first run, which nobody looked at."""
+    out = tmp_path_factory.mktemp("first") / "labels"
+    assert invoke(["label", str(models), "--out", str(out), "-q"]) == 0
+    return out
+
+
+@pytest.fixture
+def out(first: Path, tmp_path: Path) -> Path:
+    """A copy of them."""
+    return Path(shutil.copytree(first, tmp_path / "labels"))
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], models: Path, out: Path) -> Run:
+    def call(*argv: object, folder: Path = models, to: Path = out) -> tuple[int, str, str]:
+        status = invoke(["label", str(folder), "--out", str(to), *map(str, argv)])
+        return status, *capsys.readouterr()
+
+    return call
+
+
+def of(out: Path, name: str) -> Any:
+    return json.loads((out / name).read_text(encoding="utf-8"))
+
+
+def rows(out: Path) -> dict[int, Any]:
+    made = (json.loads(line) for line in (out / "objects.jsonl").read_text().splitlines())
+    return {row["object"]: row for row in made}
+
+
+def decided(out: Path, number: int, **changes: Any) -> dict[str, Any]:
+    """A decision of an object as the page saves it."""
+    row = rows(out)[number]
+    decision = {name: row[name] for name in ("object", "file", "sha256")}
+    decision |= {
+        "point_group": row["answer"],
+        "tolerance": row["tolerance"],
+        "mirrors_only_in_shape": False,
+        "note": "",
+    }
+    return decision | changes
+
+
+def saved(path: Path, *decisions: dict[str, Any]) -> Path:
+    path.write_text(json.dumps({"schema": "symrefine.decisions/1", "decisions": decisions}))
+    return path
+
+
+def schema(name: str) -> Any:
+    return json.loads(files("symrefine").joinpath("schema", f"{name}.schema.json").read_text(encoding="utf-8"))
+
+
+def test_nothing_is_settled_without_a_look(first: Path) -> None:
+    assert of(first, "models_info.json") == {}
+    labels = of(first, "labels.json")
+    assert labels["objects"] == []
+    assert [entry["object"] for entry in labels["open"]] == [1, 4, 12]
+    assert "obj_000004.ply" in (first / "review.html").read_text(encoding="utf-8")
+
+
+def test_what_is_sure_enough_is_settled(run: Run, out: Path, models: Path) -> None:
+    sure = sorted(row["confidence"] for row in rows(out).values())
+    status, said, _ = run("--accept", sure[1])
+    assert status == 0
+    assert "3 objects: 2 settled (2 by confidence, 0 by a person), 1 to look at" in said
+    info = of(out, "models_info.json")
+    assert sorted(info) == ["1", "12"]
+    shape = load(models / "obj_000001.ply")
+    assert info["1"] == bop_entry(detect(shape), shape)
+    assert "symmetries_discrete" not in info["12"]
+    for name in ("labels", "decisions"):
+        jsonschema.validate(of(out, f"{name}.json"), schema(name))
+
+
+def test_equal_runs_give_equal_bytes_and_nothing_is_detected_twice(
+    run: Run, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert run("--accept", 0.5, to=tmp_path / "other")[0] == 0
+    monkeypatch.setattr(label, "examine_model", lambda _: pytest.fail("was detected before"))
+    assert run("--accept", 0.5)[0] == 0
+    for name in RESULTS:
+        one, other = ((folder / name).read_bytes() for folder in (out, tmp_path / "other"))
+        assert one.replace(bytes(out), b"OUT") == other.replace(bytes(tmp_path / "other"), b"OUT"), name
+
+
+@pytest.mark.parametrize("group", ["C1", "D2h", "D4h"])
+def test_what_a_person_chooses_has_its_rotations(run: Run, out: Path, tmp_path: Path, group: str, models: Path) -> None:
+    """Each choice of the box that is almost square: a closed group that takes it onto itself as well as it can."""
+    decisions = saved(tmp_path / "decisions.json", decided(out, 4, point_group=group, note="seen by hand"))
+    status, said, _ = run("--decisions", decisions)
+    assert status == 0
+    assert "1 settled (0 by confidence, 1 by a person), 2 to look at" in said
+    entry = of(out, "models_info.json")["4"]
+    motions = np.array([np.eye(4).ravel(), *entry.get("symmetries_discrete", [])]).reshape(-1, 4, 4)
+    assert len(motions) == {"C1": 1, "D2h": 4, "D4h": 8}[group]
+    products = (motions[:, None] @ motions[None]).reshape(-1, 16)
+    away = np.abs(products[:, None] - motions.reshape(1, -1, 16)).max(axis=2).min(axis=1)
+    assert away.max() < 1e-3 * entry["diameter"]
+    points = load(models / "obj_000004.ply").points
+    for motion in motions:
+        moved = points @ motion[:3, :3].T + motion[:3, 3]
+        miss = np.linalg.norm(moved[:, None] - points[None], axis=2).min(axis=1).max()
+        assert miss < (0.05 if group == "D4h" else 1e-6) * entry["diameter"]
+    (told,) = of(out, "labels.json")["objects"]
+    assert (told["point_group"], told["by"], told["note"]) == (group, "person", "seen by hand")
+
+
+def test_decisions_are_kept_put_anew_and_taken_back(run: Run, out: Path, tmp_path: Path) -> None:
+    path = tmp_path / "decisions.json"
+    run("--decisions", saved(path, decided(out, 4, point_group="D4h", mirrors_only_in_shape=True), decided(out, 1)))
+    assert sorted(of(out, "models_info.json")) == ["1", "4"]
+    assert [o["mirrors_only_in_shape"] for o in of(out, "labels.json")["objects"]] == [False, True]
+    run()
+    assert sorted(of(out, "models_info.json")) == ["1", "4"], "kept without being given again"
+    run("--decisions", saved(path, decided(out, 4, point_group="D2h"), decided(out, 1, point_group=None)))
+    assert [(o["object"], o["point_group"]) for o in of(out, "labels.json")["objects"]] == [(4, "D2h")]
+    run("--decisions", out / "decisions.json")
+    assert sorted(of(out, "models_info.json")) == ["4"]
+
+
+def test_what_the_page_saves_is_what_is_read(out: Path, tmp_path: Path) -> None:
+    path = saved(tmp_path / "decisions.json", decided(out, 12), decided(out, 4, note="é <b>\u202e"))
+    jsonschema.validate(json.loads(path.read_text()), schema("decisions"))
+    read = read_decisions(path)
+    (tmp_path / "again.json").write_text(decisions_text(read))
+    assert read_decisions(tmp_path / "again.json") == read
+    jsonschema.validate(json.loads(decisions_text(read)), schema("decisions"))
+
+
+def test_an_object_that_changed_is_open_again(run: Run, models: Path, out: Path, tmp_path: Path) -> None:
+    run("--decisions", saved(tmp_path / "decisions.json", decided(out, 4), decided(out, 1)))
+    folder = Path(shutil.copytree(models, tmp_path / "models"))
+    (folder / "obj_000004.ply").write_text(ply(turned(square(), 5)))
+    before = {name: (out / name).read_bytes() for name in RESULTS}
+    status, _, said = run("--decisions", tmp_path / "decisions.json", folder=folder)
+    assert status == 2
+    assert "decisions[0].sha256: is not that of obj_000004.ply, which has changed" in said
+    assert {name: (out / name).read_bytes() for name in RESULTS} == before
+    status, _, said = run(folder=folder)
+    assert status == 0
+    assert "object 4 is open again" in said
+    assert sorted(of(out, "models_info.json")) == ["1"]
+    assert [d["object"] for d in of(out, "decisions.json")["decisions"]] == [1]
+
+
+BAD = {
+    "no such file": (None, "no such file"),
+    "not JSON": ("{", "is not JSON"),
+    "NaN": ('{"schema": NaN}', "NaN is no number of JSON"),
+    "deep": ("[" * 100_000, "is not JSON"),
+    "a list": ("[]", "schema: is list; expected an object"),
+    "another schema": ({"schema": "symrefine.labels/1", "decisions": []}, "schema: is \"symrefine.labels/1\""),
+    "no decisions": ({"schema": "symrefine.decisions/1"}, "decisions: is missing"),
+    "twice": ('{"schema": "symrefine.decisions/1", "schema": ""}', "stands there twice"),
+    "unknown key": ({"extra": 1}, "extra: is unknown; expected schema, decisions"),
+    "unknown field": ({"groups": 1}, "decisions[0].groups: is unknown"),
+    "missing": ({"sha256": ...}, "decisions[0].sha256: is missing; expected the SHA-256"),
+    "id": ({"object": 7}, "decisions[0].object: is 7, which is not there; expected one of 1, 4, 12"),
+    "no id": ({"object": True}, "decisions[0].object: is true; expected the number of an object"),
+    "group": ({"point_group": "C7"}, "decisions[0].point_group: is 'C7'; expected one of C1, D2h, D4h"),
+    "hash": ({"sha256": "0" * 63}, "decisions[0].sha256: is"),
+    "stale": ({"sha256": "0" * 64}, "decisions[0].sha256: is not that of obj_000004.ply"),
+    "tolerance": ({"tolerance": 0.5}, "decisions[0].tolerance: is 0.5; expected a fraction of the diagonal"),
+    "tick": ({"mirrors_only_in_shape": "yes"}, 'mirrors_only_in_shape: is "yes"; expected true or false'),
+    "note": ({"note": "x" * 3000}, "decisions[0].note: is"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_decisions_are_refused_in_one_line(run: Run, out: Path, tmp_path: Path, case: str) -> None:
+    wrong, said = BAD[case]
+    path = tmp_path / "given.json"
+    if isinstance(wrong, str):
+        path.write_text(wrong)
+    elif wrong is not None and ("schema" in wrong or "extra" in wrong):
+        path.write_text(
+            json.dumps({"schema": "symrefine.decisions/1", "decisions": []} | wrong if "extra" in wrong else wrong)
+        )
+    elif wrong is not None:
+        decision = {name: value for name, value in (decided(out, 4) | wrong).items() if value is not ...}
+        saved(path, decision)
+    before = {name: (out / name).read_bytes() for name in RESULTS}
+    status, _, error = run("--decisions", path)
+    assert (status, error.count("\n")) == (2, 1), error
+    assert error.startswith(f"symrefine: {path}: ")
+    assert said in error
+    assert {name: (out / name).read_bytes() for name in RESULTS} == before
+
+
+def test_one_object_is_decided_once(run: Run, out: Path, tmp_path: Path) -> None:
+    path = saved(tmp_path / "given.json", decided(out, 4), decided(out, 4))
+    assert "decisions[1].object: is 4, decided before" in run("--decisions", path)[2]
+
+
+@pytest.mark.parametrize("name", ["models_info.json", "review.html", "objects.jsonl"])
+def test_what_others_wrote_is_not_overwritten(run: Run, tmp_path: Path, name: str) -> None:
+    folder = tmp_path / "theirs"
+    folder.mkdir()
+    (folder / name).write_text("theirs")
+    status, _, said = run(to=folder)
+    assert (status, said.count("\n")) == (2, 1)
+    assert [path.read_text() for path in folder.iterdir()] == ["theirs"]
+
+
+def test_what_cannot_be_used_is_told_and_does_not_end_the_others(run: Run, models: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(models, tmp_path / "models"))
+    for number in (4, 12):
+        (folder / f"obj_{number:06d}.ply").unlink()
+    (folder / "obj_000002.ply").write_text("ply\n")
+    (folder / "obj_000003.xyz").write_text("\n".join("0.0 1.0" for _ in range(3)))
+    status, said, _ = run("--accept", 0.5, folder=folder, to=tmp_path / "new")
+    assert status == 1
+    assert "1 settled" in said
+    assert "2 failed" in said
+    assert [entry["object"] for entry in of(tmp_path / "new", "labels.json")["open"]] == [2, 3]
+    assert "Could not be used" in (tmp_path / "new" / "review.html").read_text()
+
+
+def test_two_models_of_one_object_are_refused(run: Run, models: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(models, tmp_path / "models"))
+    shutil.copy(folder / "obj_000004.ply", folder / "obj_4.ply")
+    assert "is object 4, and so is" in run(folder=folder, to=tmp_path / "new")[2]
+    assert not (tmp_path / "new").exists()
+    assert "no model in it" in run(folder=tmp_path)[2]
+
+
+def test_a_person_decides_where_noise_hides_the_answer(run: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "models"
+    folder.mkdir()
+    points = sample(join([box((0, 0, 0), (1.0, 0.7, 0.4))]), 1500, 0.02, np.random.default_rng(0))
+    np.savetxt(folder / "obj_000001.xyz", points)
+    to = tmp_path / "new"
+    assert "undetermined" in run("--tolerance", 0.01, "--accept", 0.01, folder=folder, to=to)[1]
+    assert of(to, "models_info.json") == {}
+    groups = [choice["point_group"] for choice in rows(to)[1]["choices"]]
+    path = saved(tmp_path / "decisions.json", decided(to, 1, point_group=groups[-1]))
+    run("--tolerance", 0.01, "--decisions", path, folder=folder, to=to)
+    entry = of(to, "models_info.json")["1"]
+    assert math.isfinite(entry["diameter"])
+    assert of(to, "labels.json")["objects"][0]["found"] is None

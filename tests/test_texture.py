@@ -1,0 +1,447 @@
+"""Shapes with a texture: the group that colours keep, from arrays and from files; what is missing is refused."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.resources import files
+from io import BytesIO
+from itertools import pairwise
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from PIL import Image
+
+from experiments.objects.shapes import join, revolve
+from symrefine.cli import invoke
+from symrefine.decide.subgroups import subgroup_chain
+from symrefine.detection.story import detect
+from symrefine.errors import InputError
+from symrefine.geometry import Array, random_orthogonal
+from symrefine.groups import is_subgroup, point_group
+from symrefine.load import image as pictures
+from symrefine.load import load, paint
+from symrefine.shape import Shape
+from symrefine.texture import Texture, corner_weights
+
+Colour = Callable[[Array], Array]
+CUBE, BOX = (1.0, 1.0, 1.0), (1.0, 0.7, 0.4)
+SLOW = pytest.mark.slow
+
+
+def plain(places: Array) -> Array:
+    """One colour everywhere."""
+    return np.broadcast_to(np.array([200.0, 120.0, 40.0]), places.shape).copy()
+
+
+def dot(center: tuple[float, float, float], radius: float) -> Colour:
+    """A blue dot."""
+
+    def colour(places: Array) -> Array:
+        found = plain(places)
+        found[np.linalg.norm(places - np.array(center), axis=-1) < radius] = (20, 20, 200)
+        return found
+
+    return colour
+
+
+def quarters(places: Array) -> Array:
+    """Dark where x and y have different signs."""
+    found = plain(places)
+    found[(places[..., 0] > 0) ^ (places[..., 1] > 0)] = (20, 40, 60)
+    return found
+
+
+def shade(places: Array) -> Array:
+    """A light from one side: colours differ by less than what counts."""
+    return plain(places) + 20.0 * places[..., :1]
+
+
+def sides(size: tuple[float, ...], colour: Colour, pixels: int = 64) -> tuple[list[Array], list[Array]]:
+    """Corners [4, 3] of each side of a box, at (0, 0), (1, 0), (1, 1), (0, 1) of its image, and these images."""
+    half = np.array(size) / 2
+    along = (np.arange(pixels) + 0.5) / pixels
+    corners, images = [], []
+    for axis in range(3):
+        a, b = (k for k in range(3) if k != axis)
+        for sign in (-1.0, 1.0):
+            u, v = np.meshgrid(along, along[::-1])
+            places = np.zeros((pixels, pixels, 3))
+            places[..., axis] = sign * half[axis]
+            places[..., a], places[..., b] = (2 * u - 1) * half[a], (2 * v - 1) * half[b]
+            quad = np.zeros((4, 3))
+            quad[:, axis] = sign * half[axis]
+            quad[:, a], quad[:, b] = half[a] * np.array([-1, 1, 1, -1]), half[b] * np.array([-1, -1, 1, 1])
+            corners.append(quad)
+            images.append(colour(places))
+    return corners, images
+
+
+def jpeg(image: Array, quality: int = 25) -> Array:
+    """What compression leaves of an image with some grain."""
+    grain = np.random.default_rng(5).normal(scale=6.0, size=image.shape)
+    packed = BytesIO()
+    Image.fromarray(np.clip(image + grain, 0, 255).astype(np.uint8)).save(packed, format="JPEG", quality=quality)
+    return np.asarray(Image.open(packed).convert("RGB"), dtype=float)
+
+
+def box(size: tuple[float, ...], colour: Colour, seed: int = 0, spoil: Callable[[Array], Array] = np.asarray) -> Shape:
+    """A painted box in a random pose, in a random unit."""
+    corners, images = sides(size, colour)
+    uv = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
+    pairs = [[0, 1, 2], [0, 2, 3]]
+    texture = Texture(
+        images=tuple(np.clip(spoil(image), 0, 255).astype(np.uint8) for image in images),
+        uv=np.concatenate([uv[pairs] for _ in corners]),
+        image=np.repeat(np.arange(6), 2),
+        plain=np.zeros((12, 3)),
+    )
+    faces = np.concatenate([np.array(pairs) + 4 * k for k in range(6)])
+    return turned(Shape(np.concatenate(corners), faces, texture=texture), seed)
+
+
+def turned(shape: Shape, seed: int) -> Shape:
+    rng = np.random.default_rng(seed)
+    pose, scale = random_orthogonal(rng, det=1 - 2 * (seed % 2)), float(rng.choice([0.01, 1.0, 1000.0]))
+    return replace(shape, points=scale * (shape.points @ pose.T + rng.normal(size=3)))
+
+
+CASES = {
+    "cube, plain": (CUBE, plain, "Oh", "Oh"),
+    "cube, a dot on a side": (CUBE, dot((0, 0, 0.5), 0.25), "Oh", "C4v"),
+    "cube, a dot at a corner": (CUBE, dot((0.5, 0.5, 0.5), 0.4), "Oh", "C3v"),
+    "cube, quarters": (CUBE, quarters, "Oh", "D2h"),
+    "cube, a light": (CUBE, shade, "Oh", "Oh"),
+    "box, plain": (BOX, plain, "D2h", "D2h"),
+    "box, a dot on a side": (BOX, dot((0, 0, 0.2), 0.15), "D2h", "C2v"),
+    "box, a dot off the middle": (BOX, dot((0.25, 0.0, 0.2), 0.1), "D2h", "Cs"),
+    "box, a dot anywhere": (BOX, dot((0.25, 0.18, 0.2), 0.14), "D2h", "C1"),
+    "box, quarters": (BOX, quarters, "D2h", "C2h"),
+}
+SEVERAL = ("cube, a dot on a side", "box, plain", "box, a dot anywhere", "box, quarters")
+
+
+@pytest.mark.parametrize("spoil", [np.asarray, jpeg])
+@pytest.mark.parametrize("case", [c if c in SEVERAL else pytest.param(c, marks=SLOW) for c in CASES])
+def test_colours_keep_a_part_of_the_group(case: str, spoil: Callable[[Array], Array]) -> None:
+    size, colour, shape_group, group = CASES[case]
+    found = detect(box(size, colour, seed=len(case), spoil=spoil))
+    kept = found.textured
+    assert kept is not None
+    assert (found.point_group, kept.point_group) == (shape_group, group)
+    assert kept.confidence > 0.9
+    assert is_subgroup(kept.group, found.group, np.radians(2.0))
+    assert len(kept.planes) == len(kept.group.mirrors())
+
+
+def test_what_is_painted_turns_with_the_object() -> None:
+    """Operations of the texture, applied to the painted object, give the painted object."""
+    shape = box(CUBE, dot((0, 0, 0.5), 0.25), seed=3)
+    kept = detect(shape).textured
+    assert kept is not None
+    assert shape.texture is not None
+    assert shape.faces is not None
+    rng = np.random.default_rng(0)
+    face = rng.integers(12, size=4000)
+    corners = shape.points[shape.faces]
+    places = np.einsum("nk,nkd->nd", rng.dirichlet(np.ones(3), size=4000), corners[face])
+    here = shape.texture.colours(face, corner_weights(places, corners[face]))
+    for matrix in kept.group.operations():
+        moved = (places - kept.center) @ matrix.T + kept.center
+        feet = np.stack([np.abs(np.einsum("d,nd->n", n, moved) - o) for n, o in _planes(corners)], axis=1)
+        there = feet.argmin(axis=1)
+        seen = shape.texture.colours(there, corner_weights(moved, corners[there]))
+        again = shape.texture.colours(there ^ 1, corner_weights(moved, corners[there ^ 1]))
+        off = np.minimum(np.linalg.norm(seen - here, axis=1), np.linalg.norm(again - here, axis=1))
+        assert (off > 64).mean() < 0.01
+
+
+def _planes(corners: Array) -> list[tuple[Array, float]]:
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return [(n, float(n @ c[0])) for n, c in zip(normals, corners, strict=True)]
+
+
+def can(colour: Colour, seed: int) -> Shape:
+    """A can of triangles of one colour each."""
+    profile = [(0.0, -0.6), *((0.4, z) for z in np.linspace(-0.6, 0.6, 25)), (0.0, 0.6)]
+    made = join([revolve(profile, 48)])
+    assert made.faces is not None
+    count = len(made.faces)
+    colours = colour(made.points[made.faces].mean(axis=1))
+    none = np.full(count, -1)
+    texture = Texture(images=(), uv=np.zeros((count, 3, 2)), image=none, plain=colours)
+    return turned(replace(made, texture=texture), seed)
+
+
+def band(places: Array) -> Array:
+    found = plain(places)
+    found[np.abs(places[:, 2] - 0.3) < 0.1] = (20, 20, 40)
+    return found
+
+
+def labels(count: int) -> Colour:
+    def colour(places: Array) -> Array:
+        found, phase = plain(places), np.arctan2(places[:, 1], places[:, 0])
+        on = (np.cos(count * phase) > 0.0) & (np.hypot(places[:, 0], places[:, 1]) > 0.3) & (np.abs(places[:, 2]) < 0.3)
+        found[on] = (240, 240, 240)
+        return found
+
+    return colour
+
+
+@SLOW
+@pytest.mark.parametrize(
+    ("colour", "group"), [(plain, "Dinfh"), (band, "Cinfv"), (labels(1), "C2v"), (labels(2), "D2h"), (labels(3), "D3h")]
+)
+def test_of_what_is_round_colours_keep_turns_and_mirrors(colour: Colour, group: str) -> None:
+    found = detect(can(colour, seed=2))
+    assert found.textured is not None
+    assert (found.point_group, found.textured.point_group) == ("Dinfh", group)
+
+
+def test_the_chain_of_subgroups_obeys_the_needs() -> None:
+    whole = point_group("D4h")
+    needs = np.full(16, 0.05)
+    kept = point_group("C2v").distance_rad
+    needs[kept(whole.operations()) < 1e-6] = 0.001
+    chain = subgroup_chain(whole, needs)
+    assert ("C2v", 0.001) in [(g.name, need) for g, need in chain]
+    assert chain[-1][0].name == "D4h"
+    assert all(a[1] <= b[1] and is_subgroup(a[0], b[0]) for a, b in pairwise(chain))
+    assert [g.name for g, _ in subgroup_chain(whole, np.zeros(16))] == ["D4h"]
+
+
+# --- files
+
+
+def write_obj(folder: Path, size: tuple[float, ...], colour: Colour) -> Path:
+    corners, images = sides(size, colour)
+    lines = ["mtllib the look.mtl", *(f"v {x!r} {y!r} {z!r}" for quad in corners for x, y, z in quad.tolist())]
+    lines += ["vt 0 0", "vt 1 0", "vt 1 1", "vt 0 1"]
+    look = []
+    for k, image in enumerate(images):
+        Image.fromarray(image.astype(np.uint8)).save(folder / f"side {k}.png")
+        look += [f"newmtl m{k}", "Ns 10", "Kd 1 1 1", f"map_Kd side {k}.png"]
+        lines += [f"usemtl m{k}", "f " + " ".join(f"{4 * k + c + 1}/{c - 4}" for c in range(4))]
+    (folder / "the look.mtl").write_text("\n".join(look) + "\n")
+    (folder / "box.obj").write_text("\n".join(lines) + "\n")
+    return folder / "box.obj"
+
+
+def write_ply(folder: Path, size: tuple[float, ...], colour: Colour) -> Path:
+    """One image for all sides, beside one another; coordinates of vertices."""
+    corners, images = sides(size, colour)
+    Image.fromarray(np.concatenate(images, axis=1).astype(np.uint8)).save(folder / "atlas.png")
+    uv = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
+    head = "ply\nformat ascii 1.0\ncomment TextureFile atlas.png\nelement vertex 24\n"
+    head += "".join(f"property double {name}\n" for name in ("x", "y", "z", "s", "t"))
+    head += "element face 6\nproperty list uchar int vertex_indices\nend_header\n"
+    rows = [
+        " ".join(map(repr, [*place.tolist(), float((k + u) / 6), float(v)]))
+        for k, quad in enumerate(corners)
+        for place, (u, v) in zip(quad, uv, strict=True)
+    ]
+    rows += [f"4 {4 * k} {4 * k + 1} {4 * k + 2} {4 * k + 3}" for k in range(6)]
+    (folder / "box.ply").write_text(head + "\n".join(rows) + "\n")
+    return folder / "box.ply"
+
+
+def write_glb(folder: Path, size: tuple[float, ...], colour: Colour) -> Path:
+    trimesh = pytest.importorskip("trimesh")
+    corners, images = sides(size, colour)
+    scene = trimesh.Scene()
+    uv = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
+    for k, (quad, image) in enumerate(zip(corners, images, strict=True)):
+        shown = Image.fromarray(image.astype(np.uint8))
+        material = trimesh.visual.material.PBRMaterial(baseColorTexture=shown)
+        visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
+        scene.add_geometry(
+            trimesh.Trimesh(quad, [[0, 1, 2], [0, 2, 3]], visual=visual, process=False), geom_name=f"{k}"
+        )
+    (folder / "box.glb").write_bytes(scene.export(file_type="glb"))
+    return folder / "box.glb"
+
+
+WRITERS = {"obj": write_obj, "ply": write_ply, "glb": write_glb}
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_files_show_the_colours_they_were_made_with(kind: str, tmp_path: Path) -> None:
+    def ramp(places: Array) -> Array:
+        return 127.5 + 100.0 * places
+
+    shape = load(WRITERS[kind](tmp_path, BOX, ramp), texture=True)
+    assert shape.texture is not None
+    assert shape.faces is not None
+    assert load(tmp_path / f"box.{kind}").texture is None
+    face = np.repeat(np.arange(12), 50)
+    weights = np.random.default_rng(0).dirichlet(np.ones(3), size=600)
+    places = np.einsum("nk,nkd->nd", weights, shape.points[shape.faces[face]])
+    # A pixel is 1 / 64 of a side, and a step in colour as large as that.
+    assert np.abs(shape.texture.colours(face, weights) - ramp(places)).max() < 3.0
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_the_command_tells_both_groups(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = WRITERS[kind](tmp_path, BOX, dot((0, 0, 0.2), 0.15))
+    assert invoke(["detect", str(path), "--texture", "--json", str(tmp_path / "x.json")]) == 0
+    assert "with its texture: C2v, confidence" in capsys.readouterr().out
+    record = json.loads((tmp_path / "x.json").read_text())
+    assert (record["point_group"], record["textured"]["point_group"]) == ("D2h", "C2v")
+    assert len(record["textured"]["planes"]) == 2
+    schema = json.loads(files("symrefine").joinpath("schema", "detection.schema.json").read_text())
+    jsonschema.validate(record, schema)
+    assert invoke(["detect", str(path), "--labels", "texture", "--json", str(tmp_path / "y.json")]) == 0
+    alone = json.loads((tmp_path / "y.json").read_text())
+    assert (alone["point_group"], alone["planes"]) == ("C2v", record["textured"]["planes"])
+    assert alone["textured"] is None
+
+
+def damaged(folder: Path, case: str) -> str:
+    path = write_obj(folder, BOX, plain)
+    look = (folder / "the look.mtl").read_text()
+    lines = path.read_text()
+    match case:
+        case "no image":
+            (folder / "side 3.png").unlink()
+            return "side 3.png: no such file"
+        case "no materials":
+            (folder / "the look.mtl").unlink()
+            return "the look.mtl: no such file"
+        case "options":
+            (folder / "the look.mtl").write_text(look.replace("map_Kd ", "map_Kd -s 2 2 2 "))
+            return "line 4: map_Kd '-s 2 2 2 side 0.png'; expected the name of an image and no options"
+        case "no texture":
+            (folder / "the look.mtl").write_text(look.replace("map_Kd", "map_Ks"))
+            return "has no texture: no material of its faces has an image"
+        case "unknown material":
+            path.write_text(lines.replace("usemtl m2", "usemtl other"))
+            return "no material 'other'; there are "
+        case "no coordinates":
+            path.write_text(lines.replace("f 9/-4 10/-3", "f 9 10"))
+            return "face 2 shows an image and has no texture coordinates"
+        case "beyond":
+            path.write_text(lines.replace("f 9/-4", "f 9/7"))
+            return "a corner refers to texture coordinates 7; there are 4 here"
+        case "torn image":
+            data = (folder / "side 0.png").read_bytes()
+            (folder / "side 0.png").write_bytes(data[: len(data) // 2])
+            return "side 0.png: not a whole PNG image"
+        case _:
+            (folder / "the look.mtl").write_text(look.replace("Kd 1 1 1", "Kd 1 2 3"))
+            return "line 3: Kd '1 2 3'; expected red green blue, each from 0 to 1"
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        *("no image", "no materials", "options", "no texture", "unknown material", "no coordinates", "beyond"),
+        *("torn image", "Kd"),
+    ],
+)
+def test_what_is_missing_is_refused_in_one_line(case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = damaged(tmp_path, case)
+    assert invoke(["detect", str(tmp_path / "box.obj"), "--texture"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert error.startswith(f"symrefine: {tmp_path / 'box.obj'}: ")
+    assert said in error
+    load(tmp_path / "box.obj")  # the shape is whole
+
+
+@pytest.mark.parametrize("case", ["no image", "torn image", "cut image", "other coordinates"])
+def test_what_gltf_lacks_is_refused(case: str, tmp_path: Path) -> None:
+    """trimesh would leave it out without a word."""
+    trimesh = pytest.importorskip("trimesh")
+    for name, data in trimesh.load_scene(write_glb(tmp_path, BOX, plain)).export(file_type="gltf").items():
+        (tmp_path / name).write_bytes(data)
+    path = tmp_path / "model.gltf"
+    tree = json.loads(path.read_text())
+    Image.new("RGB", (8, 8), "red").save(tmp_path / "side.png")
+    for image in tree["images"]:
+        image.pop("bufferView", None)
+        image |= {"uri": "side.png"}
+    path.write_text(json.dumps(tree))
+    texture = load(path, texture=True).texture
+    assert texture is not None
+    assert {tuple(pixels.reshape(-1, 3).max(axis=0)) for pixels in texture.images} == {(255, 0, 0)}
+    if case == "no image":
+        (tmp_path / "side.png").unlink()
+        said = "image 0, 'side.png': no such file beside it"
+    elif case == "torn image":
+        (tmp_path / "side.png").write_bytes((tmp_path / "side.png").read_bytes()[:40])
+        said = "an image of its textures cannot be read"
+    elif case == "cut image":
+        grain = np.random.default_rng(0).integers(255, size=(64, 64, 3), dtype=np.uint8)
+        Image.fromarray(grain).save(tmp_path / "side.png")
+        data = (tmp_path / "side.png").read_bytes()
+        (tmp_path / "side.png").write_bytes(data[: len(data) // 2])
+        said = "is damaged"
+    else:
+        tree["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["texCoord"] = 1
+        path.write_text(json.dumps(tree))
+        said = "material 0 places its image by other coordinates"
+    with pytest.raises(InputError, match=said):
+        load(path, texture=True)
+    assert load(path).texture is None
+
+
+def test_images_are_bounded_before_they_are_decoded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_obj(tmp_path, BOX, plain)
+    monkeypatch.setattr(paint, "LARGEST", 5 * 64 * 64)
+    with pytest.raises(InputError, match="20,480"):
+        load(path, texture=True)
+    monkeypatch.setattr(pictures, "LARGEST", 63 * 64)
+    with pytest.raises(InputError, match="64 x 64 pixels; at most 4,032 pixels"):
+        load(path, texture=True)
+    with pytest.raises(InputError, match="64 x 64 pixels; at most 4,032 pixels"):
+        load(write_glb(tmp_path, BOX, plain), texture=True)
+
+
+def test_only_meshes_with_images_have_a_texture(tmp_path: Path) -> None:
+    (tmp_path / "a.xyz").write_text("0 0 0\n1 0 0\n0 1 0\n")
+    with pytest.raises(InputError, match=r"textures are read of meshes only: \.glb \.gltf \.obj \.ply"):
+        load(tmp_path / "a.xyz", texture=True)
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n")
+    with pytest.raises(InputError, match="has no faces, so no texture"):
+        load(tmp_path / "a.obj", texture=True)
+    (tmp_path / "a.ply").write_text(write_ply(tmp_path, BOX, plain).read_text().replace("TextureFile", "Author"))
+    with pytest.raises(InputError, match="has no texture: the header has no line 'comment TextureFile NAME'"):
+        load(tmp_path / "a.ply", texture=True)
+
+
+def test_a_data_set_is_labelled_with_its_textures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Shape and texture side by side for a person, or the texture alone; another image is another object."""
+    folder = tmp_path / "models"
+    folder.mkdir()
+    write_obj(folder, BOX, dot((0, 0, 0.2), 0.15)).rename(folder / "obj_000001.obj")
+    told: dict[str, dict[str, list[object]]] = {}
+    for name, option in (("both", ["--texture"]), ("alone", ["--labels", "texture"])):
+        out = tmp_path / name
+        assert invoke(["label", str(folder), "--out", str(out), "--accept", "0.5", *option]) == 0
+        told[name] = json.loads((out / "models_info.json").read_text())["1"]
+    assert len(told["both"]["symmetries_discrete"]) == 3
+    assert len(told["alone"]["symmetries_discrete"]) == 1
+    assert "With its texture it is C2v." in (tmp_path / "both" / "review.html").read_text()
+    capsys.readouterr()
+    Image.new("RGB", (64, 64), (200, 120, 40)).save(folder / "side 5.png")
+    again = ["label", str(folder), "--out", str(tmp_path / "alone"), "--accept", "0.5", "--labels", "texture"]
+    assert invoke(again) == 0
+    assert "D2h" in capsys.readouterr().out
+
+
+def test_pictures_show_the_texture() -> None:
+    from matplotlib.image import imread
+
+    from symrefine.picture.draw import picture_png
+
+    blue = box(CUBE, dot((0, 0, 0), 2.0))
+    found = detect(blue)
+    shares = []
+    for given in (blue, replace(blue, texture=None)):
+        pixels = imread(BytesIO(picture_png(found, given, width=300, height=225, title=False)))
+        shares.append(float((pixels[..., 2] > 2.0 * pixels[..., 0] + 0.02).mean()))
+    assert shares[0] > 0.15
+    assert shares[1] < 0.05
