@@ -329,7 +329,7 @@ def test_a_full_disk_is_told_with_the_file(run: Run, data: Path, monkeypatch: py
         pytest.raises(InputError, match=r"^/dev/full: cannot be written: No space left on device$"),
         naming("/dev/full"),
     ):
-        Journal(rows=[], torn=False, descriptor=full.fileno()).append({"file": "a.ply"})
+        Journal(path=Path("/dev/full"), rows=[], torn=False, descriptor=full.fileno()).append({"file": "a.ply"})
 
     def fail(*_: object) -> None:
         with whole(data / "draft.html"):

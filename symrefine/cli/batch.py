@@ -28,7 +28,6 @@ from symrefine.cli.values import (
     positive,
 )
 from symrefine.errors import InputError
-from symrefine.files import naming
 
 if TYPE_CHECKING:
     from symrefine.cli.objects import Job
@@ -39,11 +38,11 @@ HELP = "detect the symmetries of every file of a data set"
 DESCRIPTION = (
     "Detect the symmetries of every mesh and cloud that PATH or a manifest names and print a line for each as soon as "
     "it is done. PATH is a directory, a file, a pattern, or an address that fsspec knows (s3://bucket/models/; needs "
-    "the extra remote). With --out, also append a JSON row for each; run again, files whose content and options have a row "
-    "are not done again. A file that cannot be used gives a row with its error, the others go on, and the exit status "
-    "is 1. --workers, --dask and --shard change the order of the rows, but no row. With --bop, files are named as BOP "
-    "names models, obj_000001.ply for object 1, or numbered by the ids of the manifest, and one models_info.json holds "
-    "all of them."
+    "the extra remote). With --out, also append a JSON row for each; run again, files whose content and options have a "
+    "row are not done again. A file that cannot be used gives a row with its error, the others go on, and the exit "
+    "status is 1. --workers, --dask and --shard change the order of the rows, but no row. With --bop, files are named "
+    "as BOP names models, obj_000001.ply for object 1, or numbered by the ids of the manifest, and one "
+    "models_info.json holds all of them."
 )
 # Object 1 of BOP is obj_000001.ply, and its id in a manifest is 1.
 _BOP_NAME, _BOP_ID = re.compile(r"obj_([0-9]{1,9})"), re.compile(r"0*([0-9]{1,9})")
@@ -93,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
         }
         new = [job for job in jobs if job.name not in rows]
         print_lines([ROW_HEAD, *(row_line(name, row) for name, row in rows.items())])
-        with progress("detecting", len(jobs), len(rows)) as advance, naming(args.out) if args.out else nullcontext():
+        with progress("detecting", len(jobs), len(rows)) as advance:
             for job, row in detected(new, does, out):
                 rows[job.name] = row
                 _show(row)

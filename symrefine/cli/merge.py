@@ -54,17 +54,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _rows(path: Path, *, is_study: bool) -> Sequence["Row"]:
-    """The rows of a part, which nobody may write to any more."""
-    from symrefine.fleet import journal
+    from symrefine.fleet.journal import read_rows
     from symrefine.study.journal import ENTRY, STAMP
 
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
     keys, rows_of = (STAMP + ENTRY, "a study") if is_study else (("file",), "`symrefine batch`")
-    with journal.opened(path, keys, busy=f"{path}: is being written to", rows_of=rows_of, other="another file") as part:
-        if part.torn:
-            raise InputError(f"{path}: its last row is incomplete; run the shard again first")
-        return part.rows
+    return read_rows(path, keys, rows_of=rows_of)
 
 
 def _write(out: Path, rows: Sequence["Row"]) -> None:

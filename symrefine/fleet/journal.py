@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from symrefine.errors import InputError
-from symrefine.files import is_only_writer
+from symrefine.files import is_only_writer, naming
 
 Row = dict[str, Any]
 
@@ -22,6 +22,7 @@ Row = dict[str, Any]
 class Journal:
     """An open journal: the rows that it held, whether an incomplete one was dropped, and where the next one goes."""
 
+    path: Path
     rows: Sequence[Row]
     torn: bool
     descriptor: int
@@ -30,12 +31,13 @@ class Journal:
         """Append a row in one write, so that nobody ever sees half of one, and wait until it is on disk.
 
         Raises:
-            OSError: no room.
+            InputError: no room.
         """
         line = json.dumps(row).encode("ascii") + b"\n"
-        if os.write(self.descriptor, line) != len(line):
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        os.fsync(self.descriptor)
+        with naming(str(self.path)):
+            if os.write(self.descriptor, line) != len(line):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            os.fsync(self.descriptor)
 
 
 @contextmanager
@@ -51,19 +53,48 @@ def opened(path: Path, keys: Sequence[str], *, busy: str, rows_of: str, other: s
     Raises:
         InputError: another process is writing, or the file holds something else than such rows.
     """
-    first = json.dumps(keys[0]).encode("ascii").join([b"{", b": "])
     with path.open("ab", buffering=0) as stream:
         if not is_only_writer(stream.fileno()):
             raise InputError(f"{busy}; wait, or name {other}")
-        data = path.read_bytes()
-        whole, rest = data[: data.rfind(b"\n") + 1].splitlines(), data[data.rfind(b"\n") + 1 :]
-        if not all(line.startswith(first) for line in whole) or not rest.startswith(first[: len(rest)]):
-            raise InputError(f"{path}: is there already and holds no rows of {rows_of}; name {other}")
-        try:
-            rows = [json.loads(line) for line in whole]
-            [row[key] for row in rows for key in keys]
-        except (ValueError, KeyError) as error:
-            raise InputError(f"{path}: is damaged: {error}; name {other}") from None
-        if rest:
-            os.ftruncate(stream.fileno(), len(data) - len(rest))
-        yield Journal(rows=rows, torn=bool(rest), descriptor=stream.fileno())
+        rows, size, torn = _rows(path, keys, rows_of, other)
+        if torn:
+            os.ftruncate(stream.fileno(), size)
+        yield Journal(path=path, rows=rows, torn=torn, descriptor=stream.fileno())
+
+
+def read_rows(path: Path, keys: Sequence[str], *, rows_of: str) -> list[Row]:
+    """The rows of a journal that nobody writes to any more, which stays as it is.
+
+    Args:
+        keys: that every row has, the one first that it begins with.
+        rows_of: what such rows belong to, for messages.
+
+    Raises:
+        InputError: there is none, a process is writing, the last row is incomplete, or it holds something else.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    other = "another one"
+    with path.open("rb") as stream:
+        if not is_only_writer(stream.fileno()):
+            raise InputError(f"{path}: is being written to; wait, or name {other}")
+        rows, _, torn = _rows(path, keys, rows_of, other)
+    if torn:
+        raise InputError(f"{path}: the last row is incomplete; run again what writes it, or name {other}")
+    return rows
+
+
+def _rows(path: Path, keys: Sequence[str], rows_of: str, other: str) -> tuple[list[Row], int, bool]:
+    """The rows of a file, the bytes that they take, and whether half of one follows."""
+    first = json.dumps(keys[0]).encode("ascii").join([b"{", b": "])
+    data = path.read_bytes()
+    size = data.rfind(b"\n") + 1
+    whole, rest = data[:size].splitlines(), data[size:]
+    if not all(line.startswith(first) for line in whole) or not rest.startswith(first[: len(rest)]):
+        raise InputError(f"{path}: is there already and holds no rows of {rows_of}; name {other}")
+    try:
+        rows = [json.loads(line) for line in whole]
+        [row[key] for row in rows for key in keys]
+    except (ValueError, KeyError) as error:
+        raise InputError(f"{path}: is damaged: {error}; name {other}") from None
+    return rows, size, bool(rest)

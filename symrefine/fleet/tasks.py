@@ -25,7 +25,7 @@ def finish(
         journal: where each row goes first.
 
     Raises:
-        OSError: no room for a row.
+        InputError: no room for a row.
         Exception: what `work` raised.
     """
     for index, outcome in executor.do(work, parcels):
