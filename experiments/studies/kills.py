@@ -77,7 +77,7 @@ def lay_out(folder: Path, tasks: int) -> None:
         text = "".join(" ".join(map(repr, point)) + "\n" for point in box)
         (folder / "objects" / f"box{number:03d}.xyz").write_text(text)
     (folder / "thirds.py").write_text(EXPERIMENT)
-    (folder / "thirds.yaml").write_text(f"experiment: thirds\nout: thirds\nsweep: {{seed: {{range: {tasks}}}}}\n")
+    (folder / "thirds.yaml").write_text(f"experiment: thirds\nout: out/thirds\nsweep: {{seed: {{range: {tasks}}}}}\n")
 
 
 def campaign(folder: Path, command: str, executor: str, times: int, seed: int = 0) -> Toll:
