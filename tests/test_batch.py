@@ -3,7 +3,6 @@
 import csv
 import json
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -334,6 +333,8 @@ def test_a_disk_that_is_full_in_the_middle_of_a_row_loses_none_before_it(lab: Pa
     room = sum(map(len, expected[:4])) + 40
 
     def little_room() -> None:
+        import resource
+
         resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
 
     full = start(line.split(), preexec_fn=little_room)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
+from functools import cache
 from json import dumps, loads
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -97,10 +98,8 @@ def lost(job: Job, why: Lost) -> Row:
 
 def _head(job: Job) -> Row:
     """What names a row: the file, its content, the options, the version; `error` is set if the file cannot be read."""
-    from importlib.metadata import version
-
     row: Row = {"file": job.name, **job.mark, **job.told, "sha256": None, "error": None}
-    row |= {"version": version("symrefine"), "options": dict(job.options)}
+    row |= {"version": _version(), "options": dict(job.options)}
     try:
         if is_remote(job.path):
             row["state"] = state(job.path)
@@ -109,6 +108,13 @@ def _head(job: Job) -> Row:
     except InputError as error:
         row["error"] = one_line(error)
     return row
+
+
+@cache
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("symrefine")
 
 
 def _digest(path: Path) -> str:
