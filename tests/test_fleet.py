@@ -4,9 +4,6 @@ import json
 import multiprocessing
 import os
 import random
-import signal
-import socket
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from experiments.studies.kills import Cluster
 from symrefine.errors import InputError
 from symrefine.fleet import cell
 from symrefine.fleet.cluster import Dask
@@ -79,7 +77,7 @@ def work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """A module that other processes can import."""
     (tmp_path / "fleet_work.py").write_text(WORK)
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{Path(__file__).resolve().parents[1]}")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))  # for what is started as a command of its own
     monkeypatch.delitem(sys.modules, "fleet_work", raising=False)
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         monkeypatch.setenv(name, "1")
@@ -274,47 +272,12 @@ def test_a_cluster_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch) ->
         next(iter(Dask(address="local").do(abs, [1])))
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
-class Cluster:
-    """A scheduler and its workers, each a process, as somebody would start them on several machines."""
-
-    def __init__(self) -> None:
-        self.address = f"tcp://127.0.0.1:{free_port()}"
-        self.processes: list[subprocess.Popen[bytes]] = []
-        self.scheduler = self.start_scheduler()
-        self.workers = self.start_workers()
-
-    def start_scheduler(self) -> "subprocess.Popen[bytes]":
-        port = self.address.rpartition(":")[2]
-        return self._start("dask_scheduler", "--host", "127.0.0.1", "--port", port, "--no-show")
-
-    def start_workers(self) -> "list[subprocess.Popen[bytes]]":
-        return [self._start("dask_worker", self.address, "--nthreads", "1", "--no-nanny") for _ in range(3)]
-
-    def _start(self, name: str, *options: str) -> "subprocess.Popen[bytes]":
-        line = [sys.executable, "-m", f"distributed.cli.{name}", *options, "--no-dashboard"]
-        process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        self.processes.append(process)
-        return process
-
-    def end(self) -> None:
-        for process in self.processes:
-            process.kill()
-            process.wait()
-
-
 @pytest.fixture
 def cluster(work: Any) -> Iterator[Cluster]:
     pytest.importorskip("distributed")
     assert work
-    started = Cluster()
-    yield started
-    started.end()
+    with Cluster(3) as started:
+        yield started
 
 
 @pytest.mark.slow
@@ -327,12 +290,9 @@ def test_a_cluster_survives_the_death_of_a_worker_and_of_its_scheduler(work: Any
         assert index not in rows
         rows[index] = row
         if len(rows) == 10:
-            cluster.workers[0].send_signal(signal.SIGKILL)
+            cluster.kill_worker()
         if len(rows) == 25:
-            cluster.scheduler.kill()
-            cluster.scheduler.wait()
-            cluster.start_scheduler()
-            cluster.start_workers()  # Dask's own end with their scheduler
+            cluster.restart()
     assert [rows[index] for index in parcels] == outcomes(HERE, work.square, parcels)
     assert any("connecting to the scheduler anew" in text for text in told)
 

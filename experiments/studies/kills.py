@@ -1,10 +1,12 @@
 """Kill `batch` and `run` at random moments, start them again, and compare the rows with those of undisturbed ones.
 
     python -m experiments.studies.kills --times 50
+    python -m experiments.studies.kills --cluster --tasks 1000
 
 Each command is killed so many times with each executor by SIGKILL: its first process alone, whose others have to
 notice, or all of its processes at once. Whatever was on disk then must be there at the end, each row once, and equal to
-that of an undisturbed run in one process, times apart.
+that of an undisturbed run in one process, times apart. With --cluster it is a cluster that is killed: three workers of
+Dask, one after the other, and the scheduler once.
 """
 
 import argparse
@@ -12,6 +14,7 @@ import json
 import os
 import random
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -19,7 +22,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from symrefine.study.tables import grid
 
@@ -65,6 +68,58 @@ class Toll:
         return not (self.rows_lost or self.rows_doubled or self.rows_different or self.orphans)
 
 
+class Cluster:
+    """A scheduler of Dask and its workers, each a process, as somebody would start them on several machines."""
+
+    def __init__(self, workers: int) -> None:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self._port = probe.getsockname()[1]
+        self.address = f"tcp://127.0.0.1:{self._port}"
+        self._count = workers
+        self._scheduler, self._workers = self._start_scheduler(), self._start_workers()
+
+    def kill_worker(self) -> None:
+        """Kill the oldest worker, and start another one."""
+        _end(self._workers.pop(0))
+        self._workers.append(self._start_worker())
+
+    def restart(self) -> None:
+        """Kill the scheduler and the workers, which would end when they miss it, and start all anew."""
+        for process in [self._scheduler, *self._workers]:
+            _end(process)
+        self._scheduler, self._workers = self._start_scheduler(), self._start_workers()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for process in [self._scheduler, *self._workers]:
+            _end(process)
+
+    def _start_scheduler(self) -> "subprocess.Popen[bytes]":
+        return self._start("dask_scheduler", "--host", "127.0.0.1", "--port", str(self._port), "--no-show")
+
+    def _start_workers(self) -> "list[subprocess.Popen[bytes]]":
+        return [self._start_worker() for _ in range(self._count)]
+
+    def _start_worker(self) -> "subprocess.Popen[bytes]":
+        return self._start("dask_worker", self.address, "--nthreads", "1", "--no-nanny")
+
+    def _start(self, name: str, *options: str) -> "subprocess.Popen[bytes]":
+        line = [sys.executable, "-m", f"distributed.cli.{name}", *options, "--no-dashboard"]
+        return subprocess.Popen(line, env=_environment(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    process.kill()
+    process.wait()
+
+
+def _environment() -> dict[str, str]:
+    return os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))}
+
+
 def lay_out(folder: Path, tasks: int) -> None:
     """Write so many small objects, and a study of as many runs."""
     (folder / "objects").mkdir()
@@ -108,6 +163,23 @@ def campaign(folder: Path, command: str, executor: str, times: int, seed: int = 
     return toll
 
 
+def cluster_campaign(folder: Path, tasks: int) -> Toll:
+    """Kill three workers of a cluster while it does a batch, and its scheduler once, at even shares of the work."""
+    toll = Toll(command="batch", executor="Dask, three workers of a cluster")
+    expected = _rows(_started(folder, "batch", [], "whole"))
+    with Cluster(3) as cluster:
+        file, process = folder / "far.jsonl", _popen(folder, "batch", ["--dask", cluster.address], "far")
+        for share, strike in enumerate((cluster.kill_worker, cluster.restart, *[cluster.kill_worker] * 2), start=1):
+            while len(_lines(file)) < tasks * share / 5 and process.poll() is None:
+                time.sleep(0.1)
+            before = _lines(file)
+            strike()
+            toll.kills += 1
+        toll.finished += process.wait() == 0
+    _compare(toll, before, file, expected)
+    return toll
+
+
 def _compare(toll: Toll, before: Sequence[str], file: Path, expected: Mapping[str, Any]) -> None:
     after, rows = _lines(file), _rows(file)
     toll.rows_lost += sum(line not in after for line in before) + len(set(expected) - set(rows))
@@ -118,8 +190,7 @@ def _compare(toll: Toll, before: Sequence[str], file: Path, expected: Mapping[st
 def _popen(folder: Path, command: str, options: Sequence[str], out: str) -> "subprocess.Popen[bytes]":
     what = ["objects", "--out", f"{out}.jsonl"] if command == "batch" else ["thirds.yaml", "--out", out]
     line = [sys.executable, "-m", "symrefine", command, *what, "--quiet", *options]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    return subprocess.Popen(line, cwd=folder, env=environment, start_new_session=True, stderr=subprocess.DEVNULL)
+    return subprocess.Popen(line, cwd=folder, env=_environment(), start_new_session=True, stderr=subprocess.DEVNULL)
 
 
 def _started(folder: Path, command: str, options: Sequence[str], out: str) -> Path:
@@ -171,12 +242,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--times", type=int, default=50, help="kills of each command with each executor (default: 50)")
     parser.add_argument("--tasks", type=int, default=24, help="objects, and runs of the study (default: 24)")
+    parser.add_argument("--cluster", action="store_true", help="kill processes of a cluster instead")
     parser.add_argument("--seed", type=int, default=0, help="of the moments (default: 0)")
     options = parser.parse_args(argv)
     tolls = []
     with tempfile.TemporaryDirectory(prefix="symrefine-kills-") as name:
         lay_out(Path(name), options.tasks)
-        for command in COMMANDS:
+        if options.cluster:
+            tolls.append(cluster_campaign(Path(name), options.tasks))
+        for command in () if options.cluster else COMMANDS:
             for executor in EXECUTORS:
                 tolls.append(campaign(Path(name), command, executor, options.times, options.seed))
                 print(tolls[-1], file=sys.stderr, flush=True)

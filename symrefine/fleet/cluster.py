@@ -1,6 +1,8 @@
 """Tasks on a Dask cluster: its workers may die and its scheduler may be started anew, the tasks go on."""
 
 import re
+import signal
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -149,13 +151,32 @@ def _cluster(address: str, workers: int) -> AbstractContextManager[str]:
 
 @contextmanager
 def _local(workers: int) -> Iterator[str]:
-    """A cluster of processes on this machine."""
+    """A cluster of processes on this machine, which end with it in silence, even at an interrupt from the keyboard."""
     from distributed import LocalCluster
 
-    with LocalCluster(
-        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs="CRITICAL"
-    ) as cluster:
+    with _deaf_children():
+        cluster = LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address="127.0.0.1:0",  # any free port: there may be other clusters here
+            silence_logs="CRITICAL",
+        )
+    with cluster:
         yield cluster.scheduler_address
+
+
+@contextmanager
+def _deaf_children() -> Iterator[None]:
+    """Processes started meanwhile hear no interrupt from the keyboard; who started them does, and ends them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _version() -> str:
