@@ -323,7 +323,10 @@ def start(line: Sequence[str], **options: Any) -> "subprocess.Popen[str]":
 @posix
 @pytest.mark.parametrize(
     ("line", "file"),
-    [("batch objects -q --workers 2 --out r.jsonl", "r.jsonl"), ("run thirds.yaml -q --out r", "r/journal.jsonl")],
+    [
+        pytest.param("batch objects -q --workers 2 --out r.jsonl", "r.jsonl", marks=pytest.mark.slow),
+        ("run thirds.yaml -q --out r", "r/journal.jsonl"),
+    ],
 )
 def test_a_disk_that_is_full_in_the_middle_of_a_row_loses_none_before_it(lab: Path, line: str, file: str) -> None:
     """A limit of the size of files stands for the disk: the row that passes it is written in part."""
@@ -352,13 +355,20 @@ def test_a_disk_that_is_full_in_the_middle_of_a_row_loses_none_before_it(lab: Pa
     assert len(after) == len({json.loads(row).get("file", json.loads(row).get("index")) for row in after}) == 10
 
 
-@posix
-@pytest.mark.skipif(getattr(os, "geteuid", lambda: 1)() == 0, reason="root may write anywhere")
-def test_a_folder_that_cannot_be_written_is_told_before_any_work(run: Run, lab: Path) -> None:
-    (lab / "closed").mkdir(mode=0o555)
-    refused(run("batch", "objects", "--out", "closed/r.jsonl"), "closed/r.jsonl: cannot be written")
-    refused(run("run", "thirds.yaml", "--out", "closed/r"), "closed/r: cannot be written")
-    refused(run("run", "thirds.yaml", "--out", "closed"), "closed")
+@linux
+def test_a_folder_that_cannot_be_written_is_told_in_one_line(run: Run, lab: Path) -> None:
+    """/sys takes no files, not even from root."""
+    for line in (
+        "batch objects --out /sys/r.jsonl",
+        "batch objects/box000.xyz --table /sys/t.csv",
+        "run thirds.yaml --out /sys/r",
+        "run thirds.yaml --out /sys",
+    ):
+        status, _, err = run(*line.split())
+        assert (status, err.count("\n")) == (2, 1)
+        assert err.startswith("symrefine: /sys")
+    run("batch", "objects", "--shard", "1/1", "--out", lab / "p.jsonl")
+    refused(run("merge", "p.jsonl", "--out", "/sys/all.jsonl"), "/sys/all.jsonl: cannot be written")
 
 
 @posix

@@ -84,12 +84,8 @@ def run(args: argparse.Namespace) -> int:
     with opened(Path(args.out)) if args.out else nullcontext() as out:
         if out and out.torn:
             note(f"{args.out}: the last row is incomplete; it is removed and done again")
-        latest = {row["file"]: row for row in out.rows} if out else {}
-        rows = {
-            job.name: latest[job.name]
-            for job in jobs
-            if job.name in latest and holds(latest[job.name], job, does.limits)
-        }
+        before = {row["file"]: row for row in out.rows} if out else {}
+        rows = {job.name: before[job.name] for job in jobs if holds(before.get(job.name), job, does.limits)}
         new = [job for job in jobs if job.name not in rows]
         print_lines([ROW_HEAD, *(row_line(name, row) for name, row in rows.items())])
         with progress("detecting", len(jobs), len(rows)) as advance:
@@ -120,6 +116,8 @@ def _jobs(args: argparse.Namespace) -> tuple[list["Job"], dict[str, int]]:
     Raises:
         InputError: nothing to do, or outputs that cannot be written.
     """
+    from importlib.metadata import version
+
     from symrefine.cli.objects import Job
     from symrefine.fleet.shard import Whole
 
@@ -132,10 +130,9 @@ def _jobs(args: argparse.Namespace) -> tuple[list["Job"], dict[str, int]]:
     options = detection_options(args)
     scales = [None if args.bop is None else source.told.get("scale", args.bop_scale or 1.0) for source in found]
     each = [options | dict(source.options) for source in found]
-    about = [
-        [source.name, dict(source.told), own, scale] for source, own, scale in zip(found, each, scales, strict=True)
-    ]
-    fleet = Whole.of(len(found), about)
+    wanted = list(zip(found, each, scales, strict=True))
+    about = [[source.name, dict(source.told), own, scale] for source, own, scale in wanted]
+    fleet = Whole.of(len(found), [version("symrefine"), *about])
     jobs = [
         Job(
             name=source.name,
@@ -145,7 +142,7 @@ def _jobs(args: argparse.Namespace) -> tuple[list["Job"], dict[str, int]]:
             scale=scale,
             mark=fleet.mark(args.shard, index),
         )
-        for index, (source, own, scale) in enumerate(zip(found, each, scales, strict=True))
+        for index, (source, own, scale) in enumerate(wanted)
         if args.shard is None or args.shard.takes(index)
     ]
     return jobs, numbers

@@ -57,8 +57,10 @@ def detected(
         yield by_name[row["file"]], row
 
 
-def holds(row: Row, job: Job, limits: Limits) -> bool:
+def holds(row: Row | None, job: Job, limits: Limits) -> bool:
     """Whether a row done before still tells of its file, with the entry of BOP if one is wanted and can be had."""
+    if row is None:
+        return False
     now = loads(dumps(_head(job)))  # as it comes back from the journal, places as lists
     if not is_final(row, limits) or (job.mark and any(row.get(key) != mark for key, mark in job.mark.items())):
         return False

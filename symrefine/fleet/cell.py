@@ -60,7 +60,7 @@ class Cell:
             if not self._pipe.poll(self._limits.seconds):
                 self.end()
                 seconds = f"{self._limits.seconds:g} s"
-                return Lost(why=f"takes longer than {seconds}, the limit of time", under=seconds, died=True)
+                return Lost(why=f"takes longer than {seconds}, the limit of time", under=seconds)
             outcome = self._pipe.recv()
         except (EOFError, OSError):
             return self._epitaph()
@@ -82,7 +82,7 @@ class Cell:
         code, limit = self._process.exitcode, self._limits.memory
         how = f"ended with status {code}" if code is None or code >= 0 else f"was killed by signal {-code}"
         perhaps = "; perhaps it took too much memory" if limit is None else f"; perhaps {limit:,} bytes are too few"
-        return Lost(why=f"its process {how}{perhaps}", killed=code == -9, died=True)
+        return Lost(why=f"its process {how}{perhaps}", killed=code == -9)
 
 
 def _serve(pipe: Connection, memory: int | None) -> None:

@@ -51,7 +51,7 @@ class Dask:
         """
         check_address(self.address)
         waiting, deaths, patience = set(range(len(parcels))), Counter[int](), _ANSWER_S
-        with _cluster(self.address, self.workers) as address:
+        with _cluster(self.address, self.workers) if parcels else nullcontext(self.address) as address:
             while waiting:
                 with closing(_client(address, patience)) as client:
                     for index, outcome in self._answers(client, work, parcels, sorted(waiting)):
@@ -61,7 +61,7 @@ class Dask:
                         if outcome is _DIED and deaths[index] < _DEATHS:
                             continue  # among those that wait for the next round
                         waiting.discard(index)
-                        lost = Lost(why=f"{_DEATHS} processes of the cluster died with it", died=True)
+                        lost = Lost(why=f"{_DEATHS} processes of the cluster died with it")
                         yield index, (lost if outcome is _DIED else outcome)
                 patience = self.patience
                 if waiting:

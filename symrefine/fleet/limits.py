@@ -1,6 +1,7 @@
 """What one task may take, and what came in the way of one that has no result."""
 
 import os
+import sys
 from dataclasses import dataclass
 
 from symrefine.errors import InputError
@@ -32,13 +33,11 @@ class Lost:
         why: what happened, to follow the name of the task and a colon.
         under: the limit that it met; empty if its process was killed or the machine had no more memory.
         killed: whether something from outside ended the process, as a system does that runs out of memory.
-        died: whether the process is gone.
     """
 
     why: str
     under: str = ""
     killed: bool = False
-    died: bool = False
 
 
 def one_thread_each() -> None:
@@ -59,8 +58,6 @@ def check_limits(limits: Limits) -> None:
     Raises:
         InputError: memory, elsewhere than on Linux.
     """
-    import sys
-
     if limits.memory is not None and sys.platform != "linux":
         raise InputError(f"a limit of memory needs Linux, this is {sys.platform}; leave it out")
 
