@@ -116,10 +116,9 @@ def _jobs(args: argparse.Namespace) -> tuple[list["Job"], dict[str, int]]:
     Raises:
         InputError: nothing to do, or outputs that cannot be written.
     """
-    from importlib.metadata import version
-
     from symrefine.cli.objects import Job
     from symrefine.fleet.shard import Whole
+    from symrefine.fleet.tasks import our_version
 
     found = _sources(args)
     check_table_option(args)
@@ -132,7 +131,7 @@ def _jobs(args: argparse.Namespace) -> tuple[list["Job"], dict[str, int]]:
     each = [options | dict(source.options) for source in found]
     wanted = list(zip(found, each, scales, strict=True))
     about = [[source.name, dict(source.told), own, scale] for source, own, scale in wanted]
-    fleet = Whole.of(len(found), [version("symrefine"), *about])
+    fleet = Whole.of(len(found), [our_version(), *about])
     jobs = [
         Job(
             name=source.name,

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
-from functools import cache
 from json import dumps, loads
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -14,7 +13,7 @@ from symrefine.fleet.crew import HERE, Executor
 from symrefine.fleet.journal import Journal, Row
 from symrefine.fleet.limits import Limits, Lost
 from symrefine.fleet.remote import fetched, is_remote, state
-from symrefine.fleet.tasks import finish, is_final
+from symrefine.fleet.tasks import finish, is_final, our_version
 
 if TYPE_CHECKING:
     from symrefine.detection.result import Detection
@@ -101,7 +100,7 @@ def lost(job: Job, why: Lost) -> Row:
 def _head(job: Job) -> Row:
     """What names a row: the file, its content, the options, the version; `error` is set if the file cannot be read."""
     row: Row = {"file": job.name, **job.mark, **job.told, "sha256": None, "error": None}
-    row |= {"version": _version(), "options": dict(job.options)}
+    row |= {"version": our_version(), "options": dict(job.options)}
     try:
         if is_remote(job.path):
             row["state"] = state(job.path)
@@ -110,13 +109,6 @@ def _head(job: Job) -> Row:
     except InputError as error:
         row["error"] = one_line(error)
     return row
-
-
-@cache
-def _version() -> str:
-    from importlib.metadata import version
-
-    return version("symrefine")
 
 
 def _digest(path: Path) -> str:

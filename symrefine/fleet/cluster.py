@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from symrefine.errors import InputError
 from symrefine.fleet.crew import Cells, Tell, is_worth_another
 from symrefine.fleet.limits import Limits, Lost
+from symrefine.fleet.tasks import our_version
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -88,13 +89,13 @@ class Dask:
     def _check_workers(self, client: "Client") -> None:
         """Refuse workers that would do something else; say where there are none."""
         try:
-            versions = client.run(_version)
+            versions = client.run(our_version)
         except ImportError:
             raise InputError(f"{self.address}: its workers have no symrefine; install it there, too") from None
         if not versions:
             self.tell(f"{self.address}: has no workers yet; start some with `dask worker {self.address}`")
-        if other := sorted(set(versions.values()) - {_version()}):
-            raise InputError(f"{self.address}: its workers have symrefine {other[0]}, here it is {_version()}")
+        if other := sorted(set(versions.values()) - {our_version()}):
+            raise InputError(f"{self.address}: its workers have symrefine {other[0]}, here it is {our_version()}")
 
 
 @contextmanager
@@ -177,12 +178,6 @@ def _deaf_children() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def _version() -> str:
-    from importlib.metadata import version
-
-    return version("symrefine")
 
 
 def _client(address: str, patience: float) -> "Client":

@@ -1,6 +1,7 @@
 """Tasks in, rows out: each row is on disk before anybody hears of it."""
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 from typing import TypeVar
 
 from symrefine.fleet.crew import Executor
@@ -33,6 +34,14 @@ def finish(
         if journal is not None:
             journal.append(row)
         yield row
+
+
+@cache
+def our_version() -> str:
+    """The version that rows are made with."""
+    from importlib.metadata import version
+
+    return version("symrefine")
 
 
 def mourned(row: Row, lost: Lost) -> Row:
