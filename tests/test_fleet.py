@@ -44,6 +44,10 @@ def whose(_):
     return os.getpid(), os.environ["OMP_NUM_THREADS"]
 
 
+def folder(_):
+    return str(Path.cwd())
+
+
 def hostile(x):
     if x == 1:
         time.sleep(60)
@@ -282,7 +286,10 @@ def cluster(work: Any) -> Iterator[Cluster]:
 
 @pytest.mark.slow
 @posix
-def test_a_cluster_survives_the_death_of_a_worker_and_of_its_scheduler(work: Any, cluster: Cluster) -> None:
+def test_a_cluster_survives_the_death_of_a_worker_and_of_its_scheduler(
+    work: Any, cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # its workers are somewhere else
     told: list[str] = []
     parcels = list(range(45))
     rows: dict[int, Any] = {}
@@ -295,6 +302,7 @@ def test_a_cluster_survives_the_death_of_a_worker_and_of_its_scheduler(work: Any
             cluster.restart()
     assert [rows[index] for index in parcels] == outcomes(HERE, work.square, parcels)
     assert any("connecting to the scheduler anew" in text for text in told)
+    assert outcomes(Dask(address=cluster.address), work.folder, [0]) == [str(tmp_path)]
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ say whose task it was; here each process has a pipe of its own, so nobody waits 
 
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -21,11 +22,15 @@ _GRACE_S = 5.0
 class Cell:
     """A process that does one task after the other, in one thread, within limits.
 
+    Args:
+        limits: of each task.
+        folder: where paths count from, if it is there; by default as here.
+
     Raises:
         SymrefineError: it cannot start.
     """
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: Limits, folder: str = ".") -> None:
         from multiprocessing import current_process, get_context
 
         one_thread_each()
@@ -34,7 +39,7 @@ class Cell:
         spawn = get_context("spawn")
         self._limits, self._left = limits, _TASKS
         self._pipe, inner = spawn.Pipe()
-        self._process = spawn.Process(target=_serve, args=(inner, limits.memory), daemon=True)
+        self._process = spawn.Process(target=_serve, args=(inner, limits.memory, folder), daemon=True)
         self._process.start()
         inner.close()
         try:
@@ -85,8 +90,10 @@ class Cell:
         return Lost(why=f"its process {how}{perhaps}", killed=code == -9)
 
 
-def _serve(pipe: Connection, memory: int | None) -> None:
+def _serve(pipe: Connection, memory: int | None, folder: str) -> None:
     """What the process does."""
+    with suppress(OSError):  # on another machine there may be no such folder, nor need of one
+        os.chdir(folder)
     _end_with_parent()
     hold_memory(memory)
     pipe.send(None)

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from symrefine.errors import InputError
@@ -77,7 +78,8 @@ class Dask:
         with _until_it_is_gone():
             self._check_workers(client)
             futures: dict[Future[Any], int] = {
-                client.submit(_on_a_worker, work, parcels[index], self.limits, pure=False): index for index in indices
+                client.submit(_on_a_worker, work, parcels[index], self.limits, str(Path.cwd()), pure=False): index
+                for index in indices
             }
             for future in as_completed(futures, loop=client.loop):
                 try:
@@ -117,9 +119,9 @@ class _Raised:
     error: Exception
 
 
-def _on_a_worker(work: Callable[[Any], Any], parcel: Any, limits: Limits) -> Any:
+def _on_a_worker(work: Callable[[Any], Any], parcel: Any, limits: Limits, folder: str) -> Any:
     """What a worker of the cluster does: a process of its own does the task, so that a crash ends no worker."""
-    cells = _CELLS.setdefault(limits, Cells(limits))
+    cells = _CELLS.setdefault((limits, folder), Cells(limits, folder))
     try:
         outcome = cells.do(work, parcel)
         return cells.do(work, parcel) if is_worth_another(outcome) else outcome
@@ -128,7 +130,7 @@ def _on_a_worker(work: Callable[[Any], Any], parcel: Any, limits: Limits) -> Any
 
 
 # Of a worker of the cluster, kept from task to task.
-_CELLS: dict[Limits, Cells] = {}
+_CELLS: dict[tuple[Limits, str], Cells] = {}
 
 
 def check_address(address: str) -> None:

@@ -51,10 +51,15 @@ HERE = Here()
 
 
 class Cells:
-    """Processes that are borrowed for one task each; those that are no longer fit are replaced."""
+    """Processes that are borrowed for one task each; those that are no longer fit are replaced.
 
-    def __init__(self, limits: Limits) -> None:
-        self._limits = limits
+    Args:
+        limits: of each task.
+        folder: where paths count from, if it is there.
+    """
+
+    def __init__(self, limits: Limits, folder: str = ".") -> None:
+        self._limits, self._folder = limits, folder
         self._idle: list[Cell] = []
         self._busy: set[Cell] = set()
         self._over = False
@@ -64,7 +69,7 @@ class Cells:
         try:
             cell = self._idle.pop()
         except IndexError:
-            cell = Cell(self._limits)
+            cell = Cell(self._limits, self._folder)
         self._busy.add(cell)
         try:
             if self._over:
