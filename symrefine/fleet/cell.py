@@ -15,7 +15,7 @@ from symrefine.fleet.limits import Limits, Lost, hold_memory, one_thread_each, s
 
 # What libraries keep from task to task is given back so often; starting anew costs about as much as one task.
 _TASKS = 200
-# What a process that was told to end, or whose pipe is closed, may still take before it is killed.
+# What the end of a process that was killed may take until its status is known.
 _GRACE_S = 5.0
 
 
@@ -118,7 +118,8 @@ def _outcome(work: Callable[[Any], Any], parcel: Any, memory: int | None) -> Any
     except MemoryError:
         return out_of_memory(memory)
     except Exception as error:  # noqa: BLE001 - raised again where it was asked for
-        return error if type(error).__module__ == "builtins" else SymrefineError(one_line(error))
+        is_known_there = type(error).__module__ in ("builtins", SymrefineError.__module__)
+        return error if is_known_there else SymrefineError(one_line(error))
 
 
 def out_of_memory(memory: int | None) -> Lost:
