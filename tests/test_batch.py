@@ -234,6 +234,7 @@ def test_sizes_and_shards_are_read() -> None:
         ("run thirds.yaml --table t.xls", "expected the name of a table"),
         ("merge a.jsonl --out b.jsonl", "a.jsonl: no such file"),
         ("merge objects --out b", "objects/journal.jsonl: no such file"),
+        ("merge objects --out b --table t.csv", "is for parts of `batch`"),
         ("merge objects thirds.yaml --out b", "thirds.yaml: is no directory as objects is"),
         ("merge thirds.yaml --out b", "thirds.yaml: is there already and holds no rows of `symrefine batch`"),
         ("merge thirds.yaml --out thirds.py", "thirds.py: is there already"),
@@ -278,7 +279,9 @@ def test_shards_of_a_study_become_one(run: Run, lab: Path) -> None:
     refused(run("merge", "part1", "--out", "all"), "shard 2/2 is not complete")
     assert not (lab / "all").exists()
     assert run("merge", "part1", "part2", "--out", "all")[0] == 0
-    assert "10 runs, 10 done before" in run("run", "thirds.yaml", "--out", "all", "--workers", "2")[1]
+    line = ("run", "thirds.yaml", "--out", "all", "--workers", "2", "--table", "all.parquet")
+    assert "10 runs, 10 done before" in run(*line)[1]
+    assert (lab / "all.parquet").read_bytes() == (lab / "whole.parquet").read_bytes()
     assert (lab / "all" / "rows.csv").read_bytes() == (lab / "out" / "thirds" / "rows.csv").read_bytes()
 
 

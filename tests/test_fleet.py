@@ -255,6 +255,12 @@ def test_of_several_rows_of_a_task_in_one_part_the_last_counts() -> None:
         (lambda p: p | {"p2": parts(9, 3)["p2"]}, "p2: is part of another fleet"),
         (lambda p: p | {"p2": parts(10, 2)["p2"]}, "p2: is part of another fleet"),
         (lambda p: p | {"p2": [{"file": "f1"}]}, "p2: holds rows of no shard"),
+        (
+            lambda p: p | {"p2": [{"file": "f1", "part": p["p2"][0]["part"] | {"shard": "1/0"}}]},
+            "p2: is damaged: .*1/0",
+        ),
+        (lambda p: p | {"p2": [{"file": "f1", "part": p["p2"][0]["part"] | {"index": 0}}]}, "p2: is damaged"),
+        (lambda p: p | {"p2": [{"file": "f1", "part": 7}]}, "p2: is damaged: .* 7"),
         (lambda _: {"p1": []}, "p1: holds no rows"),
     ],
 )

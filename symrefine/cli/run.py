@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     parts = [f"{len(outcome.rows)} runs", f"{outcome.resumed} done before" if outcome.resumed else ""]
     parts += [f"{outcome.failed} failed" if outcome.failed else "", f"written to {folder}"]
     print_lines([", ".join(part for part in parts if part)])
-    write_rows(args.table, outcome.rows)
+    write_rows(args.table, outcome.untimed)
     return int(outcome.failed > 0)
 
 

@@ -1,5 +1,7 @@
 """A fleet in shards, each done where and when one likes, and the parts made one: all, each once, none foreign."""
 
+import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
@@ -81,8 +83,10 @@ def _latest(name: str, rows: Sequence[Row]) -> dict[int, tuple[Row, Row]]:
     found: dict[int, tuple[Row, Row]] = {}
     for row in rows:
         mark = row.get(PART)
-        if not (isinstance(mark, dict) and set(mark) == {"fleet", "tasks", "shard", "index"}):
+        if mark is None:
             raise InputError(f"{name}: holds rows of no shard; merge takes what --shard wrote")
+        if not _is_whole(mark):
+            raise InputError(f"{name}: is damaged: a row says that its place is {mark}")
         found[mark["index"]] = mark, {key: value for key, value in row.items() if key != PART}
     return found
 
@@ -95,15 +99,27 @@ def _check_same(first: tuple[str, Row], other: tuple[str, Row]) -> None:
 
 
 def _check_complete(mark: Row, places: Mapping[int, Any]) -> None:
-    for number in range(1, _of(mark) + 1):
-        shard = Shard(number=number, of=_of(mark))
-        indices = [index for index in range(mark["tasks"]) if shard.takes(index)]
-        missing = sum(index not in places for index in indices)
-        if missing:
+    of = _of(mark)
+    found = Counter(index % of for index in places)
+    for number in range(1, of + 1):
+        tasks = len(range(number - 1, mark["tasks"], of))
+        if missing := tasks - found[number - 1]:
+            shard = Shard(number=number, of=of)
             raise InputError(
-                f"shard {shard} is not complete: {missing} of its {len(indices)} tasks have no row in the parts given; "
+                f"shard {shard} is not complete: {missing} of its {tasks} tasks have no row in the parts given; "
                 f"run it again with --shard {shard}, or name its file"
             )
+
+
+def _is_whole(mark: Any) -> bool:
+    """Whether a mark is one that `Whole.mark` makes."""
+    kinds = {"fleet": str, "tasks": int, "shard": str, "index": int}
+    if not isinstance(mark, dict) or {name: type(value) for name, value in mark.items()} != kinds:
+        return False
+    shard = re.fullmatch(r"([1-9][0-9]*)/([1-9][0-9]*)", mark["shard"])
+    if shard is None or not 0 <= mark["index"] < mark["tasks"]:
+        return False
+    return Shard(number=int(shard[1]), of=int(shard[2])).takes(mark["index"])
 
 
 def _of(mark: Row) -> int:

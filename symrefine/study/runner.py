@@ -33,12 +33,14 @@ Progress = Callable[[str, int, int], AbstractContextManager[Callable[[], None]]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What a study came to, and where it was written: rows of the finished runs, in the order of the sweep, Markdown as
-    in tables.md, figures by title; how many of the runs had been done before, and how many have an error.
+    """What a study came to, and where it was written: rows of the finished runs, in the order of the sweep, with their
+    timings and without, as in rows.csv; Markdown as in tables.md, figures by title; how many of the runs had been done
+    before, and how many have an error.
     """
 
     folder: Path
     rows: Sequence[Row]
+    untimed: Sequence[Row]
     verdicts: Sequence[Verdict]
     tables: str
     figures: Mapping[str, Path]
@@ -168,6 +170,7 @@ def _write(
     return Outcome(
         folder=folder,
         rows=full,
+        untimed=rows,
         verdicts=verdicts,
         tables="\n".join(tables),
         figures=figures,
