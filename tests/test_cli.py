@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 
 import symrefine
-from symrefine.cli import batch, invoke, values
+from symrefine.cli import batch, invoke, objects, values
 from symrefine.cli.rows import ROW_HEAD, row_line
 from symrefine.cli.tables import detection_lines, headline
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.files import naming, whole
+from symrefine.fleet.journal import Journal, Row
 from symrefine.geometry import random_orthogonal
-from symrefine.journal import Journal
 from symrefine.ntuples import notation
 from symrefine.ntuples.affine import derive_affine
 from symrefine.ntuples.derive import derive
@@ -247,7 +247,7 @@ def test_the_tolerance_of_the_command_line_is_that_of_detect() -> None:
         ("derive --dim 3 --orders 2,3 --json nowhere/a.json", "there is no directory nowhere"),
         ("derive --dim 9 --orders 9,9", "monomials"),
         ("batch nowhere", "no such directory"),
-        ("batch box.ply", "is a file, not a directory"),
+        ("batch", "expected PATH, or --manifest"),
         ("batch empty", "no mesh and no cloud"),
         ("batch . --workers 0", "--workers"),
         ("batch . --tolerance 3", "--tolerance"),
@@ -330,7 +330,7 @@ def test_a_full_disk_is_told_with_the_file(run: Run, data: Path, monkeypatch: py
         pytest.raises(InputError, match=r"^/dev/full: cannot be written: No space left on device$"),
         naming("/dev/full"),
     ):
-        Journal(rows=[], torn=False, descriptor=full.fileno()).append({"file": "a.ply"})
+        Journal(path=Path("/dev/full"), rows=[], torn=False, descriptor=full.fileno()).append({"file": "a.ply"})
 
     def fail(*_: object) -> None:
         with whole(data / "draft.html"):
@@ -571,7 +571,7 @@ def test_batch_goes_on_and_resumes(run: Run, shelf: Path, tmp_path: Path, monkey
     assert "c.ply" in first[2]["error"]
 
     done: list[str] = []
-    monkeypatch.setattr(batch, "examine_file", counting(batch.examine_file, done))
+    monkeypatch.setattr(objects, "examine_file", counting(objects.examine_file, done))
     assert "3 files, 3 done before, 1 failed" in run("batch", shelf, "--out", out)[1]
     assert done == []
     out.write_bytes(out.read_bytes()[:-30])
@@ -619,9 +619,9 @@ with batch.opened(Path({str(out)!r})):
     assert len(rows(out)) == 3
 
 
-def counting(function: Callable[[batch.Job], batch.Row], done: list[str]) -> Callable[[batch.Job], batch.Row]:
-    def counted(job: batch.Job) -> batch.Row:
-        done.append(job[1])
+def counting(function: Callable[[objects.Job], Row], done: list[str]) -> Callable[[objects.Job], Row]:
+    def counted(job: objects.Job) -> Row:
+        done.append(job.name)
         return function(job)
 
     return counted

@@ -187,3 +187,13 @@ def test_contributing_names_the_rooms_that_the_contract_has_floor_by_floor() -> 
     page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").partition("| one thought each |")[2]
     told = re.findall(r"^\| ((?:`\w+`(?:, )?)+) \|", page.partition("\n\n")[0], re.MULTILINE)
     assert [set(re.findall(r"\w+", rooms)) for rooms in told] == floors
+
+
+@pytest.mark.slow
+def test_the_page_of_fleets_does_what_it_says(tmp_path: Path) -> None:
+    """Its Python runs, in processes of its own."""
+    box = "".join(f"{x} {y} {z}\n" for x in (-1, 1) for y in (-2, 2) for z in (-3, 3))
+    head = "".join(f"property float {name}\n" for name in "xyz")
+    (tmp_path / "mug.ply").write_text(f"ply\nformat ascii 1.0\nelement vertex 8\n{head}end_header\n{box}")
+    (tmp_path / "page.py").write_text(python_blocks((DOCS / "fleets.md").read_text(encoding="utf-8")), encoding="utf-8")
+    assert run("page.py", cwd=tmp_path).stdout == "mug D2h\n"

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "symrefine"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 # A worker process may end itself when its parent is gone.
-WORKERS = {Path("study") / "work.py"}
+WORKERS = {Path("fleet") / "cell.py"}
 LONGEST_MODULE = 400
 HEAVY = {"casadi", "matplotlib", "open3d", "rerun", "scipy"}  # 0.1 s to 1 s each, and `--help` needs none
 

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from symrefine.errors import InputError
+from symrefine.fleet.crew import Processes
 from symrefine.study import journal, runner, versions
 from symrefine.study.document import Node
 from symrefine.study.plan import Plan, make_plan
@@ -377,7 +378,7 @@ def test_unknown_results_are_told_and_rows_kept(make: Make, lab: Path) -> None:
 def test_same_bytes_in_one_process_in_two_and_after_a_kill(make: Make, lab: Path) -> None:
     plan = make()
     run_study(plan, lab / "one")
-    run_study(plan, lab / "two", workers=2)
+    run_study(plan, lab / "two", executor=Processes(workers=2))
     assert run_study(plan, lab / "cut", limit=5).resumed == 0
     path = lab / "cut" / "journal.jsonl"
     whole = path.read_bytes()
@@ -409,14 +410,11 @@ def test_an_interrupt_keeps_what_is_done(make: Make, lab: Path, monkeypatch: pyt
             raise KeyboardInterrupt
         return attempt(*args)
 
-    from symrefine.study import work
-
-    attempt = work.attempt
-    monkeypatch.setattr(work, "attempt", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        run_study(plan, lab / "out")
-    monkeypatch.undo()
-    monkeypatch.setattr(runner, "code_version", lambda *_: "test")
+    attempt = runner.attempt
+    with monkeypatch.context() as patch:
+        patch.setattr(runner, "attempt", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            run_study(plan, lab / "out")
     assert run_study(plan, lab / "out").resumed == 6
 
 

@@ -2,10 +2,11 @@
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from typing import TypeVar
 
-from symrefine.study.work import in_processes
+from symrefine.errors import SymrefineError
+from symrefine.fleet.crew import Processes
+from symrefine.fleet.limits import Lost
 
 C = TypeVar("C")
 R = TypeVar("R")
@@ -31,20 +32,17 @@ def in_order(work: Callable[[C], R], cases: Sequence[C], jobs: int) -> Iterator[
         jobs: processes of one thread each; with 1 all is done in this one.
 
     Raises:
-        SymrefineError: a process died.
+        SymrefineError: the process of a case died, twice.
     """
     if jobs == 1 or len(cases) < 2:
         yield from map(work, cases)
         return
     early: dict[int, R] = {}
     following = 0
-    for index, result in in_processes(partial(_numbered, work), list(enumerate(cases)), jobs):
+    for index, result in Processes(workers=jobs).do(work, cases):
+        if isinstance(result, Lost):
+            raise SymrefineError(f"case {index}: {result.why}")
         early[index] = result
         while following in early:
             yield early.pop(following)
             following += 1
-
-
-def _numbered(work: Callable[[C], R], job: tuple[int, C]) -> tuple[int, R]:
-    index, case = job
-    return index, work(case)

@@ -67,7 +67,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--workers", type=int, default=2, help="runs done at the same time (default: 2)")
     parser.add_argument("--docs", type=Path, default=HOME, help="where README.md and docs/ are (default: here)")
     options = parser.parse_args(argv)
-    from symrefine.study.work import one_thread_each
+    from symrefine.fleet.limits import one_thread_each
 
     one_thread_each()  # before anything heavy is imported
     from symrefine.study.typed import read_config
@@ -104,13 +104,14 @@ def missing_models() -> str:
 def run_part(path: Path, out: Path, *, full: bool, workers: int) -> Part:
     """Run one study; rows of another version of the code are done again."""
     from symrefine.cli.signs import progress
+    from symrefine.fleet.crew import on_this_machine
     from symrefine.study.plan import make_plan
     from symrefine.study.runner import run_study
 
     start = perf_counter()
     try:
         plan = make_plan(path, quick=not full)
-        outcome = run_study(plan, out / path.stem, workers=workers, replace=True, progress=progress)
+        outcome = run_study(plan, out / path.stem, executor=on_this_machine(workers), replace=True, progress=progress)
     except (SymrefineError, OSError) as error:
         return Part(
             name=path.name,

@@ -15,7 +15,7 @@ DESCRIPTION = (
     "that line into ~/.bashrc, ~/.zshrc or ~/.config/fish/config.fish."
 )
 # What stands for a file in the help of an argument; DIR stands for a directory.
-_FILES = ("FILE", "PATH", "OUT", "CONFIG", "A", "B")
+_FILES = ("FILE", "PATH", "OUT", "CONFIG", "PART", "A", "B")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -3,7 +3,7 @@
 import argparse
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from symrefine.cli.inputs import failure
 from symrefine.cli.outputs import complain, is_quiet, note, print_lines, write_all
@@ -19,10 +19,11 @@ from symrefine.cli.values import (
     probability,
 )
 from symrefine.errors import InputError, one_line
-from symrefine.files import check_target, json_text, naming, text_writer, whole
+from symrefine.files import check_target, json_text, text_writer, whole
 
 if TYPE_CHECKING:
-    from symrefine.journal import Journal
+    from symrefine.fleet.journal import Journal
+    from symrefine.fleet.limits import Lost
     from symrefine.review.decisions import Decisions
     from symrefine.review.labels import Labels
     from symrefine.review.objects import Row
@@ -67,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Detect what is new, apply what was decided, write the labels, tell what is left."""
-    from symrefine.study.work import one_thread_each
+    from symrefine.fleet.limits import one_thread_each
 
     one_thread_each()  # so that one worker gives the same bytes as several
     from symrefine.export.bop import models_of
@@ -112,8 +113,9 @@ def _fitting(kept: "Decisions", rows: "Rows", place: Path) -> "Decisions":
 
 def _detected(args: argparse.Namespace, asked: "Rows", held: "Journal") -> "Rows":
     """The rows of all objects; those that still tell of their files are not made again."""
+    from symrefine.fleet.crew import on_this_machine
+    from symrefine.fleet.tasks import finish
     from symrefine.review.store import ROWS, holds
-    from symrefine.study.work import in_processes
 
     out = Path(args.out)
     if held.torn:
@@ -124,9 +126,8 @@ def _detected(args: argparse.Namespace, asked: "Rows", held: "Journal") -> "Rows
     jobs = [(row, args.dir, args.out) for row in todo]
     print_lines(_line(row) for row in rows.values())
     with progress("detecting", len(asked), len(rows)) as advance:
-        for row in in_processes(examine_model, jobs, args.workers):
-            with naming(str(out / ROWS)):
-                held.append(row)
+        for made in finish(on_this_machine(args.workers, tell=note), examine_model, jobs, lost, held):
+            row = cast("Row", made)
             rows[row["object"]] = row
             if is_quiet() and row["error"] is not None:
                 complain(row["error"])
@@ -135,7 +136,7 @@ def _detected(args: argparse.Namespace, asked: "Rows", held: "Journal") -> "Rows
     return dict(sorted(rows.items()))
 
 
-def examine_model(job: Job) -> "Row":
+def examine_model(job: Job) -> dict[str, Any]:
     """The row of one object: what was found, or what was wrong with it; its pictures are written first."""
     from symrefine.cli.detect import examine
     from symrefine.detection.result import Detection
@@ -145,7 +146,7 @@ def examine_model(job: Job) -> "Row":
     row, folder, out = job
     path = Path(folder, row["file"])
     if row["error"] is not None:
-        return row
+        return dict(row)
     try:
         shape, found, _ = examine(str(path), row["options"])
         if not isinstance(found, Detection):
@@ -154,9 +155,15 @@ def examine_model(job: Job) -> "Row":
         for k, picture in enumerate(kept.pictures):
             with whole(place_of_picture(Path(out), row, k)) as draft:
                 draft.write_bytes(picture)
-        return {**row, **kept.told}  # type: ignore[typeddict-item]
+        return {**row, **kept.told}
     except Exception as error:  # noqa: BLE001 - one file must not end the others
         return {**row, "error": failure(str(path), error)}
+
+
+def lost(job: Job, why: "Lost") -> dict[str, Any]:
+    """The row of an object that was lost."""
+    row, folder, _ = job
+    return {**row, "error": one_line(f"{Path(folder, row['file'])}: {why.why}")}
 
 
 def _write(args: argparse.Namespace, rows: "Rows", decisions: "Decisions", labels: "Labels") -> None:

@@ -5,10 +5,24 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NoReturn
 
-from symrefine.cli import align, batch, complete, completion, derive, detect, export, info, label, run, symmetrize, view
+from symrefine.cli import (
+    align,
+    batch,
+    complete,
+    completion,
+    derive,
+    detect,
+    export,
+    info,
+    label,
+    merge,
+    run,
+    symmetrize,
+    view,
+)
 from symrefine.errors import InputError, meant
 
-_COMMANDS = (detect, info, align, derive, export, symmetrize, complete, batch, label, run, view, completion)
+_COMMANDS = (detect, info, align, derive, export, symmetrize, complete, batch, label, run, merge, view, completion)
 _DESCRIPTION = "Symmetry of 3-D shapes: mirror planes, rotation axes and the point group of a mesh or a point cloud."
 _EPILOG = (
     "`symrefine COMMAND --help` explains a command. Exit status: 0 done, 1 some files of a batch or runs failed, 2 bad "

@@ -5,7 +5,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from symrefine.cli.outputs import complain, is_quiet, note, print_lines, say, say_lines
+from symrefine.cli.fleet import add_fleet_options, check_table_option, executor, write_rows
+from symrefine.cli.outputs import check_outputs, complain, is_quiet, note, print_lines, say, say_lines
 from symrefine.cli.signs import progress
 from symrefine.cli.values import count
 from symrefine.errors import InputError
@@ -33,11 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="put another value in the config, such as sweep.seed=[0,1] or fixed.points=5000; may be repeated",
     )
     parser.add_argument("--quick", action="store_true", help="the quick version: what the config sets under `quick`")
-    parser.add_argument(
-        "--workers", type=count, default=1, metavar="N", help="runs done at the same time (default: %(default)s)"
-    )
     parser.add_argument("--out", metavar="DIR", help="directory to write to (default: `out` of the config)")
     parser.add_argument("--limit", type=count, metavar="N", help="only the first N runs of the sweep")
+    add_fleet_options(parser, "run")
     parser.add_argument(
         "--replace", action="store_true", help="drop rows of another config or code version in the directory"
     )
@@ -47,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the study, print its tables, tell whether all went well."""
     if args.config is None and not args.list:
         args.parser.error("CONFIG.yaml is missing; `symrefine run --list` names those in ./configs")
-    from symrefine.study.work import one_thread_each
+    from symrefine.fleet.limits import one_thread_each
 
     one_thread_each()  # before anything heavy is imported
     from symrefine.study.plan import make_plan
@@ -61,9 +60,17 @@ def run(args: argparse.Namespace) -> int:
         say_lines(_runs(plan.cases[: args.limit]))
         return 0
     folder = Path(args.out or plan.study.out)
+    check_table_option(args)
+    check_outputs({"--table": args.table}, [])
     with naming(str(folder)):
         outcome = run_study(
-            plan, folder, workers=args.workers, limit=args.limit, replace=args.replace, progress=progress
+            plan,
+            folder,
+            executor=executor(args),
+            shard=args.shard,
+            limit=args.limit,
+            replace=args.replace,
+            progress=progress,
         )
     if outcome.tables and not is_quiet():
         say(outcome.tables + "\n")
@@ -72,6 +79,7 @@ def run(args: argparse.Namespace) -> int:
     parts = [f"{len(outcome.rows)} runs", f"{outcome.resumed} done before" if outcome.resumed else ""]
     parts += [f"{outcome.failed} failed" if outcome.failed else "", f"written to {folder}"]
     print_lines([", ".join(part for part in parts if part)])
+    write_rows(args.table, outcome.untimed)
     return int(outcome.failed > 0)
 
 

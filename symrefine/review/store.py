@@ -7,9 +7,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, cast
 
-from symrefine import journal
 from symrefine.errors import InputError
 from symrefine.files import check_target
+from symrefine.fleet import journal
 from symrefine.load import IMAGES
 from symrefine.review.objects import Row
 
@@ -89,7 +89,7 @@ def _head(number: int, path: Path, options: dict[str, Any], scale: float, looks:
 
 def holds(out: Path, row: Row | None, now: Row) -> bool:
     """Whether a row made before still tells of its object, and its pictures are there."""
-    if row is None or now["sha256"] is None:
+    if row is None or now["sha256"] is None or row.get("lost") is not None:
         return False
     same = all(row.get(key) == now.get(key) for key in ("file", "sha256", "version", "options", "scale"))
     return same and all(place_of_picture(out, row, k).is_file() for k in range(len(row["choices"])))

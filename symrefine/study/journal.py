@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from symrefine import journal
 from symrefine.errors import InputError
+from symrefine.fleet import journal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,13 +29,18 @@ class Entry:
     results: Mapping[str, Any]
     timings: Mapping[str, float]
 
+    @classmethod
+    def of(cls, row: journal.Row) -> "Entry":
+        """The entry that a row of the journal holds."""
+        return cls(**{name: row[name] for name in ENTRY})
+
 
 STAMP, ENTRY = tuple(Stamp.__dataclass_fields__), tuple(Entry.__dataclass_fields__)
 
 
 @contextmanager
-def opened(path: Path, stamp: Stamp, *, replace: bool) -> Iterator[tuple[dict[int, Entry], journal.Journal]]:
-    """The finished runs by index, and the journal to append to; nobody else can write to it meanwhile.
+def opened(path: Path, stamp: Stamp, *, replace: bool) -> Iterator[tuple[dict[int, journal.Row], journal.Journal]]:
+    """The rows of finished runs by index, and the journal to append to; nobody else can write to it meanwhile.
 
     Args:
         stamp: of the rows to come.
@@ -57,4 +62,4 @@ def opened(path: Path, stamp: Stamp, *, replace: bool) -> Iterator[tuple[dict[in
         if other:
             rows = []
             os.ftruncate(found.descriptor, 0)
-        yield {row["index"]: Entry(**{name: row[name] for name in ENTRY}) for row in rows}, found
+        yield {row["index"]: row for row in rows}, found

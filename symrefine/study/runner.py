@@ -9,6 +9,10 @@ from typing import Any
 
 from symrefine.errors import InputError
 from symrefine.files import replacing
+from symrefine.fleet.crew import HERE, Executor
+from symrefine.fleet.shard import Shard, Whole
+from symrefine.fleet.table import csv_text
+from symrefine.fleet.tasks import finish, is_final
 from symrefine.study.claims import Verdict, claims_table, judge, verdict_rows
 from symrefine.study.document import Node
 from symrefine.study.experiment import Row
@@ -16,23 +20,27 @@ from symrefine.study.figures import check_figures, draw
 from symrefine.study.journal import Entry, Stamp, opened
 from symrefine.study.plan import Plan, select, varying
 from symrefine.study.summary import Measure, check_columns
-from symrefine.study.tables import check_tables, csv_text, markdown
+from symrefine.study.tables import check_tables, markdown
 from symrefine.study.versions import code_version, library_versions
-from symrefine.study.work import finish
+from symrefine.study.work import attempt, lost, parcel
 
 JOURNAL = "journal.jsonl"
+RECORDINGS = "recordings"
+_NAMES = ("rows.csv", "timings.csv", "claims.csv", "tables.md", "traces.csv")
 # (text, steps in all, steps done before) to a context that gives a function to call after each step.
 Progress = Callable[[str, int, int], AbstractContextManager[Callable[[], None]]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What a study came to, and where it was written: rows of the finished runs, in the order of the sweep, Markdown as
-    in tables.md, figures by title; how many of the runs had been done before, and how many have an error.
+    """What a study came to, and where it was written: rows of the finished runs, in the order of the sweep, with their
+    timings and without, as in rows.csv; Markdown as in tables.md, figures by title; how many of the runs had been done
+    before, and how many have an error.
     """
 
     folder: Path
     rows: Sequence[Row]
+    untimed: Sequence[Row]
     verdicts: Sequence[Verdict]
     tables: str
     figures: Mapping[str, Path]
@@ -44,7 +52,8 @@ def run_study(
     plan: Plan,
     folder: Path,
     *,
-    workers: int = 1,
+    executor: Executor = HERE,
+    shard: Shard | None = None,
     limit: int | None = None,
     replace: bool = False,
     progress: Progress = lambda *_: nullcontext(lambda: None),
@@ -53,6 +62,8 @@ def run_study(
 
     Args:
         folder: to write to; made if it is not there.
+        executor: what does the runs, which changes nothing but the time; runs lost to other limits are tried again.
+        shard: the runs of this shard only.
         limit: the first so many runs of the sweep only.
         replace: whether rows of another config or code version in the folder are dropped instead of refused.
 
@@ -62,17 +73,24 @@ def run_study(
     measures = _check(plan)
     code = code_version(plan.experiment.name, plan.experiment.root)
     stamp = Stamp(config=plan.config_hash, code=code, libraries=library_versions())
+    _refuse_foreign(plan, folder)
     _make(folder)
-    wanted = range(len(plan.cases) if limit is None else min(limit, len(plan.cases)))
-    with opened(folder / JOURNAL, stamp, replace=replace) as (entries, journal):
-        before = sum(index in entries for index in wanted)
-        jobs = [(index, plan.cases[index]) for index in wanted if index not in entries]
+    fleet = Whole.of(len(plan.cases), asdict(stamp))
+    first = range(len(plan.cases) if limit is None else min(limit, len(plan.cases)))
+    wanted = [index for index in first if shard is None or shard.takes(index)]
+    with opened(folder / JOURNAL, stamp, replace=replace) as (found, journal):
+        kept = {i: row for i, row in found.items() if is_final(row, executor.limits) and fleet.has(row, shard, i)}
+        before = sum(index in kept for index in wanted)
+        jobs = [
+            parcel(plan.experiment, index, plan.cases[index], asdict(stamp) | fleet.mark(shard, index))
+            for index in wanted
+            if index not in kept
+        ]
         with progress("running", len(wanted), before) as advance:
-            for entry in finish(plan.experiment, jobs, workers):
-                journal.append(asdict(stamp) | asdict(entry))
-                entries[entry.index] = entry
+            for row in finish(executor, attempt, jobs, lost, journal):
+                found[row["index"]] = row
                 advance()
-        done = [entries[index] for index in sorted(entries)]
+        done = [Entry.of(found[index]) for index in sorted(found)]
         return _write(plan, folder, stamp, done, measures, before, progress)
 
 
@@ -100,6 +118,18 @@ def _must_pick(where: Node, plan: Plan, *common: Node) -> None:
     picks = [select(node, plan.experiment) for node in (where, *common)]
     if not plan.changed and not any(all(pick(asdict(case)) for pick in picks) for case in plan.cases):
         raise where.error("picks no run of the sweep")
+
+
+def _refuse_foreign(plan: Plan, folder: Path) -> None:
+    """Refuse a folder that no study has written to but that has files of the names which this one will write."""
+    if (folder / JOURNAL).exists():
+        return
+    for name in [*_NAMES, *(f"{_slug(figure.title)}.png" for figure in plan.study.figures), RECORDINGS]:
+        if (folder / name).exists():
+            raise InputError(
+                f"{folder / name}: is there already and not of a study, whose journal would be beside it; "
+                "name another directory with --out"
+            )
 
 
 def _make(folder: Path) -> None:
@@ -140,6 +170,7 @@ def _write(
     return Outcome(
         folder=folder,
         rows=full,
+        untimed=rows,
         verdicts=verdicts,
         tables="\n".join(tables),
         figures=figures,
@@ -194,10 +225,10 @@ def _record(plan: Plan, folder: Path, chosen: Sequence[Any], progress: Progress)
     cases = _picked(plan, chosen, plan.study.record)
     if record is None or not cases:
         return
-    _make(folder / "recordings")
+    _make(folder / RECORDINGS)
     with progress("recording", len(cases), 0) as advance:
         for case in cases:
-            with replacing(folder / "recordings" / f"{_name(case, plan.cases)}.rrd") as draft:
+            with replacing(folder / RECORDINGS / f"{_name(case, plan.cases)}.rrd") as draft:
                 record(case, draft)
             advance()
 

@@ -1,7 +1,5 @@
-"""Rows as CSV and as Markdown tables."""
+"""Rows as Markdown tables."""
 
-import csv
-import io
 from collections.abc import Sequence
 
 from symrefine.study.experiment import Experiment, Row
@@ -9,17 +7,6 @@ from symrefine.study.plan import chosen
 from symrefine.study.schema import Study, Table
 from symrefine.study.summary import Measure, short, summarise
 from symrefine.study.typed import Scalar
-
-
-def csv_text(rows: Sequence[Row]) -> str:
-    """Rows as CSV: every column that any row has, in order of appearance; no value is an empty field."""
-    columns = list({name: None for row in rows for name in row})
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(columns)
-    values = [[row.get(name) for name in columns] for row in rows]
-    writer.writerows([str(v).lower() if isinstance(v, bool) else v for v in row] for row in values)
-    return stream.getvalue()
 
 
 def check_tables(study: Study, experiment: Experiment) -> list[Measure]:

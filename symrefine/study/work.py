@@ -1,105 +1,51 @@
-"""Cases run one after the other or in several processes; what goes wrong with one does not end the others."""
+"""One run of a study, wherever it is done; what goes wrong with it does not end the others."""
 
 import math
-import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
-from typing import Any, TypeVar
+from typing import Any
 
 from symrefine.errors import SymrefineError
+from symrefine.fleet.journal import Row
+from symrefine.fleet.limits import Lost
 from symrefine.study.experiment import Experiment, load_experiment
 from symrefine.study.journal import Entry
 from symrefine.study.versions import LIBRARIES
 
-P = TypeVar("P")
-R = TypeVar("R")
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 TIMING = "_s"
 WALL = "wall_s"
 # What the runner adds to every row.
 OWN_COLUMNS = ("config", "code", *LIBRARIES, "error")
 
-# Place in the sweep and the case.
-Job = tuple[int, Any]
-# Module, its root, place in the sweep, fields of the case: what a process can be sent.
-_Parcel = tuple[str, str, int, dict[str, Any]]
+# Module, its root, place in the sweep, fields of the case, what the row begins with: what a process can be sent.
+Parcel = tuple[str, str, int, dict[str, Any], Mapping[str, Any]]
 
 
-def one_thread_each() -> None:
-    """Keep the libraries loaded from here on to one thread, so that sums do not depend on the number of cores."""
-    for name in THREADS:
-        os.environ[name] = "1"
+def parcel(experiment: Experiment, index: int, case: Any, head: Mapping[str, Any]) -> Parcel:
+    """A run as another process can be sent it.
 
-
-def finish(experiment: Experiment, jobs: Sequence[Job], workers: int) -> Iterator[Entry]:
-    """The entry of each job, as soon as it is done.
-
-    Raises:
-        SymrefineError: a process died.
+    Args:
+        index: place in the sweep.
+        head: what its row begins with.
     """
-    if workers == 1 or len(jobs) < 2:
-        yield from (attempt(experiment, index, case) for index, case in jobs)
-        return
-    parcels = [(experiment.name, str(experiment.root), index, asdict(case)) for index, case in jobs]
-    yield from in_processes(_unpack, parcels, workers)
+    return experiment.name, str(experiment.root), index, asdict(case), head
 
 
-def in_processes(work: Callable[[P], R], parcels: Sequence[P], workers: int) -> Iterator[R]:
-    """What `work` makes of each parcel, as soon as it is done, in this process or in several of one thread.
-
-    Raises:
-        SymrefineError: a process died.
-    """
-    if workers == 1 or len(parcels) < 2:
-        yield from map(work, parcels)
-        return
-    from concurrent.futures import ProcessPoolExecutor, as_completed
-    from concurrent.futures.process import BrokenProcessPool
-    from multiprocessing import get_context
-
-    one_thread_each()
-    pool = ProcessPoolExecutor(min(workers, len(parcels)), get_context("spawn"), _start_worker)
-    try:
-        for done in as_completed([pool.submit(work, parcel) for parcel in parcels]):
-            yield done.result()
-    except BrokenProcessPool:
-        raise SymrefineError(
-            "a worker process died, perhaps out of memory; finished rows are kept, run it again"
-        ) from None
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _start_worker() -> None:
-    """Make a worker end with an interrupt, and with the process that started it."""
-    import signal
-    import threading
-    import warnings
-    from multiprocessing import parent_process
-
-    warnings.simplefilter("ignore")
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    parent = parent_process()
-    if parent is None:
-        return
-
-    def end_with_parent() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=end_with_parent, daemon=True).start()
-
-
-def _unpack(parcel: _Parcel) -> Entry:
-    name, root, index, fields = parcel
+def attempt(sent: Parcel) -> Row:
+    """The row of a run: its results and timings, or its error."""
+    name, root, index, fields, head = sent
     experiment = load_experiment(name, Path(root))
-    return attempt(experiment, index, experiment.case(**fields))
+    return {**head, **asdict(_entry(experiment, index, experiment.case(**fields)))}
 
 
-def attempt(experiment: Experiment, index: int, case: Any) -> Entry:
-    """Run a case; its results and timings, or its error."""
+def lost(sent: Parcel, why: Lost) -> Row:
+    """The row of a run that was lost."""
+    return {**sent[-1], **asdict(Entry(index=sent[2], error=f"the run {why.why}", results={}, timings={}))}
+
+
+def _entry(experiment: Experiment, index: int, case: Any) -> Entry:
     start = perf_counter()
     row: Mapping[str, Any] = {}
     error = None

@@ -1,0 +1,70 @@
+"""`symrefine merge`: the parts that `--shard` wrote become one."""
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from symrefine.cli.fleet import add_table_option, check_table_option, write_rows
+from symrefine.cli.outputs import check_outputs, print_lines
+from symrefine.errors import InputError
+from symrefine.files import naming, whole
+
+if TYPE_CHECKING:
+    from symrefine.fleet.journal import Row
+
+HELP = "make one of the parts that --shard wrote"
+DESCRIPTION = (
+    "Put the parts that `symrefine batch --shard` or `symrefine run --shard` wrote together, rows in the order of the "
+    "tasks. Parts that are incomplete, overlap, or belong to another fleet are refused, and so is an output that is "
+    "there already. Parts of `batch` are its files; those of `run` are its directories, and `symrefine run` on the "
+    "directory made of them writes the tables."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("path", metavar="PART", nargs="+", help="all files of a batch, or all directories of a study")
+    parser.add_argument("--out", metavar="FILE|DIR", required=True, help="file, or directory, for the whole")
+    add_table_option(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Merge, and say what was merged."""
+    from symrefine.fleet.shard import merged
+    from symrefine.study.runner import JOURNAL
+
+    parts = [Path(name) for name in args.path]
+    studies = [path for path in parts if path.is_dir()]
+    if studies and len(studies) < len(parts):
+        other = next(path for path in parts if path not in studies)
+        raise InputError(f"{other}: is no directory as {studies[0]} is; merge takes files, or directories")
+    files = [path / JOURNAL for path in parts] if studies else parts
+    out = Path(args.out, JOURNAL) if studies else Path(args.out)
+    if Path(args.out).exists():
+        raise InputError(f"{args.out}: is there already; name another one with --out")
+    if studies and args.table:
+        raise InputError(f"--table {args.table}: is for parts of `batch`; `symrefine run` writes the table of a study")
+    check_table_option(args)
+    check_outputs({"--table": args.table} | ({} if studies else {"--out": args.out}), files)
+    rows = merged({str(path): _rows(path, is_study=bool(studies)) for path in files})
+    _write(out, rows)
+    write_rows(args.table, rows)
+    print_lines([f"wrote {args.out}: {len(rows)} rows of {len(parts)} parts"])
+    return 0
+
+
+def _rows(path: Path, *, is_study: bool) -> Sequence["Row"]:
+    from symrefine.fleet.journal import read_rows
+    from symrefine.study.journal import ENTRY, STAMP
+
+    keys, rows_of = (STAMP + ENTRY, "a study") if is_study else (("file",), "`symrefine batch`")
+    return read_rows(path, keys, rows_of=rows_of)
+
+
+def _write(out: Path, rows: Sequence["Row"]) -> None:
+    with naming(str(out)):
+        out.parent.mkdir(exist_ok=True)
+    with whole(out) as draft:
+        draft.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="ascii", newline="")

@@ -1,0 +1,166 @@
+"""Many objects: files, patterns, directories, addresses, or a manifest that says more of each."""
+
+import csv
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from symrefine.cli import values
+from symrefine.cli.inputs import expanded
+from symrefine.errors import InputError, meant
+from symrefine.fleet.remote import is_remote, listed
+from symrefine.units import METRES
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """An object to look at.
+
+    Attributes:
+        name: what its row calls it.
+        path: of its file, or the address.
+        place: where it was named, for messages.
+        told: what the manifest says of it, for its row: `id`, `scale`.
+        options: of `detect`, for this one.
+    """
+
+    name: str
+    path: str
+    place: str
+    told: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+
+def sources(paths: Sequence[str], *, recursive: bool) -> list[Source]:
+    """The objects that paths stand for, each once, in order; in a lone directory they are called as they are there.
+
+    Raises:
+        InputError: one that stands for nothing.
+    """
+    found: dict[str, Source] = {}
+    for path in paths:
+        files = listed(path, _is_ours, recursive=recursive) if is_remote(path) else _local(path, recursive)
+        if not files:
+            from symrefine.load import READERS
+
+            raise InputError(f"{path}: no mesh and no cloud in it; known are {' '.join(READERS)}, and .gz of each")
+        for inside, file in files.items():
+            found.setdefault(file, Source(name=inside if len(paths) == 1 else file, path=file, place=file))
+    return list(found.values())
+
+
+def _local(path: str, recursive: bool) -> dict[str, str]:
+    """The files that a path stands for, in order, by the names that they have in it if it is a directory."""
+    folder = Path(path)
+    if not folder.is_dir():
+        files = expanded([path])
+        if missing := [name for name in files if not Path(name).exists()]:
+            raise InputError(f"{missing[0]}: no such directory, file or pattern")
+        return {name: name for name in files}
+    found = folder.rglob("*") if recursive else folder.glob("*")
+    names = [p.relative_to(folder) for p in found if _is_ours(p) and p.is_file()]
+    shown = sorted(name.as_posix() for name in names if not any(part.startswith(".") for part in name.parts))
+    return {name: str(folder / name) for name in shown}
+
+
+def _is_ours(path: Path) -> bool:
+    from symrefine.load import READERS, suffix_of
+
+    return suffix_of(path) in READERS
+
+
+def _one_of(*known: str) -> Callable[[str], str]:
+    def choose(text: str) -> str:
+        if text not in known:
+            raise ValueError(f"{text!r} is not one of {', '.join(known)}{meant(text, known)}")
+        return text
+
+    return choose
+
+
+# Columns of a manifest, and what reads them: what is told of an object, and the options of `detect` by their names.
+_TOLD: Mapping[str, Callable[[str], Any]] = {"id": str, "scale": values.positive}
+_OPTIONS: Mapping[str, Callable[[str], Any]] = {
+    "tolerance": values.tolerance,
+    "units": _one_of(*METRES),
+    "measure": _one_of("surface", "solid"),
+    "seed": values.natural,
+    "frame": values.natural,
+    "outliers": _one_of("auto", "none"),
+    "viewpoint": values.place,
+    "labels": str,
+    "weights": str,
+}
+
+
+def manifest(path: Path) -> list[Source]:
+    """The objects of a manifest: CSV with a column `path`, relative to it, and any of `id`, `scale` and the options.
+
+    Raises:
+        InputError: with the line and the column.
+    """
+    found: list[Source] = []
+    seen: dict[str, dict[str, int]] = {"path": {}, "id": {}}
+    for line, row in _lines(path):
+        place = f"{path}:{line}"
+        for column, known in seen.items():
+            if row[column] and (first := known.setdefault(row[column], line)) != line:
+                raise InputError(f"{place}: {column}: {row[column]} stands in line {first}, too")
+        file = row["path"] if is_remote(row["path"]) else str(path.parent / row["path"])
+        if not row["path"] or not (is_remote(file) or Path(file).is_file()):
+            raise InputError(
+                f"{place}: path: {row['path'] or 'is empty'}: no such file; expected one relative to {path.parent}"
+            )
+        told, options = (
+            {name: _value(place, name, row[name], read) for name, read in kind.items() if row.get(name)}
+            for kind in (_TOLD, _OPTIONS)
+        )
+        found.append(Source(name=row["path"], path=file, place=place, told=told, options=options))
+    if not found:
+        raise InputError(f"{path}: names no objects; expected a line for each below the titles")
+    return found
+
+
+def _lines(path: Path) -> Iterator[tuple[int, Mapping[str, str]]]:
+    """The lines of a manifest with their number, as text by column; a column that is not there is empty."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or 'no text in UTF-8'}") from None
+    reader = csv.reader(text.splitlines(keepends=True), strict=True)
+    try:
+        titles = [title.strip() for title in next(reader, [])]
+        _check_titles(path, titles)
+        for cells in reader:
+            if not cells:
+                continue
+            if len(cells) != len(titles):
+                raise InputError(
+                    f"{path}:{reader.line_num}: has {len(cells)} values, expected {len(titles)} as the titles"
+                )
+            yield reader.line_num, {"id": ""} | dict(zip(titles, (cell.strip() for cell in cells), strict=True))
+    except csv.Error as error:
+        raise InputError(f"{path}:{reader.line_num}: is no CSV: {error}") from None
+
+
+def _check_titles(path: Path, titles: Sequence[str]) -> None:
+    known = ["path", *_TOLD, *_OPTIONS]
+    for title in titles:
+        if title not in known:
+            raise InputError(f"{path}:1: {title!a}: unknown column; expected {', '.join(known)}{meant(title, known)}")
+        if titles.count(title) > 1:
+            raise InputError(f"{path}:1: {title}: stands there twice")
+    if "path" not in titles:
+        raise InputError(f"{path}:1: there is no column path; expected {', '.join(known)}")
+
+
+def _value(place: str, column: str, text: str, read: Callable[[str], Any]) -> Any:
+    from argparse import ArgumentTypeError
+
+    try:
+        return read(text)
+    except (ArgumentTypeError, ValueError) as error:
+        raise InputError(f"{place}: {column}: {error}") from None
