@@ -91,6 +91,16 @@ def test_labels_of_faces_count():
     assert not on_vertices(one_other, near, center).faces
 
 
+def test_parts_that_touch_share_vertices_but_for_rounding():
+    shape, near, center, _ = posed("caltrop")
+    rng, size = np.random.default_rng(0), shape.diagonal
+    apart = shape.points[shape.faces].reshape(-1, 3) + 1e-15 * size * rng.standard_normal((3 * len(shape.faces), 3))
+    found = on_vertices(Shape(apart, np.arange(len(apart)).reshape(-1, 3)), near, center)
+    assert found is not None
+    assert found.miss < 1e-13
+    assert found.faces
+
+
 @pytest.mark.parametrize("name", ["chair", "fan8", "caltrop"])
 def test_noise_of_vertices_is_told_or_too_much(name):
     shape, near, center, _ = posed(name)

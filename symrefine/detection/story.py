@@ -153,8 +153,7 @@ def _report(
     names, needs = [h.group.name for h in links], [h.need for h in links]
     told = alternatives(names, needs, decision, -1 if reason else index)
     history = chosen.history
-    with clock("vertices"):
-        on = _on_vertices(measured, chosen)
+    on = _on_vertices(measured, chosen, surface.diagonal, clock)
     chosen = chosen if on is None else _polished(chosen, on, measured)
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
     planes = [e for e in chosen.elements if e.operations.kind == "plane"]
@@ -228,12 +227,14 @@ def _report(
     )
 
 
-def _on_vertices(measured: Measured, chosen: Hypothesis) -> OnVertices | None:
+def _on_vertices(measured: Measured, chosen: Hypothesis, diagonal: float, clock: Clock) -> OnVertices | None:
     """Where the vertices of a mesh put the group that was decided, if it maps them onto one another."""
     if measured.shape.faces is None:
         return None
     origin, scale = measured.moments.center, measured.moments.scale
-    return on_vertices(measured.shape, chosen.group, origin + scale * chosen.placed.center)
+    with clock("vertices"):
+        center = origin + scale * chosen.placed.center
+        return on_vertices(measured.shape, chosen.group, center, diagonal=scale * diagonal)
 
 
 def _polished(chosen: Hypothesis, on: OnVertices, measured: Measured) -> Hypothesis:

@@ -23,6 +23,9 @@ ROUNDS, STILL, ROUNDING = 30, 1e-15, 1e-12
 NEAR, LARGEST = 2e-3, 5_000_000
 # A shape is exact where no vertex misses its counterpart by more than what rounding to five digits leaves.
 ROUNDED = 1e-5
+# Vertices of parts that touch are one where they are nearer than single precision tells; where the walls of the grid
+# stand that finds them: round numbers, of which designs are full, lie nowhere near.
+WELD, WALL = 1e-6, 0.3819660112501051
 # Vertices that are asked first, and rounds of these: where they have no counterparts the others are not asked.
 ASKED, GLANCES = 200, 6
 
@@ -40,18 +43,21 @@ class Distinct:
     labels: Index | None
 
     @classmethod
-    def of(cls, shape: Shape, center: Array, diagonal: float) -> "Distinct":
-        """The labels of a cloud tell points apart, those of a mesh are of its faces."""
+    def of(cls, shape: Shape, center: Array, diagonal: float, *, weld: float = 0.0) -> "Distinct":
+        """The labels of a cloud tell points apart, those of a mesh are of its faces.
+
+        Points in one cell of a grid of `weld` are one, if that is not 0: whatever the grid, few of those that touch lie
+        on two sides of its walls.
+        """
         local = (shape.points - center) / diagonal
         labels = shape.labels if shape.faces is None else None
-        key = local if labels is None else np.column_stack([local, labels])
-        _, rows, back = np.unique(key, axis=0, return_index=True, return_inverse=True)
-        return cls(
-            points=local[rows],
-            rows=rows,
-            back=back.reshape(-1),
-            labels=None if labels is None else labels[rows],
-        )
+        place = np.floor(local / weld + WALL) if weld else local
+        key = place if labels is None else np.column_stack([place, labels])
+        order = np.lexsort(key.T[::-1])
+        first = np.append(True, (np.diff(key[order], axis=0) != 0.0).any(axis=1))
+        rows, back = order[first], np.empty(len(key), dtype=np.intp)
+        back[order] = np.cumsum(first) - 1
+        return cls(points=local[rows], rows=rows, back=back, labels=None if labels is None else labels[rows])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -73,7 +79,9 @@ class OnVertices:
     faces: bool
 
 
-def on_vertices(shape: Shape, group: PointGroup, center: Array, *, within: float = ROUNDED) -> OnVertices | None:
+def on_vertices(
+    shape: Shape, group: PointGroup, center: Array, *, within: float = ROUNDED, diagonal: float = 0.0
+) -> OnVertices | None:
     """Where the points of a shape, the vertices of a mesh, put its group, if it maps them onto one another.
 
     Args:
@@ -81,6 +89,7 @@ def on_vertices(shape: Shape, group: PointGroup, center: Array, *, within: float
         group: as found in the shape; its place may be off by some thousandths of the diagonal.
         center: [3] as found, input units.
         within: by what fraction of the diagonal an image may miss its counterpart.
+        diagonal: input units; that of the smallest box around the points if 0.
 
     Returns:
         None where some points have no counterpart, for C1, for all of space (K, Kh), and where there are too many
@@ -88,8 +97,8 @@ def on_vertices(shape: Shape, group: PointGroup, center: Array, *, within: float
     """
     if group.name == "C1" or group.symbol.family in ("K", "Kh"):
         return None
-    diagonal = tight_diagonal(shape.points)
-    own = Distinct.of(shape, center, diagonal)
+    diagonal = diagonal or tight_diagonal(shape.points)
+    own = Distinct.of(shape, center, diagonal, weld=WELD)
     place = Placed(group=finite_group(group, own.points, copied=False), center=np.zeros(3))
     if place.group.order * len(own.rows) > LARGEST:
         return None
