@@ -18,6 +18,7 @@ from symrefine.export.bop import bop_entry
 from symrefine.front.verbs import detect
 from symrefine.geometry import random_orthogonal
 from symrefine.load import load
+from symrefine.review import cards
 from symrefine.review.decisions import decisions_text, read_decisions
 from symrefine.shape import Shape
 
@@ -304,3 +305,39 @@ def test_a_person_decides_where_noise_hides_the_answer(run: Run, tmp_path: Path)
     entry = of(to, "models_info.json")["1"]
     assert math.isfinite(entry["diameter"])
     assert of(to, "labels.json")["objects"][0]["found"] is None
+
+
+def test_a_run_that_was_killed_goes_on(run: Run, out: Path, first: Path) -> None:
+    """Half of a row, and a picture that is not there: those two are done again, and all is as it was."""
+    lines = (out / "objects.jsonl").read_bytes()
+    (out / "objects.jsonl").write_bytes(lines[: lines.rfind(b"\n", 0, -1) + 100])
+    next((out / "pictures").glob("obj_000001_*.webp")).unlink()
+    for name in ("models_info.json", "labels.json", "review.html"):
+        (out / name).unlink()
+    status, _, said = run()
+    assert status == 0
+    assert "the last row is incomplete" in said
+    for name in ("models_info.json", "labels.json"):
+        assert (out / name).read_bytes() == (first / name).read_bytes()
+    assert rows(out) == rows(first)
+    assert {p.name: p.read_bytes() for p in (out / "pictures").iterdir()} == {
+        p.name: p.read_bytes() for p in (first / "pictures").iterdir()
+    }
+
+
+def test_a_page_has_room_for_so_many(run: Run, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cards, "MOST", 1)
+    assert run()[0] == 0
+    page = (out / "review.html").read_text(encoding="utf-8")
+    assert page.count("<article") == 1
+    assert "2 more come after these" in page
+    assert "3 objects to look at" in page
+
+
+def test_names_and_notes_do_not_act_on_the_page(run: Run, out: Path, tmp_path: Path) -> None:
+    note = "</script><script>alert(1)</script>\u202e"
+    run("--decisions", saved(tmp_path / "decisions.json", decided(out, 4, note=note)))
+    page = (out / "review.html").read_text(encoding="utf-8")
+    assert "alert(1)" in page
+    assert "<script>alert" not in page
+    assert "\u202e" not in page

@@ -286,7 +286,9 @@ def test_files_show_the_colours_they_were_made_with(kind: str, tmp_path: Path) -
 @pytest.mark.parametrize("kind", WRITERS)
 def test_the_command_tells_both_groups(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = WRITERS[kind](tmp_path, BOX, dot((0, 0, 0.2), 0.15))
-    assert invoke(["detect", str(path), "--texture", "--json", str(tmp_path / "x.json")]) == 0
+    page = tmp_path / "x.html"
+    assert invoke(["detect", str(path), "--texture", "--json", str(tmp_path / "x.json"), "--report", str(page)]) == 0
+    assert "With its texture</dt><dd>C2v, 1.00" in page.read_text(encoding="utf-8")
     assert "with its texture: C2v, confidence" in capsys.readouterr().out
     record = json.loads((tmp_path / "x.json").read_text())
     assert (record["point_group"], record["textured"]["point_group"]) == ("D2h", "C2v")

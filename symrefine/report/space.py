@@ -70,6 +70,8 @@ def _head(d: Detection, shape: Shape) -> str:
         title, below, summary = "Undetermined", "", sentence(d.undetermined)
     elif d.at_least:
         title = f"At least {title}"
+    if d.textured is not None:
+        summary += f" With its texture it is {symbol(d.textured.point_group)}."
     return head(shape.source, title, below, summary)
 
 
