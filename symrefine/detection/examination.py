@@ -11,8 +11,7 @@ from symrefine.decide.chain import Pool, chain, explore
 from symrefine.decide.hypotheses import Hypothesis
 from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide
 from symrefine.detection.measure import Measured, Outliers, doubt, gather, measure
-from symrefine.detection.result import Sample
-from symrefine.detection.sketch import Sketch, is_large, set_apart, sketched
+from symrefine.detection.sketch import Sample, Sketch, is_large, set_apart, sketched
 from symrefine.geometry import Array, check_tolerance
 from symrefine.shape import Index, Shape
 from symrefine.surface.misses import TOLERANCE, disc_distances

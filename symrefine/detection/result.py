@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from symrefine.decide.posterior import Alternative
 from symrefine.detection.examination import Examined
+from symrefine.detection.sketch import Sample
 from symrefine.fit.refine import Iterate
 from symrefine.geometry import Array, Axis, Plane, ReadOnly
 from symrefine.groups import PointGroup
@@ -81,14 +82,6 @@ class Candidate:
     direction: Array
     point: Array
     excess: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sample:
-    """How many points, drawn at random, stand for the surface of a cloud, and of how many."""
-
-    points: int
-    of: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

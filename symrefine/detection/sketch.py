@@ -26,6 +26,14 @@ MANY, SAMPLE = 100_000, 50_000
 BEYOND = 1.5
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sample:
+    """How many points, drawn at random, stand for the surface of a cloud, and of how many."""
+
+    points: int
+    of: int
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sketch:
     """A cloud of very many points in 3-space.
