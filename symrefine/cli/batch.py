@@ -44,8 +44,8 @@ DESCRIPTION = (
     "as BOP names models, obj_000001.ply for object 1, or numbered by the ids of the manifest, and one "
     "models_info.json holds all of them."
 )
-# Object 1 of BOP is obj_000001.ply, and its id in a manifest is 1.
-_BOP_NAME, _BOP_ID = re.compile(r"obj_([0-9]{1,9})"), re.compile(r"0*([0-9]{1,9})")
+# What tells an object of BOP in a manifest.
+_BOP_ID = re.compile(r"[0-9]{1,9}")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -163,20 +163,21 @@ def _numbered(args: argparse.Namespace, found: Sequence["Source"]) -> dict[str, 
     Raises:
         InputError: a name or id that tells no object, two of one object, or a file that is no `models_info.json`.
     """
-    from symrefine.export.bop import read_models_info
+    from symrefine.export.bop import number_of, read_models_info
     from symrefine.load import stem_of
 
     read_models_info(Path(args.bop))
     owners: dict[int, str] = {}
     for source in found:
         told = source.told.get("id")
-        match = _BOP_ID.fullmatch(told) if told else _BOP_NAME.fullmatch(stem_of(Path(source.path)))
-        if match is None:
+        by_id = int(told) if told and _BOP_ID.fullmatch(told) else None
+        number = by_id if told else number_of(stem_of(Path(source.path)))
+        if number is None:
             right = f"ids, and {told!r} is no number" if told else "names: obj_000001.ply"
             raise InputError(f"{source.place}: --bop takes the number of an object from {right}")
-        other = owners.setdefault(int(match[1]), source.name)
+        other = owners.setdefault(number, source.name)
         if other != source.name:
-            raise InputError(f"{source.place}: is object {int(match[1])}, and so is {other}; --bop takes one")
+            raise InputError(f"{source.place}: is object {number}, and so is {other}; --bop takes one")
     return {name: number for number, name in owners.items()}
 
 

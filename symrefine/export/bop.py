@@ -138,6 +138,12 @@ def read_models_info(path: Path) -> dict[str, Entry]:
     return data
 
 
+def number_of(name: str) -> int | None:
+    """The number of the object whose model BOP gives a name: 1 of obj_000001; None if it is no such name."""
+    match = _NAME.fullmatch(name)
+    return int(match[1]) if match else None
+
+
 def models_of(folder: Path) -> dict[int, Path]:
     """The models of a folder by their number, as BOP names them: object 1 is obj_000001.ply. What else is there stays.
 
@@ -150,10 +156,10 @@ def models_of(folder: Path) -> dict[int, Path]:
         raise InputError(f"{folder}: {'is a file, not a' if folder.exists() else 'no such'} directory")
     models: dict[int, Path] = {}
     for path in sorted(p for p in folder.iterdir() if suffix_of(p) in READERS and p.is_file()):
-        if match := _NAME.fullmatch(stem_of(path)):
-            other = models.setdefault(int(match[1]), path)
+        if (number := number_of(stem_of(path))) is not None:
+            other = models.setdefault(number, path)
             if other != path:
-                raise InputError(f"{path}: is object {int(match[1])}, and so is {other.name}; keep one of them")
+                raise InputError(f"{path}: is object {number}, and so is {other.name}; keep one of them")
     if not models:
         raise InputError(f"{folder}: no model in it; object 1 is obj_000001.ply, or of another suffix that can be read")
     return dict(sorted(models.items()))

@@ -3,13 +3,13 @@
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from hashlib import file_digest, sha256
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, cast
 
 from symrefine.errors import InputError
 from symrefine.files import check_target
 from symrefine.fleet import journal
+from symrefine.fleet.tasks import our_version
 from symrefine.load import IMAGES
 from symrefine.review.objects import Row
 
@@ -77,7 +77,7 @@ def _digest(path: Path) -> str:
 
 def _head(number: int, path: Path, options: dict[str, Any], scale: float, looks: list[str]) -> Row:
     row: dict[str, Any] = {"object": number, "file": path.name, "sha256": None, "error": None}
-    row |= {"version": version("symrefine"), "options": options, "scale": scale}
+    row |= {"version": our_version(), "options": options, "scale": scale}
     row |= {"answer": None, "confidence": 0.0, "doubt": "", "textured": None, "choices": []}
     try:
         own = _digest(path)
