@@ -30,7 +30,7 @@ from symrefine.geometry import Array, Isometry, random_orthogonal, unit
 from symrefine.groups.orthogonal import chord_angles
 from symrefine.shape import Shape
 
-OWN = {"asymmetric": "household", "camera": "household", "grinder": "household", "clutter": "shape", "fan3": "shape"}
+OWN = {"asymmetric": "household", "camera": "household", "grinder": "household", "bolt": "shape", "fan3": "shape"}
 REAL = ("drill_cordless", "shark", "panther", "magnolia", "teddy")
 POINTS = 10000
 # Strays lie in the bounding box, so many times as large; so large is the floor, in boxes.

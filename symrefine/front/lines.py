@@ -96,6 +96,7 @@ def alignment_summary(found: "Alignment", source: Shape, target: Shape) -> list[
         f"{source.source} onto {target.source}: {found.status}",
         *(f"  {' '.join(f'{x + 0.0:11.8f}' for x in row)}  |  {shift:.8g}" for row, shift in rows),
         f"  determinant {found.determinant:+d} ({kind}), confidence {found.confidence:.3f}",
+        f"  overlap {100 * found.overlap[0]:.0f} % of the source, {100 * found.overlap[1]:.0f} % of the target",
         f"  rms {percent(found.rms)} of the diagonal, scale {found.scale:.6g}; {sum(found.timings.values()):.2g} s",
     ]
 
