@@ -92,11 +92,11 @@ def alignment_summary(found: "Alignment", source: Shape, target: Shape) -> list[
     """The status, the map, and how well it holds."""
     rows = zip(found.matrix.tolist(), found.translation.tolist(), strict=True)
     kind = "rotation" if found.determinant > 0 else "reflection or rotoreflection"
+    met = " and ".join(f"{100 * share:.0f} %" for share in found.overlap)
     return [
         f"{source.source} onto {target.source}: {found.status}",
         *(f"  {' '.join(f'{x + 0.0:11.8f}' for x in row)}  |  {shift:.8g}" for row, shift in rows),
-        f"  determinant {found.determinant:+d} ({kind}), confidence {found.confidence:.3f}",
-        f"  overlap {100 * found.overlap[0]:.0f} % of the source, {100 * found.overlap[1]:.0f} % of the target",
+        f"  determinant {found.determinant:+d} ({kind}), confidence {found.confidence:.3f}, overlap {met}",
         f"  rms {percent(found.rms)} of the diagonal, scale {found.scale:.6g}; {sum(found.timings.values()):.2g} s",
     ]
 
