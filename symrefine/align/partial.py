@@ -38,7 +38,7 @@ COARSER, MOST_PLANES = 1.5, 6000
 # One in so many local planes is moved by the polish, and by the first look at the maps that are proposed.
 MOVED, LOOK = 2, 3
 # Maps of each determinant that are polished, if they meet at least such a share of what the best does.
-POLISHED, WORTH = 4, 0.4
+POLISHED, WORTH = 4, 0.5
 # A patch is unseen if one in so many of the places where it begins is at a border. Of true maps at least one in four
 # is: the two are cut by different planes, and each border is known by a few local planes only.
 MOST = 6
@@ -301,4 +301,5 @@ def _doubt(best: Met, every: Sequence[Met], rivals: Sequence[Met], fitting: floa
         hands = ", and the determinant is open" if len({m.determinant for m in every}) > 1 else ""
         return f"{OPEN}: {len(every)} maps lay what is seen on one another about as well{hands}"
     met = " and ".join(f"{100 * share:.0f} %" for share in best.overlap)
-    return f"{OPEN}: {met} of source and target meet, which may be chance"
+    well = 100 * max(side.well for side in best.sides)
+    return f"{OPEN}: {met} of source and target meet, {well:.0f} % as well as one object does, which may be chance"
