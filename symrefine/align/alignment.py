@@ -26,6 +26,7 @@ class Miss:
         excess: what the map misses by over what the tolerance, or the noise of the moments, allows.
         overlap: share of the source that the map lays on the target, and share of the target that is met.
         determinant_confidence: probability that the determinant is right.
+        hand_is_open: whether neither hand misses by so little as true maps do, and both by about as much.
         confidence: probability that the map is, where it was not told from the excess.
     """
 
@@ -34,6 +35,7 @@ class Miss:
     excess: float
     overlap: tuple[float, float]
     determinant_confidence: float
+    hand_is_open: bool = False
     confidence: float | None = None
 
 
@@ -133,7 +135,13 @@ class Alignment(ReadOnly):
             return 0.0
         if self._fit.confidence is not None:
             return self._fit.confidence
-        return 1.0 if self.exact else meant(Link(need=self._fit.excess), 1.0)
+        if self.exact:
+            return 1.0
+        agree = meant(Link(need=self._fit.excess), 1.0)
+        # Where the other hand does about as well though the target has no mirror, either may be right.
+        if self._fit.hand_is_open and len(set(np.sign(np.linalg.det(self.equivalents)))) == 1:
+            return min(agree, self.determinant_confidence)
+        return agree
 
     @property
     def overlap(self) -> tuple[float, float]:

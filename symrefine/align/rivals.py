@@ -58,6 +58,11 @@ class Choice:
         return float(1.0 / (1.0 + 9.0 ** (-self.lead / GOOD)))
 
     @property
+    def hand_is_open(self) -> bool:
+        """Whether neither hand misses by so little as true maps do, and both by about as much."""
+        return self.lead < GOOD < self.excess
+
+    @property
     def merit(self) -> tuple[float, float]:
         """The less the better: first that the surfaces agree, then that the moments do."""
         return max(self.excess, 1.0), self.misfit

@@ -245,7 +245,14 @@ def _miss(choice: Choice, motion: Similarity, scale: bool, reflections: bool) ->
             f"the objects differ by {excess:.1f} times what the tolerance allows: 99 % of the source comes within "
             f"{100 * float(np.quantile(misses, 0.99)):.2g} % of the diagonal"
         )
-    return Miss(rms=rms, status=status, excess=excess, overlap=shares, determinant_confidence=sure)
+    return Miss(
+        rms=rms,
+        status=status,
+        excess=excess,
+        overlap=shares,
+        determinant_confidence=sure,
+        hand_is_open=reflections and choice.hand_is_open,
+    )
 
 
 def _unlikely(misfit: float) -> float:
