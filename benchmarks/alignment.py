@@ -1,4 +1,4 @@
-"""Alignment beside Open3D in the same run, and what n-tuples cost beside the moments: `python -m benchmarks.alignment`.
+"""Alignment beside its peers in one run, and what n-tuples cost beside the moments: `python -m benchmarks.alignment`.
 
 Chiral objects of `../shared/objects` (not part of the product; whatever is not there is left out), 10,000 independent
 points of source and target, rotations and reflections. Processor time over all threads, which other load changes
@@ -13,6 +13,7 @@ from itertools import product
 import numpy as np
 
 from benchmarks.metric import Metric
+from experiments.studies import partial_alignment as partial
 from experiments.studies.alignment import CHIRAL, RANDOM, Case, error_deg, estimator, given, mesh, present, sample
 from symrefine.align.story import Alignment
 from symrefine.moments.moments import central_moments
@@ -91,9 +92,23 @@ def evaluation() -> Iterator[Metric]:
             yield Metric(key="n-tuples over their moments", value=second / first, unit="ratio", target=0.1)
 
 
+def in_part(seeds: int) -> Iterator[Metric]:
+    """Objects that share 65 % with one another, or half of a scene, beside the peers that are installed."""
+    rows = [
+        partial.run(case)
+        for case in partial.cases(partial.METHODS, ("overlap 65 %", "clutter 50 %"), partial.OWN, range(seeds))
+    ]
+    print("\n" + "\n".join(partial.table(rows, partial.METHODS)))
+    own = [r for r in rows if r.case.method == "align"]
+    wrong, spent = np.mean([not r.right for r in own]), 1e3 * np.mean([r.seconds for r in own])
+    yield Metric(key="align in part, wrong of all", value=float(wrong), unit="share", target=0.02)
+    yield Metric(key="align in part, processor time", value=float(spent), unit="ms", target=150.0)
+
+
 def metrics(seeds: int = 1) -> Iterator[Metric]:
     """The figures that are compared with stored ones."""
     yield from evaluation()
+    yield from in_part(seeds)
     if present(CHIRAL):
         yield from beside_open3d(seeds)
 

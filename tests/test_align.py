@@ -1,6 +1,7 @@
 """Alignment: exact on the same points, close on other samples, honest about what cannot be known."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
+from experiments.objects.household import camera
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
 from symrefine.align.landscape import grid_rotations, harmonic_pair, hills, landscape
 from symrefine.align.moment_fit import as_good, covariance, exact, fit
@@ -16,10 +18,12 @@ from symrefine.align.procrustes import procrustes
 from symrefine.align.span import monomial_pair, span_fit
 from symrefine.align.story import Alignment, align
 from symrefine.errors import DegenerateShapeError, InputError
-from symrefine.geometry import Array, householder, line_angle_rad, random_orthogonal, rotation
+from symrefine.geometry import Array, householder, line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.groups.orthogonal import chord_angles
 from symrefine.moments.moments import central_moments
 from symrefine.ntuples.contract import ntuples
+from symrefine.propose.consensus import Matches, consensus, pair_invariants
+from symrefine.propose.signatures import signatures
 from symrefine.shape import Shape
 from symrefine.surface.skin import make_skin
 
@@ -518,3 +522,122 @@ def test_noise_that_hides_every_direction_is_said():
     found = align(corners, np.random.default_rng(1).standard_normal((3000, 4)))
     assert found.status.startswith("not determined")
     assert not found.is_misfit
+
+
+# --- objects that share a part only -----------------------------------------------------------------------------------
+
+
+def cut_pair(det: int, share: float, seed: int) -> tuple[Array, Array, Array]:
+    """Source and target cut from opposite sides, such a share of each seen by the other, and the true matrix."""
+    rng = rng_of(50, seed)
+    kept, along, matrix = 1.0 / (2.0 - share), np.array([0.8, 0.5, -0.3]), random_orthogonal(rng, det=det)
+    source, target = (sample(camera(), 12000, 0.0, rng) for _ in range(2))
+    source = source[source @ along <= np.quantile(source @ along, kept)]
+    target = target[target @ along >= np.quantile(target @ along, 1.0 - kept)]
+    return source, target @ matrix.T + 4.0, matrix
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_cuts_from_opposite_sides(det: int) -> None:
+    source, target, matrix = cut_pair(det, 0.7, 0)
+    found = align(source, target)
+    assert angle_deg(found.matrix, matrix) < 0.5
+    np.testing.assert_allclose(found.apply([[0.0, 0.0, 0.0]]), [[4.0, 4.0, 4.0]], atol=0.01)
+    assert found.status == "ok"
+    assert found.confidence > 0.9
+    assert found.determinant_confidence > 0.9
+    np.testing.assert_allclose(found.overlap, 0.7, atol=0.05)
+    assert found.rms < 0.005
+
+
+def test_partial_alignment_turns_with_its_objects() -> None:
+    source, target, _ = cut_pair(-1, 0.7, 1)
+    plain = align(source, target)
+    g, h = random_orthogonal(rng_of(51), det=-1), random_orthogonal(rng_of(52), det=1)
+    both = align(source @ g.T + 5.0, target @ h.T - 3.0)
+    assert angle_deg(both.matrix, h @ plain.matrix @ g.T) < 0.2
+    np.testing.assert_allclose(both.apply(source @ g.T + 5.0), plain.apply(source) @ h.T - 3.0, atol=0.01)
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_a_model_in_a_scene(det: int) -> None:
+    # Half of the target is a floor that the source knows nothing of, so large that their sizes differ.
+    rng = rng_of(53)
+    matrix, model = random_orthogonal(rng, det=det), sample(asymmetric(), 8000, 0.0, rng)
+    scene = sample(asymmetric(), 6000, 0.0, rng)
+    floor = rng.uniform(-1.0, 1.0, (6000, 3)) * [1.5, 1.5, 0.0] + [0.0, 0.0, scene[:, 2].min()]
+    found = align(model, np.concatenate([scene, floor]) @ matrix.T + 2.0)
+    assert angle_deg(found.matrix, matrix) < 0.5
+    assert found.overlap[0] > 0.95 > 0.6 > found.overlap[1]
+    assert not found.is_misfit
+
+
+def test_objects_that_have_nothing_in_common_are_not_aligned() -> None:
+    rng = rng_of(54)
+    found = align(sample(asymmetric(), 5000, 0.0, rng), sample(table(), 5000, 0.0, rng))
+    assert found.confidence == 0.0
+    assert found.status != "ok"
+
+
+def test_a_flat_part_in_common_says_that_it_slides_or_is_chance() -> None:
+    # All that the two share is a piece of a plane.
+    rng = rng_of(55)
+    plate = np.column_stack([rng.uniform(-1, 1, (6000, 2)), np.zeros(6000)])
+    first, second = (
+        np.concatenate([plate, sample(join([box(at, (0.5, 0.3, size))]), 2500, 0.0, rng)])
+        for at, size in (((0.7, 0.6, 0.4), 0.8), ((-0.6, 0.3, -0.3), 0.6))
+    )
+    found = align(first, second @ random_orthogonal(rng).T)
+    assert found.status != "ok"
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_the_covariance_is_that_of_the_errors(det: int) -> None:
+    # Whitened errors of rotation vector and translation, 6 numbers each: their mean square is 1 but for what is shared
+    # by neighbouring planes.
+    squares = []
+    for seed in range(6):
+        rng = rng_of(56, seed, det + 1)
+        matrix, shift = random_orthogonal(rng, det=det), rng.uniform(-2, 2, 3)
+        source, target = (sample(asymmetric(), 5000, 0.005, rng) for _ in range(2))
+        found = align(source, target @ matrix.T + shift)
+        turn = found.matrix @ matrix.T
+        w = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+        error = np.concatenate([w, found.translation - shift])
+        squares.append(error @ np.linalg.solve(found.covariance, error) / 6.0)
+    assert 0.1 < np.mean(squares) < 4.0
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_handedness_is_told_by_two_lines(det: int) -> None:
+    # Whatever the signs of the normals: a true map keeps all invariants, with the handedness times its determinant.
+    rng = rng_of(57)
+    points, normals, matrix = rng.normal(size=(20, 3)), unit(rng.normal(size=(20, 3))), random_orthogonal(rng, det=det)
+    signs = rng.choice([-1.0, 1.0], (20, 1))
+    here, there = pair_invariants(points, normals), pair_invariants(points @ matrix.T + 3.0, signs * normals @ matrix.T)
+    for a, b in zip(here[:-1], there[:-1], strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-12)
+    np.testing.assert_allclose(here[-1], det * there[-1], atol=1e-12)
+    assert np.abs(here[-1]).max() > 0.1
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_consensus_finds_a_fifth_of_true_matches(det: int) -> None:
+    rng = rng_of(58)
+    points, normals = rng.normal(size=(200, 3)), unit(rng.normal(size=(200, 3)))
+    matrix = random_orthogonal(rng, det=det)
+    target, there = points @ matrix.T + 1.0, normals @ matrix.T
+    target[40:], there[40:] = rng.normal(size=(160, 3)), unit(rng.normal(size=(160, 3)))
+    best = consensus(Matches(source=points, source_normals=normals, target=target, target_normals=there), 0.05)[0]
+    np.testing.assert_allclose(best.matrix, matrix, atol=1e-9)
+    np.testing.assert_allclose(best.shift, 1.0, atol=1e-9)
+    assert best.support >= 40
+
+
+def test_signatures_do_not_know_pose_hand_or_signs() -> None:
+    rng = rng_of(59)
+    cloud = make_skin(sample(asymmetric(), 4000, 0.0, rng), rng).local_planes(np.arange(0, 4000, 8))
+    matrix, signs = random_orthogonal(rng, det=-1), rng.choice([-1.0, 1.0], (500, 1))
+    points = cloud.points @ matrix.T + 2.0
+    turned_ = replace(cloud, points=points, normals=signs * cloud.normals @ matrix.T, tree=cKDTree(points))
+    np.testing.assert_allclose(signatures(turned_, 0.3), signatures(cloud, 0.3), atol=1e-6)

@@ -8,10 +8,12 @@ import pytest
 
 from experiments.objects.exhibits import exhibit
 from experiments.objects.poses import Pose, posed
+from experiments.objects.shapes import asymmetric, sample
 from experiments.peers.pymatgen_groups import point_group_pymatgen, schoenflies
+from experiments.peers.registration import PEERS, fast_global, installed, register
 from experiments.peers.trimesh_inertia import trimesh_symmetry
 from symrefine.errors import InputError
-from symrefine.geometry import line_angle_rad
+from symrefine.geometry import line_angle_rad, random_orthogonal
 from symrefine.shape import Shape
 
 
@@ -95,3 +97,24 @@ def test_the_real_pymatgen_where_it_is_installed():
     pytest.importorskip("pymatgen.symmetry.analyzer")
     oxygen, hydrogen = [0, 0, 0], [[0.76, 0, 0.59], [-0.76, 0, 0.59]]
     assert point_group_pymatgen(["O", "H", "H"], np.array([oxygen, *hydrogen]), 0.05) == "C2v"
+
+
+# --- registration -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("det", [1, -1])
+@pytest.mark.parametrize("name", [name for name in PEERS if installed(name)])
+def test_registration_peers_are_asked_for_both_hands(name, det):
+    rng = np.random.default_rng(1)
+    mesh, matrix = asymmetric(), random_orthogonal(rng, det=det)
+    source, target = (sample(mesh, 4000, 0.0, rng) for _ in range(2))
+    found = register(name, source, target @ matrix.T + [1.0, 2.0, 3.0], mesh.diagonal)
+    np.testing.assert_allclose(found[:3, :3], matrix, atol=0.2)  # without ICP, KISS-Matcher is 5 degrees off
+    np.testing.assert_allclose(found[:3, 3], [1.0, 2.0, 3.0], atol=0.05 * mesh.diagonal)
+
+
+def test_a_registration_peer_that_is_absent_is_named(monkeypatch):
+    monkeypatch.setitem(PEERS, "nobody", ("nowhere_at_all", fast_global))
+    assert not installed("nobody")
+    with pytest.raises(InputError, match="nobody: nowhere_at_all is not installed"):
+        register("nobody", np.eye(3), np.eye(3), 1.0)

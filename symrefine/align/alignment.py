@@ -24,11 +24,19 @@ class Miss:
         rms: distance from the moved source to the target, RMS, as a fraction of the target's diagonal.
         status: "ok", or why the result should not be relied upon.
         excess: what the map misses by over what the tolerance, or the noise of the moments, allows.
+        overlap: share of the source that the map lays on the target, and share of the target that is met.
+        determinant_confidence: probability that the determinant is right.
+        hand_is_open: whether neither hand misses by so little as true maps do, and both by about as much.
+        confidence: probability that the map is, where it was not told from the excess.
     """
 
     rms: float
     status: str
     excess: float
+    overlap: tuple[float, float]
+    determinant_confidence: float
+    hand_is_open: bool = False
+    confidence: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,6 +49,9 @@ class Alignment(ReadOnly):
         scale: 1.0 unless it was asked for.
         sigma_rad: standard deviation of the rotation from sampling noise; 0 where the moments agree to rounding, large
             where some turn is not observable.
+        covariance: [6, 6] of `y = exp([w]) matrix x + translation + d`: rotation vector w (target axes, radians), then
+            d (units of the target); n = 3 only, else [0, 0]. Zero where the moments agree to rounding, and along what
+            nothing tells.
         exact: whether the moments of both agree to rounding: the same points in another pose.
         timings: seconds by stage.
     """
@@ -49,6 +60,7 @@ class Alignment(ReadOnly):
     translation: Array
     scale: float
     sigma_rad: float
+    covariance: Array
     exact: bool
     timings: dict[str, float]
     _coset: Callable[[], Coset] = field(repr=False)
@@ -116,11 +128,33 @@ class Alignment(ReadOnly):
     def confidence(self) -> float:
         """Probability that the objects are meant to agree under this map, or one of its equivalents.
 
-        Of what the map misses by, as `detect` tells it of a symmetry; 0 where the status leaves open or denies it.
+        Of what the map misses by, as `detect` tells it of a symmetry; of objects that share a part only, of how much
+        meets and of what other maps do as well. 0 where the status leaves open or denies it.
         """
         if self.status != OK:
             return 0.0
-        return 1.0 if self.exact else meant(Link(need=self._fit.excess), 1.0)
+        if self._fit.confidence is not None:
+            return self._fit.confidence
+        if self.exact:
+            return 1.0
+        agree = meant(Link(need=self._fit.excess), 1.0)
+        # Where the other hand does about as well though the target has no mirror, either may be right.
+        if self._fit.hand_is_open and len(set(np.sign(np.linalg.det(self.equivalents)))) == 1:
+            return min(agree, self.determinant_confidence)
+        return agree
+
+    @property
+    def overlap(self) -> tuple[float, float]:
+        """Share of the source that comes to lie on the target within the tolerance, and share of the target it meets.
+
+        In 3-space of the surface, elsewhere of the points.
+        """
+        return self._fit.overlap
+
+    @property
+    def determinant_confidence(self) -> float:
+        """Probability that the determinant is right, 0.5 where a reflection does as well; 1 where none is admitted."""
+        return self._fit.determinant_confidence
 
     @property
     def is_misfit(self) -> bool:

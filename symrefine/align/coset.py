@@ -97,6 +97,17 @@ def coset_of_list(matrices: Array, source_center: Array, target_center: Array, s
     )
 
 
+def coset_of_maps(matrices: Array, translations: Array) -> Coset:
+    """The coset where what two objects share of one another allows these maps [k, n, n] and [k, n], the best first."""
+    return Coset(
+        matrices=matrices,
+        translations=translations,
+        free=np.zeros((0, matrices.shape[1])),
+        symmetry="",
+        observable=_in_words(f"{len(matrices)} maps that lay what is seen on one another about as well", matrices),
+    )
+
+
 def lifted(
     inner: Coset,
     source_basis: Array,

@@ -7,6 +7,7 @@ import numpy as np
 
 from symrefine.align.landscape import harmonic_pair
 from symrefine.align.moment_fit import MomentPair
+from symrefine.align.polish import Similarity
 from symrefine.align.procrustes import Procrustes, procrustes
 from symrefine.detection.measure import SAMPLES
 from symrefine.geometry import Array, Isometry, tight_diagonal
@@ -144,6 +145,11 @@ class Evidence:
     def misses(self, motion: Isometry) -> Array:
         """Distances from the moved source to the target, fractions of the diagonal."""
         return disc_distances(self.judge.cloud, motion.apply(self.moving.points)) / self.judge.diagonal
+
+    def misses_back(self, motion: Similarity) -> Array:
+        """Distances from the target to the moved source, fractions of the diagonal."""
+        back = motion.inverse.apply(self.judge.cloud.points)
+        return motion.scale * disc_distances(self.moving, back) / self.judge.diagonal
 
     def excess(self, motion: Isometry) -> float:
         """The largest statistic of the miss over its limit; <= 1 if the surfaces agree. Of atoms every one counts."""

@@ -29,6 +29,12 @@ class Similarity(Isometry):
         """Images [N, n] of points [N, n]."""
         return self.scale * (points @ self.matrix.T) + self.shift
 
+    @property
+    def inverse(self) -> "Similarity":
+        """The way back."""
+        back = self.matrix.T
+        return Similarity(matrix=back, shift=-(back @ self.shift) / self.scale, scale=1.0 / self.scale)
+
     def moved(self, x: Array) -> "Similarity":
         """This map, turned about the origin and shifted by x [6], its scale times exp(x[6]) if there is one."""
         stretch = float(np.exp(x[6])) if len(x) > 6 else 1.0

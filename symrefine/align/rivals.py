@@ -6,6 +6,7 @@ tell apart: the two determinants of a thin propeller, or the teeth of a gear tha
 polished and judged on the points.
 """
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -40,6 +41,7 @@ class Choice:
         exact: whether the moments agree to rounding, as for the same points on both sides.
         misfit: cost per coefficient; about 1 or below if sampling noise explains the difference of the moments.
         excess: miss over its limit; 0 where the moments were enough to decide.
+        lead: by how much more the other determinant misses, over the limit; infinite where the moments deny it.
     """
 
     evidence: Evidence
@@ -48,6 +50,17 @@ class Choice:
     exact: bool
     misfit: float
     excess: float
+    lead: float = math.inf
+
+    @property
+    def determinant_confidence(self) -> float:
+        """Probability that the determinant is right: nine in ten where the other misses by more than true maps vary."""
+        return float(1.0 / (1.0 + 9.0 ** (-self.lead / GOOD)))
+
+    @property
+    def hand_is_open(self) -> bool:
+        """Whether neither hand misses by so little as true maps do, and both by about as much."""
+        return self.lead < GOOD < self.excess
 
     @property
     def merit(self) -> tuple[float, float]:
@@ -55,31 +68,38 @@ class Choice:
         return max(self.excess, 1.0), self.misfit
 
 
-def choose(evidence: Evidence, *, reflections: bool = True) -> Choice:
+def choose(evidence: Evidence, *, reflections: bool = True, brief: bool = False) -> Choice:
     """The best map over O(3), or over SO(3) without reflections; determinant +1 wherever both do equally well.
 
     Where the moments do not fit, the densities of the clouds may differ: a second try gives every point its share of
-    the area.
+    the area. With `brief` there is none where the surfaces do not agree either: they may share a part only.
     """
-    first = _choose(evidence, reflections)
+    first = _choose(evidence, reflections, brief=brief)
     if first.merit <= (1.0, MISFIT) or few(evidence.source.shape, evidence.target.shape):
+        return first
+    if brief and first.excess > 1.0:
         return first
     evened = replace(evidence, source=evidence.source.evened(), target=evidence.target.evened())
     return min(first, _choose(evened, reflections), key=lambda c: c.merit)
 
 
-def _choose(evidence: Evidence, reflections: bool) -> Choice:
+def _choose(evidence: Evidence, reflections: bool, *, brief: bool = False) -> Choice:
+    """The best map as the moments have it; with `brief` only the best of either determinant if they do not fit."""
     pair = evidence.harmonics
     fitted = candidates(evidence, (1, -1) if reflections else (1,))
     same = exact(pair, fitted)
     if len(same.costs):
         best = Similarity(matrix=same.matrices[int(np.argmax(same.signs))], shift=np.zeros(3))
-        return Choice(evidence=evidence, motion=best, covariance=np.zeros((3, 3)), exact=True, misfit=0.0, excess=0.0)
+        lead = 0.0 if same.signs.min() < same.signs.max() else math.inf
+        none = np.zeros((3, 3))
+        return Choice(evidence=evidence, motion=best, covariance=none, exact=True, misfit=0.0, excess=0.0, lead=lead)
     rivals, unlike, spread = fitted[as_good(pair, fitted.matrices)], misfit(pair, fitted), covariance(pair, fitted)
-    motion, excess = Similarity(matrix=rivals.matrices[0], shift=np.zeros(3)), 0.0
+    motion, excess, lead = Similarity(matrix=rivals.matrices[0], shift=np.zeros(3)), 0.0, math.inf
     if (len(rivals.costs) > 1 or unlike > MISFIT) and evidence.has_points:
-        motion, excess = _judged(evidence, rivals, spread)
-    return Choice(evidence=evidence, motion=motion, covariance=spread, exact=False, misfit=unlike, excess=excess)
+        motion, excess, lead = _judged(evidence, rivals, spread, brief=brief and unlike > MISFIT)
+    return Choice(
+        evidence=evidence, motion=motion, covariance=spread, exact=False, misfit=unlike, excess=excess, lead=lead
+    )
 
 
 def candidates(evidence: Evidence, determinants: tuple[int, ...]) -> Fits:
@@ -95,13 +115,19 @@ def candidates(evidence: Evidence, determinants: tuple[int, ...]) -> Fits:
     return best_fits(pair, np.concatenate([starts, *climbed]))
 
 
-def _judged(evidence: Evidence, rivals: Fits, covariance: Array) -> tuple[Similarity, float]:
-    """The rival that the points confirm best, and its excess; the proper one if its mirror image does no better."""
+def _judged(evidence: Evidence, rivals: Fits, covariance: Array, *, brief: bool) -> tuple[Similarity, float, float]:
+    """The rival that the points confirm best, and its excess; the proper one if its mirror image does no better.
+
+    Also by how much more the other determinant exceeds. With `brief` the first of each determinant has to do.
+    """
     best: dict[int, tuple[Similarity, float]] = {}
     for det in dict.fromkeys(int(sign) for sign in rivals.signs):  # by cost
         of_det = rivals.matrices[rivals.signs == det]
-        best[det] = _first_good(evidence, chain(of_det[:RIVALS], _phases(evidence, of_det[0], rivals)), covariance)
-    return best[min(best, key=lambda det: best[det][1] + GOOD * (det < 0))]
+        every = of_det[:1] if brief else chain(of_det[:RIVALS], _phases(evidence, of_det[0], rivals))
+        best[det] = _first_good(evidence, every, covariance)
+    chosen = min(best, key=lambda det: best[det][1] + GOOD * (det < 0))
+    lead = best[-chosen][1] - best[chosen][1] if -chosen in best else math.inf
+    return *best[chosen], lead
 
 
 def _first_good(evidence: Evidence, matrices: Iterable[Array], covariance: Array) -> tuple[Similarity, float]:
@@ -137,11 +163,11 @@ def _phases(evidence: Evidence, matrix: Array, rivals: Fits) -> Iterator[Array]:
 def polished(evidence: Evidence, target: Skin | LocalPlanes, start: Similarity, covariance: Array) -> Polished:
     """Polish on the points of the evidence from a start whose rotation the moments know with this covariance [3, 3]."""
     error = min(SIGNIFICANT * float(np.sqrt(np.trace(covariance))), LONGEST)
-    known = _information(evidence, covariance)
+    known = information(evidence, covariance)
     return polish(evidence.moving, target, start, error=error, known=known, scale=evidence.scale)
 
 
-def _information(evidence: Evidence, covariance: Array) -> Array:
+def information(evidence: Evidence, covariance: Array) -> Array:
     """Inverse covariance [6, 6] of rotation and shift (RMS radii) that the moments carry."""
     known: Array = np.zeros((6, 6))
     known[:3, :3] = np.linalg.inv(covariance + FLOOR * np.eye(3))

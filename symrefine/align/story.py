@@ -2,24 +2,29 @@
 
 moments of both -> n-tuples -> Procrustes (or the landscape over O(3) where the tuples vanish) -> Gauss-Newton on all
 moments -> rivals judged on the points -> polish on the points -> the coset of maps that do equally well.
+Where neither moments nor surfaces agree as a whole: local planes that look alike -> consensus -> polish -> what each
+map lays on the other side, what contradicts it, and what nobody saw.
 Elsewhere than in 3-space: moments -> n-tuples -> Procrustes -> Gauss-Newton on the moments.
 """
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.align.alignment import OK, OPEN, Alignment, Miss
-from symrefine.align.coset import Coset, coset_of_group, coset_of_list, lifted
+from symrefine.align.coset import Coset, coset_of_group, coset_of_list, coset_of_maps, lifted
 from symrefine.align.moment_fit import MISFIT, ROUNDING
 from symrefine.align.pair import Evidence, Side, few
+from symrefine.align.partial import Meeting, partial_meeting
 from symrefine.align.polish import Similarity
-from symrefine.align.rivals import Choice, choose, polished
+from symrefine.align.rivals import Choice, choose, information, polished
 from symrefine.align.span import span_fit
 from symrefine.clock import Clock
 from symrefine.detection.measure import FLAT, PARTS
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
-from symrefine.geometry import Array, check_tolerance
+from symrefine.geometry import Array, check_tolerance, cross_matrix
 from symrefine.groups import PointGroup
 from symrefine.moments.moments import Moments, central_moments, shape_moments
 from symrefine.moments.quadrature import mesh_nodes
@@ -74,7 +79,7 @@ def align(
             f"{lean.source} spans {min(ranks)} of {a.dim} dimensions, {full.source} {max(ranks)}: nothing maps them"
         )
     if a.dim != 3 or max(ranks) < 3:
-        return _align_moments(sides, scale, allow_reflection, clock)
+        return _align_moments(sides, scale, allow_reflection, tolerance, clock)
     evidence = Evidence(
         source=sides[0], target=sides[1], scale=scale or _unlike(*sides), tolerance=tolerance, seed=seed
     )
@@ -126,15 +131,27 @@ def _same_size(source: Side, target: Side) -> bool:
 
 def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: bool, clock: Clock) -> Alignment:
     """The story in 3-space. Objects of unlike size are compared at one size, even where the scale is not asked for."""
+    surfaces = evidence.has_points and not few(evidence.source.shape, evidence.target.shape)
+    partly = polish and not scale and surfaces
     with clock("choose"):
-        choice = choose(evidence, reflections=reflections)
-    evidence, motion, covariance = choice.evidence, choice.motion, choice.covariance
-    if polish and not choice.exact and evidence.has_points:
+        choice = choose(evidence, reflections=reflections, brief=partly)
+    whole, motion = choice.evidence, choice.motion
+    covariance = np.zeros((6, 6)) if choice.exact else np.linalg.inv(information(whole, choice.covariance))
+    # Where the sizes differ though nobody said so, it may be that one shows more than the other.
+    agree = choice.exact or (choice.excess <= 1.0 and whole.scale == scale)
+    if polish and (agree or not partly) and not choice.exact and whole.has_points:
         with clock("planes"):
-            _ = evidence.moving, evidence.met
+            _ = whole.moving, whole.met
         with clock("polish"):
-            done = polished(evidence, evidence.met, motion, covariance)
-            motion, covariance = done.motion, done.covariance[:3, :3]
+            done = polished(whole, whole.met, motion, choice.covariance)
+            motion, covariance = done.motion, done.covariance
+        agree &= not partly or whole.excess(motion) <= 1.0
+    if partly and not agree:
+        with clock("partial"):
+            meeting = partial_meeting(evidence, reflections=reflections)
+        if meeting is not None and meeting.status:
+            return _met_in_part(meeting, evidence, clock)
+    evidence = whole
     matrix, translation, factor = _in_input_units(evidence, motion, scale)
 
     def coset() -> Coset:
@@ -145,12 +162,48 @@ def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: boo
         matrix=matrix,
         translation=translation,
         scale=factor,
-        sigma_rad=float(np.sqrt(np.trace(covariance))),
+        sigma_rad=float(np.sqrt(np.trace(covariance[:3, :3]))),
+        covariance=_of_transform(covariance, evidence, matrix, factor),
         exact=choice.exact and (scale or _same_size(evidence.source, evidence.target)),
         timings=clock.seconds,
         _coset=coset,
-        _miss=lambda: _miss(choice, motion, scale),
+        _miss=lambda: _miss(choice, motion, scale, reflections),
     )
+
+
+def _met_in_part(meeting: Meeting, evidence: Evidence, clock: Clock) -> Alignment:
+    """The answer for surfaces that share a part only; sizes are as given."""
+    evidence = replace(evidence, scale=False)
+    maps = [_in_input_units(evidence, m.motion, False)[:2] for m in (meeting.best, *meeting.equals)]
+    (matrix, translation), best = maps[0], meeting.best
+    coset = coset_of_maps(*(np.array(parts) for parts in zip(*maps, strict=True)))
+    miss = Miss(
+        rms=best.rms * evidence.target.moments.scale / evidence.target.shape.diagonal,
+        status=meeting.status,
+        excess=0.0,
+        overlap=best.overlap,
+        determinant_confidence=meeting.determinant_confidence,
+        confidence=meeting.confidence,
+    )
+    return Alignment(
+        matrix=matrix,
+        translation=translation,
+        scale=1.0,
+        sigma_rad=np.inf if best.is_loose else float(np.sqrt(np.trace(best.covariance[:3, :3]))),
+        covariance=_of_transform(best.covariance, evidence, matrix, 1.0),
+        exact=False,
+        timings=clock.seconds,
+        _coset=lambda: coset,
+        _miss=lambda: miss,
+    )
+
+
+def _of_transform(covariance: Array, evidence: Evidence, matrix: Array, factor: float) -> Array:
+    """Covariance [6, 6] of rotation vector and translation, in input units, from that about the source's centre."""
+    change: Array = np.eye(6)
+    change[3:, :3] = cross_matrix(factor * (matrix @ evidence.source.moments.center))
+    change[3:, 3:] *= evidence.target.moments.scale
+    return change @ covariance @ change.T
 
 
 def _symmetry(evidence: Evidence, motion: Similarity) -> tuple[PointGroup, Array]:
@@ -172,22 +225,34 @@ def _in_input_units(evidence: Evidence, motion: Similarity, scale: bool) -> tupl
     return motion.matrix, b.center + b.scale * motion.shift - factor * (motion.matrix @ a.center), factor
 
 
-def _miss(choice: Choice, motion: Similarity, scale: bool) -> Miss:
+def _miss(choice: Choice, motion: Similarity, scale: bool, reflections: bool) -> Miss:
     """How well the map holds in 3-space."""
     evidence = choice.evidence
     a, b = evidence.source, evidence.target
-    status = OK if scale else _sizes(a, b)
+    # Of objects that do not agree at any size, the size is not to blame.
+    status = OK if scale or choice.excess > 1.0 else _sizes(a, b)
+    sure = choice.determinant_confidence if reflections else 1.0
     if status != OK or not evidence.has_points:
-        rms = _nearest(a.shape, b.shape, *_in_input_units(evidence, motion, scale))
-        return Miss(rms=rms, status=status, excess=_unlikely(choice.misfit))
-    misses = evidence.misses(motion)
+        rms, shares = _nearest(a.shape, b.shape, *_in_input_units(evidence, motion, scale), evidence.tolerance)
+        excess = _unlikely(choice.misfit)
+        return Miss(rms=rms, status=status, excess=excess, overlap=shares, determinant_confidence=sure)
+    misses, back = evidence.misses(motion), evidence.misses_back(motion)
     rms, excess = float(np.sqrt(np.mean(misses**2))), evidence.excess(motion)
+    far = evidence.judge.far
+    shares = float((misses <= far).mean()), float((back <= far).mean())
     if excess > 1.0 and not choice.exact:
         status = (
             f"the objects differ by {excess:.1f} times what the tolerance allows: 99 % of the source comes within "
             f"{100 * float(np.quantile(misses, 0.99)):.2g} % of the diagonal"
         )
-    return Miss(rms=rms, status=status, excess=excess)
+    return Miss(
+        rms=rms,
+        status=status,
+        excess=excess,
+        overlap=shares,
+        determinant_confidence=sure,
+        hand_is_open=reflections and choice.hand_is_open,
+    )
 
 
 def _unlikely(misfit: float) -> float:
@@ -202,16 +267,25 @@ def _sizes(source: Side, target: Side) -> str:
     return f"the target is {ratio:.3g} times as large as the source: ask for the scale"
 
 
-def _nearest(source: Shape, target: Shape, matrix: Array, translation: Array, scale: float) -> float:
-    """Root mean square distance of the moved source points to the nearest point of the target, over its diagonal."""
+def _nearest(
+    source: Shape, target: Shape, matrix: Array, translation: Array, scale: float, tolerance: float
+) -> tuple[float, tuple[float, float]]:
+    """Root mean square distance of the moved source points to the nearest point of the target, over its diagonal.
+
+    And the shares of the points of either side that the other has one within the tolerance of.
+    """
     from scipy.spatial import cKDTree
 
     moved = scale * (source.points @ matrix.T) + translation
-    distance, _ = cKDTree(target.points).query(moved)
-    return float(np.sqrt(np.mean(distance**2)) / target.diagonal)
+    there = cKDTree(target.points).query(moved)[0] / target.diagonal
+    back = cKDTree(moved).query(target.points)[0] / target.diagonal
+    shares = float((there <= tolerance).mean()), float((back <= tolerance).mean())
+    return float(np.sqrt(np.mean(there**2))), shares
 
 
-def _align_moments(sides: tuple[Side, Side], scale: bool, reflections: bool, clock: Clock) -> Alignment:
+def _align_moments(
+    sides: tuple[Side, Side], scale: bool, reflections: bool, tolerance: float, clock: Clock
+) -> Alignment:
     """The story elsewhere, and for sets that span fewer dimensions than they live in: moments within the span."""
     a, b = sides
     dim, rank = a.shape.dim, max(_rank(a.moments), _rank(b.moments))
@@ -236,14 +310,22 @@ def _align_moments(sides: tuple[Side, Side], scale: bool, reflections: bool, clo
             status = f"the moments differ by {found.misfit:.0f} times what sampling explains"
         if status == OK and not np.isfinite(found.sigma_rad) and not found.exact:
             status = f"{OPEN}: the noise of the moments hides every direction; give more points"
-        rms = _nearest(a.shape, b.shape, matrix, translation, factor)
-        return Miss(rms=rms, status=status, excess=_unlikely(found.misfit))
+        rms, shares = _nearest(a.shape, b.shape, matrix, translation, factor, tolerance)
+        both = len(np.unique(np.sign(np.linalg.det(coset.matrices)))) > 1
+        return Miss(
+            rms=rms,
+            status=status,
+            excess=_unlikely(found.misfit),
+            overlap=shares,
+            determinant_confidence=0.5 if both else 1.0,
+        )
 
     return Alignment(
         matrix=matrix,
         translation=translation,
         scale=factor,
         sigma_rad=0.0 if found.exact else found.sigma_rad,
+        covariance=np.zeros((0, 0)),
         exact=found.exact and (scale or _same_size(a, b)),
         timings=clock.seconds,
         _coset=(lambda: _planar_coset(b.shape, coset, reflections)) if dim == rank == 2 else (lambda: coset),

@@ -242,6 +242,11 @@ def alignment_lines(record: Record) -> Iterator[str]:
         yield distance
     else:
         yield f"{distance}, {_known(record)}"
+        met = (f"{100 * record['overlap'][side]:.0f} % of the {side}" for side in ("source", "target"))
+        yield (
+            f"overlap {' and '.join(met)}; confidence {record['confidence']:.3f}, "
+            f"of the determinant {record['determinant_confidence']:.3f}"
+        )
         observable = record["observable"]
         yield f"determined: {'everything' if observable == 'full' else observable}"
     yield f"{seconds(record)} s"

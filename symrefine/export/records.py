@@ -222,9 +222,10 @@ def alignment_record(
 ) -> Record:
     """What `symrefine align --json` writes: `target ~ scale * matrix @ source + translation`, and its equivalents.
 
-    `rms` is a fraction of the target's diagonal; `free` spans the directions of the target within which any orthogonal
-    map does as well. Where `misfit` is true no map takes the one onto the other, `status` says why, and all the rest
-    is about the closest map that was found.
+    `rms` is a fraction of the target's diagonal; `overlap` tells the shares that meet; `covariance` [6, 6] is that of a
+    rotation vector (radians) and the translation, [0, 0] elsewhere than in 3-space; `free` spans the directions of the
+    target within which any orthogonal map does as well. Where `misfit` is true no map takes the one onto the other,
+    `status` says why, and all the rest is about the closest map that was found.
     """
     a = alignment
     size = float(np.abs(target.points).max())
@@ -239,11 +240,14 @@ def alignment_record(
         "misfit": bool(a.is_misfit),
         "confidence": number(a.confidence),
         "determinant": a.determinant,
+        "determinant_confidence": number(a.determinant_confidence),
         "matrix": matrix(a.matrix),
         "translation": numbers(a.translation, size),
         "scale": number(a.scale),
+        "overlap": {"source": number(a.overlap[0], 1.0), "target": number(a.overlap[1], 1.0)},
         "rms": number(a.rms, 1.0),
         "sigma_rad": number(a.sigma_rad),
+        "covariance": [numbers(row, 0.0) for row in a.covariance],
         "exact": bool(a.exact),
         "observable": a.observable,
         "symmetry": a.coset.symmetry or None,

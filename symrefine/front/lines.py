@@ -131,7 +131,8 @@ def _aligned(record: Record) -> Iterator[str]:
     """The status, the map, and how well it holds."""
     yield f"{printable(record['source'])} onto {printable(record['target'])}: {record['status']}"
     yield from map_rows(record)
-    yield f"  {handedness(record)}, confidence {record['confidence']:.3f}"
+    met = " and ".join(percent(record["overlap"][side]) for side in ("source", "target"))
+    yield f"  {handedness(record)}, confidence {record['confidence']:.3f}, overlap {met}"
     yield (
         f"  rms {percent(record['rms'])} of the diagonal, scale {record['scale']:.6g}; "
         f"{sum(record['timings'].values()):.2g} s"

@@ -60,7 +60,17 @@ class Openings:
             self.links[stride] = np.concatenate([pairs, pairs[::-1]], axis=1)
         return self.links[stride]
 
-    def unseen(self, cloud: LocalPlanes, moved: Array, away: Mask, stride: int, margin: float) -> Mask:
+    def unseen(
+        self,
+        cloud: LocalPlanes,
+        moved: Array,
+        away: Mask,
+        stride: int,
+        margin: float,
+        *,
+        met: "tuple[LocalPlanes, Openings] | None" = None,
+        most: int = MOST,
+    ) -> Mask:
         """Which of every `stride`-th local planes, moved to [N, 3], lie where nobody looked.
 
         Args:
@@ -69,11 +79,14 @@ class Openings:
             away: [N] those that meet no surface.
             stride: of the local planes.
             margin: by how much space has to be free.
+            met: the surface that they were to meet and its openings, where that is another one.
+            most: a patch is unseen if one in so many of the places where it begins is at a border.
         """
         one, other = self.linked(cloud, stride)
-        if self.cameras:
+        there_cloud, there_openings = (cloud, self) if met is None else met
+        if there_openings.cameras:
             found = away.copy()
-            for camera in self.cameras:
+            for camera in there_openings.cameras:
                 found[found] = ~camera.sees_through(moved[found], margin)
             # What meets the surface next to it already reaches beyond what was seen.
             beyond = np.zeros_like(found)
@@ -84,16 +97,16 @@ class Openings:
         if not begins.any():
             return np.zeros(len(moved), dtype=bool)
         patch = connected_parts(one[leave & ~begins], other[leave & ~begins], len(moved))
-        met, back = np.unique(other[begins], return_inverse=True)
+        rim, back = np.unique(other[begins], return_inverse=True)
         classes = cloud.classes(slice(None, None, stride))
-        _, target = cloud.nearest(moved[met], None if classes is None else classes[met])
-        there, here = self.border[target][back], self.border[::stride][met][back]
+        _, target = there_cloud.nearest(moved[rim], None if classes is None else classes[rim])
+        there, here = there_openings.border[target][back], self.border[::stride][rim][back]
         own = patch[one[begins]]
         at_border = there & ~here
         # A border that is carried onto a border says nothing: there the object may end on both sides.
         both = np.bincount(own, there & here, len(moved))
         every = np.bincount(own, minlength=len(moved))
-        free = (MOST * np.bincount(own, at_border, len(moved)) >= every - both) & (every > 0)
+        free = (most * np.bincount(own, at_border, len(moved)) >= every - both) & (every > 0)
         found = away & free[patch]
         # What lies next to such a patch already reaches beyond the border.
         found[other[begins][free[own] & at_border]] = True
@@ -101,7 +114,13 @@ class Openings:
 
 
 def openings(
-    cloud: LocalPlanes, points: Array, tree: Tree, cameras: tuple[Camera, ...] = (), near: Index | None = None
+    cloud: LocalPlanes,
+    points: Array,
+    tree: Tree,
+    cameras: tuple[Camera, ...] = (),
+    near: Index | None = None,
+    *,
+    least: float = OPEN,
 ) -> Openings | None:
     """What is open of a surface; None if it is closed, or known too coarsely to tell.
 
@@ -111,6 +130,7 @@ def openings(
         tree: kd-tree over them.
         cameras: what saw it, where that is known.
         near: [M, NEIGHBOURS] of the points near each local plane, if they are known already.
+        least: share of the local planes that have to lie far aside.
     """
     if cameras:
         none = np.zeros(len(cloud.points), dtype=bool)
@@ -127,7 +147,7 @@ def openings(
     thin = thick < np.maximum(BENT * np.median(thick), 0.5 * FLAT * width)
     sheet = thin & (variances[:, 1] > WIRE**2 * variances[:, 2])
     share = _lines(cloud, sheet & (aside > FAR_ASIDE)).mean()
-    if share < OPEN:
+    if share < least:
         return None
     line = _lines(cloud, thin & (aside > ASIDE))
     border = Tree(cloud.points[line]).nearest(cloud.points)[0] < 2.0 * np.median(cloud.reach)

@@ -109,12 +109,18 @@ class Surroundings:
 
 
 def sampling(
-    points: Array, rng: np.random.Generator, *, outliers: bool, apart: bool = True, blobs: bool = False
+    points: Array,
+    rng: np.random.Generator,
+    *,
+    outliers: bool,
+    groups: bool = True,
+    apart: bool = True,
+    blobs: bool = False,
 ) -> Sampling:
     """How points [N, 3] were sampled; with `outliers` those that belong to no surface are set apart.
 
-    With `apart` clumps apart from the body are as well, and with `blobs` those that touch it. Of points that fill a
-    volume none is set apart, and all are kept.
+    With `apart` clumps apart from the body are as well, and with `blobs` those that touch it; without `groups` nobody
+    looks for either. Of points that fill a volume none is set apart, and all are kept.
     """
     kept: Index = np.arange(len(points))
     taken: list[Index] = []
@@ -131,11 +137,11 @@ def sampling(
         kept = _without_strays(points)
         around = _around(points[kept], rng)
     strays = np.setdiff1d(np.arange(len(points)), kept)
-    if outliers and apart and (found := clumps(points[kept], around)):
+    if outliers and groups and apart and (found := clumps(points[kept], around)):
         taken += [kept[c] for c in found]
         kept = np.setdiff1d(kept, np.concatenate(taken))
         around = _around(points[kept], rng)
-    if outliers:
+    if outliers and groups:
         lone = [kept[b] for b in filled(points[kept], around, rng)]
     if blobs and lone:
         taken += lone

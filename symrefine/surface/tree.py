@@ -76,3 +76,10 @@ def side_by_side(points: Array) -> Index:
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(points, leafsize=LEAF, balanced_tree=False, compact_nodes=False).indices)
+
+
+def pairs_within(points: Array, radius: float) -> Index:
+    """All pairs [P, 2], i < j, of points [N, d] that are no farther apart than a radius."""
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(points, leafsize=LEAF).query_pairs(radius, output_type="ndarray"))

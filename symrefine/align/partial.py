@@ -1,0 +1,305 @@
+"""Alignment of surfaces that share a part only: no centroid, both determinants at once.
+
+Local planes of either side that look alike whichever way they are turned or mirrored -> maps that many of them agree
+upon -> the polish on the points -> what each map lays on the other side, where that says no, and where nobody looked.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from symrefine.align.alignment import OK, OPEN
+from symrefine.align.pair import THIN, Evidence, Side
+from symrefine.align.polish import Similarity, polish
+from symrefine.decide.maps import ITSELF, Merit, ahead, as_good, fits, is_rival, score
+from symrefine.detection.measure import SAMPLES
+from symrefine.fit.matching import AGREE
+from symrefine.geometry import Array, tight_diagonal
+from symrefine.groups.orthogonal import chord_angles
+from symrefine.moments.quadrature import sample_surface
+from symrefine.propose.consensus import Matches, Proposal, consensus
+from symrefine.propose.signatures import mutual_matches, signatures
+from symrefine.surface.cameras import cameras
+from symrefine.surface.misses import LIMITS, disc_distances
+from symrefine.surface.neighbourhoods import fills_volume
+from symrefine.surface.openings import Openings, openings
+from symrefine.surface.sampling import sampling
+from symrefine.surface.skin import LocalPlanes, Skin, drawn, make_skin
+from symrefine.surface.surface import HOPELESS
+
+# Local planes of either side, how far around themselves they look and how near matches come, in diagonals, and matches
+# that are asked: more cost time, and no more maps were found.
+PLANES, AROUND, WITHIN, MATCHES = 1500, 0.1, 0.04, 500
+# A side with so many times the surface gets as many more local planes, up to a number.
+COARSER, MOST_PLANES = 1.5, 6000
+# One in so many local planes is moved by the polish, and by the first look at the maps that are proposed.
+MOVED, LOOK = 2, 3
+# Maps of each determinant that are polished, if they meet at least such a share of what the best does.
+POLISHED, WORTH = 4, 0.5
+# A patch is unseen if one in so many of the places where it begins is at a border. Of true maps at least one in four
+# is: the two are cut by different planes, and each border is known by a few local planes only.
+MOST = 6
+# Maps nearer than this, radians and diagonals, are one.
+APART = (0.17, 0.04)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shown:
+    """What one side shows of its surface, about the centre of its moments, in units of the target.
+
+    Attributes:
+        skin: its points without strays.
+        weights: [N] by which local planes are drawn, so that they are even; None where the points are.
+        cloud: local planes.
+        views: [N, 3] where the points were seen from, if that is known.
+        closed: whether nothing can be missing, as of a mesh.
+    """
+
+    skin: Skin
+    weights: Array | None
+    cloud: LocalPlanes
+    views: Array | None
+    closed: bool
+    rng: np.random.Generator
+
+    @classmethod
+    def of(cls, side: Side, unit: float, seed: int) -> "Shown | None":
+        """What a mesh or cloud shows; None if its points fill a volume."""
+        rng = np.random.default_rng(seed)
+        points, normals, views, weights = side.shape.points, side.shape.normals, side.shape.viewpoint, None
+        if side.is_mesh:
+            points, normals = sample_surface(side.shape, SAMPLES, rng)[0], None
+        else:
+            seen = sampling(points, np.random.default_rng(0), outliers=True, groups=False)
+            points, weights = points[seen.even], seen.shares
+            normals, views = (None if v is None else v[seen.even] for v in (normals, views))
+        local = (points - side.moments.center) / unit
+        skin = make_skin(local, rng, normals=normals, thin=THIN)
+        if not side.is_mesh and normals is None and fills_volume(local, skin.tree, np.random.default_rng(0)):
+            return None
+        cloud = skin.local_planes(drawn(len(local), PLANES, rng, weights))
+        views = None if views is None else (views - side.moments.center) / unit
+        return cls(skin=skin, weights=weights, cloud=cloud, views=views, closed=side.is_mesh, rng=rng)
+
+    def as_fine_as(self, spacing: float) -> "Shown":
+        """The same with as many local planes as it takes to lie about so near to one another."""
+        finer = (self.cloud.spacing / spacing) ** 2
+        if finer < COARSER:
+            return self
+        count = min(round(finer * PLANES), MOST_PLANES)
+        pick = drawn(len(self.skin.points), count, self.rng, self.weights)
+        return replace(self, cloud=self.skin.local_planes(pick))
+
+    @cached_property
+    def moving(self) -> LocalPlanes:
+        """Some of the local planes, that stand for all in the polish."""
+        pick = drawn(len(self.skin.points), len(self.cloud.points) // MOVED, self.rng, self.weights)
+        return self.skin.local_planes(pick)
+
+    @cached_property
+    def openings(self) -> Openings:
+        """Where the surface ends without a reason, and what saw it."""
+        none = np.zeros(len(self.cloud.points), dtype=bool)
+        eyes = () if self.views is None else cameras(self.skin.points, self.views)
+        open_ = None if self.closed else openings(self.cloud, self.skin.points, self.skin.tree, eyes, least=0.0)
+        return open_ or Openings(line=none, border=none, evident=False)
+
+    @cached_property
+    def noise(self) -> Array:
+        """Distances [M] of the local planes to the discs of all others: what sampling alone misses by."""
+        return disc_distances(self.cloud, self.cloud.points, skip_self=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Met:
+    """A map between two surfaces that was polished, and what they say of it.
+
+    Attributes:
+        motion: the map.
+        covariance: [6, 6] of the rotation vector (target axes, radians) and the shift; zero along what nothing tells.
+        sides: what of the source, and of the target, it lays on the other.
+        overlap: share of the source, and of the target, that meets the other.
+        rms: of the misses where they meet.
+    """
+
+    motion: Similarity
+    covariance: Array
+    sides: tuple[Merit, Merit]
+    overlap: tuple[float, float]
+    rms: float
+
+    @property
+    def score(self) -> float:
+        """The more the better."""
+        return score(self.sides)
+
+    @property
+    def determinant(self) -> int:
+        """+1 or -1."""
+        return int(np.sign(np.linalg.det(self.motion.matrix)))
+
+    @property
+    def is_loose(self) -> bool:
+        """Whether it may slide or turn, and meets as well."""
+        return bool(np.linalg.matrix_rank(self.covariance) < len(self.covariance))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Meeting:
+    """The map that two surfaces which share a part agree upon best.
+
+    Attributes:
+        best: the map.
+        equals: others that do about as well.
+        confidence: probability that it is right.
+        determinant_confidence: probability that its determinant is.
+        status: "ok", or why it should not be relied upon.
+    """
+
+    best: Met
+    equals: tuple[Met, ...]
+    confidence: float
+    determinant_confidence: float
+    status: str
+
+
+def partial_meeting(evidence: Evidence, *, reflections: bool) -> Meeting | None:
+    """How two surfaces of one size meet that share a part only; None where nothing suggests that they do.
+
+    Maps of either determinant are tried; without `reflections` those of -1 are rivals only.
+    """
+    unit = evidence.target.moments.scale
+    source, target = (Shown.of(s, unit, evidence.seed) for s in (evidence.source, evidence.target))
+    if source is None or target is None:
+        return None
+    finest = min(source.cloud.spacing, target.cloud.spacing)
+    source, target = source.as_fine_as(finest), target.as_fine_as(finest)
+    judge = _Judge(
+        source=source,
+        target=target,
+        diagonal=min(tight_diagonal(s.cloud.points) for s in (source, target)),
+        tolerance=evidence.tolerance,
+    )
+    found: list[Met] = []
+    for proposal in judge.promising(proposals(source, target, judge.diagonal)):
+        met = judge.polished(proposal)
+        if not any(judge.same(met, m) for m in found):
+            found.append(met)
+    found.sort(key=lambda m: -m.score)
+    best = next((m for m in found if reflections or m.determinant > 0), None)
+    if best is None:
+        return None
+    rivals = [m for m in found if m is not best]
+    alike = [m for m in rivals if is_rival(best.score, m.score) and judge.is_symmetry(best, m)]
+    open_ = source.openings.evident or target.openings.evident
+    return _weighed(best, alike, [m for m in rivals if m not in alike], reflections=reflections, open_=open_)
+
+
+def proposals(source: Shown, target: Shown, diagonal: float) -> list[Proposal]:
+    """Maps of either determinant that local planes which look alike agree upon."""
+    a, b = source.cloud, target.cloud
+    looks = (signatures(cloud, AROUND * diagonal) for cloud in (a, b))
+    i, j = (m[:MATCHES] for m in mutual_matches(*looks))
+    matches = Matches(source=a.points[i], source_normals=a.normals[i], target=b.points[j], target_normals=b.normals[j])
+    return consensus(matches, WITHIN * diagonal)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Judge:
+    """Two surfaces that judge maps between them, the smaller diagonal of both, and the tolerance."""
+
+    source: Shown
+    target: Shown
+    diagonal: float
+    tolerance: float
+
+    @property
+    def far(self) -> float:
+        """Miss from which on nothing is met, diagonals."""
+        return LIMITS[1] * self.tolerance
+
+    def promising(self, every: Sequence[Proposal]) -> list[Proposal]:
+        """The proposals of each determinant under which most local planes meet others, as they stand."""
+        points, normals = (v[::LOOK] for v in (self.source.cloud.points, self.source.cloud.normals))
+        count = []
+        for p in every:
+            away, met = self.target.cloud.met_by(points @ p.matrix.T + p.shift)
+            facing = np.abs(np.einsum("ij,ij->i", normals @ p.matrix.T, met.normals)) > AGREE
+            count.append(int((facing & (away < WITHIN * self.diagonal)).sum()))
+        order = [i for i in np.argsort(-np.array(count), kind="stable") if count[i] >= WORTH * max(count)]
+        signs = [float(np.sign(np.linalg.det(every[i].matrix))) for i in order]
+        return [every[i] for k, i in enumerate(order) if signs[:k].count(signs[k]) < POLISHED]
+
+    def polished(self, proposal: Proposal) -> Met:
+        """A proposal after the polish, judged from both sides."""
+        start, known = Similarity(matrix=proposal.matrix, shift=proposal.shift), np.zeros((6, 6))
+        done = polish(self.source.moving, self.target.cloud, start, error=WITHIN * self.diagonal, known=known)
+        there, back = (self.source, self.target, done.motion), (self.target, self.source, done.motion.inverse)
+        (one, misses), (other, back_misses) = self._side(*there), self._side(*back)
+        met = np.concatenate([misses, back_misses])
+        return Met(
+            motion=done.motion,
+            covariance=done.covariance,
+            sides=(one, other),
+            overlap=(one.well + one.less, other.well + other.less),
+            rms=self.diagonal * float(np.sqrt(np.mean(met**2))) if len(met) else math.inf,
+        )
+
+    def _side(self, here: Shown, there: Shown, motion: Similarity) -> tuple[Merit, Array]:
+        """What one side says of a map, and by how much its local planes miss the other where they meet, diagonals."""
+        moved = motion.apply(here.cloud.points)
+        misses = disc_distances(there.cloud, moved, bound=HOPELESS * self.far * self.diagonal) / self.diagonal
+        met, margin = (there.cloud, there.openings), self.far * self.diagonal
+        unseen = here.openings.unseen(here.cloud, moved, misses > self.far, 1, margin, met=met, most=MOST)
+        noise = np.concatenate([here.noise, there.noise]) / self.diagonal
+        return Merit.of(misses, unseen, noise, self.far), misses[~unseen & (misses <= self.far)]
+
+    def same(self, one: Met, other: Met) -> bool:
+        """Whether two maps are one."""
+        shifts = float(np.linalg.norm(one.motion.shift - other.motion.shift))
+        turned = float(chord_angles(one.motion.matrix, other.motion.matrix))
+        return turned < APART[0] and shifts < APART[1] * self.diagonal
+
+    def is_symmetry(self, one: Met, other: Met) -> bool:
+        """Whether what leads from one map to the other carries the source, or the target, onto itself as a whole."""
+        within = self._after(one.motion.inverse, other.motion), self._after(other.motion, one.motion.inverse)
+        sides = zip((self.source, self.target), within, strict=True)
+        return any(self._side(side, side, motion)[0].score > ITSELF for side, motion in sides)
+
+    @staticmethod
+    def _after(last: Similarity, first: Similarity) -> Similarity:
+        return Similarity(matrix=last.matrix @ first.matrix, shift=last.matrix @ first.shift + last.shift)
+
+
+def _weighed(best: Met, alike: list[Met], rivals: list[Met], *, reflections: bool, open_: bool) -> Meeting:
+    """How sure the best map is, given those that a symmetry makes of it, and its rivals."""
+    fitting = fits(best.sides)
+    certain = 0.0 if best.is_loose else fitting * ahead(best.score, [r.score for r in rivals])
+    equals = [r for r in rivals if as_good(best.score, r.score) and (reflections or r.determinant > 0)]
+    every = [best, *(m for m in alike if reflections or m.determinant > 0), *equals]
+    other = [m.score for m in (*alike, *rivals) if m.determinant != best.determinant]
+    return Meeting(
+        best=best,
+        equals=tuple(every[1:]),
+        confidence=certain,
+        # Where nothing fits, either is as likely; where one is not admitted, nobody asks.
+        determinant_confidence=0.5 + fitting * (max(ahead(best.score, other), 0.5) - 0.5) if reflections else 1.0,
+        status=OK if certain > 0.5 else _doubt(best, every, rivals, fitting, open_),
+    )
+
+
+def _doubt(best: Met, every: Sequence[Met], rivals: Sequence[Met], fitting: float, open_: bool) -> str:
+    """Why the best map is not to be relied upon; nothing where the objects do not fit, and nothing may be missing."""
+    if any(not as_good(r.score, best.score) for r in rivals) or (fitting < 0.5 and not open_):
+        return ""
+    if best.is_loose:
+        return f"{OPEN}: what the objects share may slide or turn in itself"
+    if fitting >= 0.5 and len(every) > 1:
+        hands = ", and the determinant is open" if len({m.determinant for m in every}) > 1 else ""
+        return f"{OPEN}: {len(every)} maps lay what is seen on one another about as well{hands}"
+    met = " and ".join(f"{100 * share:.0f} %" for share in best.overlap)
+    well = 100 * max(side.well for side in best.sides)
+    return f"{OPEN}: {met} of source and target meet, {well:.0f} % as well as one object does, which may be chance"

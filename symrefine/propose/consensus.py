@@ -1,0 +1,125 @@
+"""Rigid maps of either determinant that many matches of local planes agree upon: no centroid, no sign of a normal.
+
+Two local planes keep, wherever they are carried, the distance d of their points and the angles between the line from
+one to the other (direction u) and their normals m and n. All of it is polynomial in what no sign of a normal changes:
+
+    (u.m)^2   (u.n)^2   (m.n)^2   (u.m)(u.n)(m.n)   and the handedness   (u.m)(u.n) det(u, m, n)
+
+A rotation keeps the last one, a reflection reverses it, so one pair of matches already says which it is. Two matches
+are compatible under a determinant if they keep all six. Those of a true map are compatible with one another, so that a
+pair of them has many compatible matches in common (SC2-PCR; Chen, Sun, Yang, Tao, 2022).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from symrefine.geometry import Array, Mask, orthogonal_factor
+
+# By how much the invariants of compatible pairs may differ: normals of 15 degrees off move them by so much.
+INVARIANT, HANDEDNESS = 0.3, 0.15
+# Maps that are grown from the best matches for each determinant, how many are told, and rounds that each takes.
+SEEDS, TOLD, ROUNDS = 20, 8, 3
+# Share of the most that a match has in common with a seed, from which on it belongs to it.
+COMMON = 0.3
+# Cosine of the largest angle between normals that agree, and of the angle between matrices that are one map.
+FACING, SAME = 0.7, 0.9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Matches:
+    """Local planes of the source, points [N, 3] and unit normals [N, 3] of any sign, and those that look like them."""
+
+    source: Array
+    source_normals: Array
+    target: Array
+    target_normals: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Proposal:
+    """A map `target ~ matrix @ source + shift`, and how many matches agree with it."""
+
+    matrix: Array
+    shift: Array
+    support: int
+
+
+def consensus(matches: Matches, within: float) -> list[Proposal]:
+    """The maps of either determinant that most matches agree with to a distance, best first."""
+    here, there = (
+        pair_invariants(p, n)
+        for p, n in (
+            (matches.source, matches.source_normals),
+            (matches.target, matches.target_normals),
+        )
+    )
+    allowed = np.abs(here[0] - there[0]) < within
+    allowed &= here[0] > 2.0 * within
+    for a, b in zip(here[1:-1], there[1:-1], strict=True):
+        allowed &= np.abs(a - b) < INVARIANT
+    found: list[Proposal] = []
+    for det in (1, -1):
+        agree = (allowed & (np.abs(here[-1] - det * there[-1]) < HANDEDNESS)).astype(np.float32)
+        found += _grown(matches, agree * (agree @ agree), within, det)
+    return sorted(found, key=lambda p: -p.support)
+
+
+def pair_invariants(points: Array, normals: Array) -> tuple[Array, ...]:
+    """Distances [N, N] of all pairs of local planes, and what of their angles no sign of a normal changes.
+
+    The last one is the handedness, which a reflection reverses.
+    """
+    across = points[None] - points[:, None]
+    distance = np.sqrt(np.einsum("ijk,ijk->ij", across, across))
+    across /= np.maximum(distance, 1e-300)[:, :, None]
+    first, second = np.einsum("ijk,ik->ij", across, normals), np.einsum("ijk,jk->ij", across, normals)
+    between, leaning = normals @ normals.T, first * second
+    volume = np.einsum("ijk,ijk->ij", across, np.cross(normals[:, None], normals[None]))
+    return distance, first**2, second**2, between**2, leaning * between, leaning * volume
+
+
+def _grown(matches: Matches, common: Array, within: float, det: int) -> list[Proposal]:
+    """Maps of one determinant, each from a match and those that have most in common [N, N] with it."""
+    score = common.sum(axis=1)
+    found: list[Proposal] = []
+    for _ in range(SEEDS):
+        seed = int(score.argmax())
+        if score[seed] <= 0.0:
+            break
+        row = common[seed]
+        inside = row >= COMMON * row.max()
+        inside[seed], score[seed] = True, 0.0
+        map_, agreeing = _settled(matches, inside, within, det)
+        score[agreeing] = 0.0
+        if agreeing.sum() > 2 and not any(_same(map_, p, within) for p in found):
+            found.append(Proposal(matrix=map_[0], shift=map_[1], support=int(agreeing.sum())))
+    return sorted(found, key=lambda p: -p.support)[:TOLD]
+
+
+def _settled(matches: Matches, inside: Mask, within: float, det: int) -> tuple[tuple[Array, Array], Mask]:
+    """The map of some matches [N], fitted again to those that agree with it, and these."""
+    map_ = _fitted(matches, inside, det)
+    for _ in range(ROUNDS):
+        matrix, shift = map_
+        away = np.linalg.norm(matches.source @ matrix.T + shift - matches.target, axis=1)
+        facing = np.abs(np.einsum("ij,ij->i", matches.source_normals @ matrix.T, matches.target_normals))
+        inside = (away < within) & (facing > FACING)
+        if inside.sum() < 3:
+            break
+        map_ = _fitted(matches, inside, det)
+    return map_, inside
+
+
+def _fitted(matches: Matches, some: Mask, det: int) -> tuple[Array, Array]:
+    """Least squares over some matches: orthogonal matrix of a determinant, and shift."""
+    a, b = matches.source[some], matches.target[some]
+    moments = (b - b.mean(axis=0)).T @ (a - a.mean(axis=0))
+    matrix = det * orthogonal_factor(det * moments, proper=True)
+    return matrix, b.mean(axis=0) - matrix @ a.mean(axis=0)
+
+
+def _same(map_: tuple[Array, Array], known: Proposal, within: float) -> bool:
+    """Whether a map is a known one."""
+    turned = (np.trace(map_[0] @ known.matrix.T) - 1.0) / 2.0
+    return bool(turned > SAME and np.linalg.norm(map_[1] - known.shift) < 2.0 * within)

@@ -1,0 +1,60 @@
+"""What the surroundings of a local plane look like from it, whichever way they are turned or mirrored.
+
+The histograms of FPFH (Rusu, Blodow, Beetz, 2009) in small, without what a reflection or the sign of a normal changes:
+of the neighbours, by how far away they are, how high they stand over the plane, how much their normals turn away from
+its own, and how far these lean towards it. "High" is the side to which the surface bends.
+"""
+
+import numpy as np
+
+from symrefine.geometry import Array
+from symrefine.shape import Index
+from symrefine.surface.skin import LocalPlanes
+from symrefine.surface.tree import pairs_within
+
+# Shells of about equal area that neighbours are told apart by, and bins of each histogram.
+SHELLS, BINS = 3, 6
+
+
+def signatures(cloud: LocalPlanes, radius: float) -> Array:
+    """Histograms [M, SHELLS * 3 * BINS] of the neighbours within a radius of each local plane."""
+    count, points, normals = len(cloud.points), cloud.points, cloud.normals
+    pairs = pairs_within(cloud.points, radius)
+    one, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+    toward = points[other, :3] - points[one]
+    length = np.maximum(np.linalg.norm(toward, axis=1), 1e-300)
+    across = np.einsum("ki,ki->k", toward, normals[one])
+    bent = np.where(np.bincount(one, across, count) < 0.0, -1.0, 1.0)[one]
+    height = 0.5 + 0.5 * bent * across / length
+    turned = np.abs(np.einsum("ki,ki->k", normals[one], normals[other]))
+    leaning = np.abs(np.einsum("ki,ki->k", toward, normals[other])) / length
+    shell = one * SHELLS + np.minimum((length / radius) ** 2 * SHELLS, SHELLS - 1).astype(np.int64)
+    found = np.stack([_histograms(shell, v, count * SHELLS) for v in (height, turned, leaning)], axis=1)
+    return found.reshape(count, -1)
+
+
+def _histograms(owner: Index, values: Array, count: int) -> Array:
+    """Histograms [count, BINS] of the values [K] in 0 .. 1 of each owner [K]; they add up to 1, or are empty.
+
+    A value counts in the two bins that it lies between.
+    """
+    place = values * (BINS - 1)
+    low = np.minimum(place.astype(np.int64), BINS - 2)
+    part = place - low
+    at = owner * BINS + low
+    found = np.bincount(at, 1.0 - part, count * BINS) + np.bincount(at + 1, part, count * BINS)
+    found = found.reshape(count, BINS)
+    return found / np.maximum(found.sum(axis=1, keepdims=True), 1.0)
+
+
+def mutual_matches(source: Array, target: Array) -> tuple[Index, Index]:
+    """Indices of the signatures [N, F] and [M, F] that are each nearest to the other.
+
+    Those come first that are least like a plane, which is like any other.
+    """
+    squares = (target**2).sum(axis=1) - 2.0 * source @ target.T + (source**2).sum(axis=1)[:, None]
+    nearest = squares.argmin(axis=1)
+    mutual = np.flatnonzero(squares.argmin(axis=0)[nearest] == np.arange(len(source)))
+    turned = source.reshape(len(source), SHELLS, 3, BINS)[mutual, :, 1, -1].mean(axis=1)
+    mutual = mutual[np.argsort(turned, kind="stable")]
+    return mutual, nearest[mutual]
