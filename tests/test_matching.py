@@ -482,6 +482,7 @@ def test_neighbours_that_there_are_not_are_infinitely_far():
     assert np.isinf(distance[:, 1]).all()
     np.testing.assert_array_equal(near, [[k, len(points)] for k in range(5)])
     assert Tree(points).nearest(np.empty((0, 3)))[0].shape == (0,)
+    assert np.isinf(Tree(np.empty((0, 3))).nearest(points)[0]).all()
 
 
 def test_points_side_by_side_are_near_one_another():

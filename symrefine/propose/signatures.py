@@ -19,7 +19,7 @@ SHELLS, BINS = 3, 6
 def signatures(cloud: LocalPlanes, radius: float) -> Array:
     """Histograms [M, SHELLS * 3 * BINS] of the neighbours within a radius of each local plane."""
     count, points, normals = len(cloud.points), cloud.points, cloud.normals
-    pairs = pairs_within(cloud.points, radius)
+    pairs = pairs_within(cloud.tree.points, radius)
     one, other = np.concatenate([pairs, pairs[:, ::-1]]).T
     toward = points[other, :3] - points[one]
     length = np.maximum(np.linalg.norm(toward, axis=1), 1e-300)

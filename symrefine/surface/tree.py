@@ -23,7 +23,7 @@ class Tree:
 
         self.points = np.ascontiguousarray(points, dtype=np.float64)
         with _one_thread():
-            self._tree: Any = KDTree(self.points, leafsize=LEAF)
+            self._tree: Any = KDTree(self.points, leafsize=LEAF) if len(self.points) else None
 
     def query(self, queries: Array, count: int, *, skip: int = 0, bound: float = math.inf) -> tuple[Array, Index]:
         """Distances and indices, both [Q, count], of the points nearest to queries [Q, d], nearest first.
@@ -35,6 +35,8 @@ class Tree:
             bound: neighbours so far away, and those that there are not, are told with an infinite distance and index N.
         """
         last = skip + count
+        if self._tree is None:
+            return np.full((len(queries), count), np.inf), np.zeros((len(queries), count), dtype=np.int64)
         with _one_thread():
             limit = None if math.isinf(bound) else bound
             away, near = self._tree.query(np.ascontiguousarray(queries), k=last, distance_upper_bound=limit)
