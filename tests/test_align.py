@@ -634,6 +634,12 @@ def test_consensus_finds_a_fifth_of_true_matches(det: int) -> None:
     assert best.support >= 40
 
 
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_consensus_of_too_few_matches_is_none(count: int) -> None:
+    points, normals = np.eye(3)[:count], np.eye(3)[:count]
+    assert consensus(Matches(source=points, source_normals=normals, target=points, target_normals=normals), 0.1) == []
+
+
 def test_signatures_do_not_know_pose_hand_or_signs() -> None:
     rng = rng_of(59)
     cloud = make_skin(sample(asymmetric(), 4000, 0.0, rng), rng).local_planes(np.arange(0, 4000, 8))

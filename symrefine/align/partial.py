@@ -229,7 +229,7 @@ class _Judge:
             away, met = self.target.cloud.met_by(points @ p.matrix.T + p.shift)
             facing = np.abs(np.einsum("ij,ij->i", normals @ p.matrix.T, met.normals)) > AGREE
             count.append(int((facing & (away < WITHIN * self.diagonal)).sum()))
-        order = [i for i in np.argsort(-np.array(count), kind="stable") if count[i] >= WORTH * max(count)]
+        order = [i for i in np.argsort(-np.array(count), kind="stable") if count[i] >= max(WORTH * max(count), 1.0)]
         signs = [float(np.sign(np.linalg.det(every[i].matrix))) for i in order]
         return [every[i] for k, i in enumerate(order) if signs[:k].count(signs[k]) < POLISHED]
 

@@ -83,7 +83,7 @@ def _grown(matches: Matches, common: Array, within: float, det: int) -> list[Pro
     """Maps of one determinant, each from a match and those that have most in common [N, N] with it."""
     score = common.sum(axis=1)
     found: list[Proposal] = []
-    for _ in range(SEEDS):
+    for _ in range(min(SEEDS, len(score))):
         seed = int(score.argmax())
         if score[seed] <= 0.0:
             break
