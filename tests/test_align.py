@@ -26,6 +26,7 @@ from symrefine.propose.consensus import Matches, consensus, pair_invariants
 from symrefine.propose.signatures import signatures
 from symrefine.shape import Shape
 from symrefine.surface.skin import make_skin
+from symrefine.surface.tree import Tree
 
 DETERMINANTS = (1, -1)
 SEEDS = st.integers(0, 2**32 - 1)
@@ -645,5 +646,5 @@ def test_signatures_do_not_know_pose_hand_or_signs() -> None:
     cloud = make_skin(sample(asymmetric(), 4000, 0.0, rng), rng).local_planes(np.arange(0, 4000, 8))
     matrix, signs = random_orthogonal(rng, det=-1), rng.choice([-1.0, 1.0], (500, 1))
     points = cloud.points @ matrix.T + 2.0
-    turned_ = replace(cloud, points=points, normals=signs * cloud.normals @ matrix.T, tree=cKDTree(points))
+    turned_ = replace(cloud, points=points, normals=signs * cloud.normals @ matrix.T, tree=Tree(points))
     np.testing.assert_allclose(signatures(turned_, 0.3), signatures(cloud, 0.3), atol=1e-6)
