@@ -239,7 +239,7 @@ def picture(rows: Sequence[Row], path: Path) -> None:
     mpl.use("agg")
     import matplotlib.pyplot as plt
 
-    figure, plots = plt.subplots(1, 2, figsize=(9, 3.6), sharey=True, layout="constrained")
+    figure, plots = plt.subplots(1, 2, figsize=(10, 3.6), sharey=True, layout="constrained")
     for axes, make, label in zip(plots, (overlap, outliers), ("overlap", "share of outliers"), strict=True):
         levels = {n: s for n, (m, s) in CONDITIONS.items() if m is make}
         levels["full"] = 1.0 if make is overlap else 0.0
@@ -251,7 +251,7 @@ def picture(rows: Sequence[Row], path: Path) -> None:
         axes.set(xlabel=label, ylim=(0.0, 1.05))
     plots[0].invert_xaxis()
     plots[0].set_ylabel("right")
-    plots[0].legend()
+    figure.legend(*plots[0].get_legend_handles_labels(), loc="outside right upper")
     with whole(path) as draft:
         figure.savefig(draft, dpi=110, format="png")
     plt.close(figure)
