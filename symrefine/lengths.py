@@ -4,7 +4,7 @@ import numpy as np
 
 from symrefine.detection.measure import Outliers, is_few
 from symrefine.detection.sketch import MANY, is_large, sampled, sketched
-from symrefine.errors import InputError
+from symrefine.errors import InputError, about
 from symrefine.geometry import LARGEST_TOLERANCE, Array, check_tolerance, tight_diagonal
 from symrefine.plane.outline import smallest_diagonal
 from symrefine.shape import Shape
@@ -34,7 +34,8 @@ def relative_tolerance(
         return float(asked)
     if isinstance(shape, Stream):
         shape = sketched(shape).sample if shape.count > MANY else shape.held()
-    value, unit = read_length(asked)
+    with about("tolerance"):
+        value, unit = read_length(asked)
     length = value if unit == OF_FILE else value * METRES[unit] / METRES[_unit(asked, shape, units)]
     diagonal = object_diagonal(shape, outliers=outliers)
     if length > LARGEST_TOLERANCE * diagonal:

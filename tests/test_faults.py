@@ -228,5 +228,5 @@ def test_gltf_of_numbers_that_count_nothing(tmp_path: Path, value: object) -> No
 @pytest.mark.parametrize("options", [{"tolerance": "x"}, {"tolerance": None}, {"seed": -1}, {"seed": "1"}], ids=str)
 def test_options_that_are_none(options: dict[str, object]) -> None:
     for call in (lambda: symrefine.detect(CUBE, **options), lambda: symrefine.align(CUBE, CUBE, **options)):
-        with pytest.raises(InputError, match=f"{next(iter(options))} is "):
+        with pytest.raises(InputError, match=f"{next(iter(options))}(:| is) "):
             call()

@@ -241,8 +241,8 @@ def test_trace_comes_closer_to_the_truth(name):
     rows = solo.trace(solo.Case(name=name, points=8000, noise_rel=0.005, motion="rotation", seed=2))
     assert [row["iteration"] for row in rows] == list(range(len(rows)))
     assert len(rows) >= 2
-    # Where the start is clearly off; one that is within the noise is left there.
-    assert rows[-1]["worst_deg"] < max(0.5 * rows[0]["worst_deg"], 0.06)
+    # Where the start is clearly off; one that is within the noise, 0.05 degrees of these, is left there.
+    assert rows[-1]["worst_deg"] < max(0.5 * rows[0]["worst_deg"], 0.1)
     assert rows[-1]["residual_rel"] > 0
 
 

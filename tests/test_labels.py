@@ -351,7 +351,7 @@ def test_arrays_of_npz(tmp_path: Path) -> None:
     assert (shape.labels.tolist(), shape.weights.tolist()) == ([1, 0, 1, 1], [1, 2, 3, 4])
     assert "kind cannot weigh points; expected one number for" in refusal(cloud, labels="mass", weights="kind")
     mesh = npz(tmp_path / "b.npz", points=TETRA, faces=FACES[:3], label=[1, 2, 1], rgb=np.eye(4))
-    assert "holds arrays faces, points, rgb" in refusal(mesh, labels="label")
+    assert "holds arrays faces, label, points, rgb" in refusal(mesh, labels="label")
     mesh = npz(tmp_path / "b.npz", points=TETRA, faces=FACES[:3], label=[True, False, True])
     assert load(mesh, labels="label").labels.tolist() == [1, 0, 1]
     mesh = npz(tmp_path / "c.npz", points=TETRA, faces=FACES[:3], rgb=np.eye(4))

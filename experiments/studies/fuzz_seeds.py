@@ -28,7 +28,7 @@ def _models(suffix: str) -> list[bytes]:
     """As this package writes them: a mesh, where the format has faces, and a cloud."""
     mesh, cloud = shape_of((CORNERS, FACES)), shape_of(CORNERS)
     both = [cloud] if suffix in (".xyz", ".npy") else [mesh, cloud]
-    return [model_bytes(Path(f"a{suffix}"), shape) for shape in both]
+    return [model_bytes(suffix, shape) for shape in both]
 
 
 def _ply() -> list[bytes]:

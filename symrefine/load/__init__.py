@@ -244,7 +244,8 @@ def _contents(file: Path, wanted: Wanted, *, is_chosen: bool = False) -> Frames[
     try:
         is_folder = file.is_dir()
     except (OSError, ValueError) as error:
-        raise InputError(f"is no name of a file: {error}") from None
+        reason = getattr(error, "strerror", None) or error  # without the name, which may be long
+        raise InputError(f"is no name of a file: {reason}") from None
     if is_folder:
         raise InputError("is a directory; expected a file")
     if suffix not in _FORMATS:
