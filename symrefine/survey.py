@@ -14,8 +14,9 @@ from symrefine.lengths import heavy, object_diagonal
 from symrefine.moments.moments import shape_moments
 from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.shape import Index, Shape
+from symrefine.surface.clumps import count_parts
 from symrefine.surface.neighbourhoods import connected_parts, fills_volume
-from symrefine.surface.sampling import count_parts, sampling
+from symrefine.surface.sampling import sampling
 from symrefine.surface.tree import Tree
 
 # Points below which the answer for a cloud is often `undetermined` (see README, boundary cases).

@@ -16,7 +16,8 @@ from symrefine.moments.moments import Moments
 from symrefine.moments.running import running_moments
 from symrefine.shape import Index, Shape
 from symrefine.stream import Stream
-from symrefine.surface.sampling import Surroundings, strays_beside
+from symrefine.surface.sampling import strays_beside
+from symrefine.surface.surroundings import Surroundings
 
 # Points of a cloud from which on a sample stands for its surface, and points of that: with 1 % noise planes are then
 # known to 0.07 degrees instead of 0.05, at a tenth of the cost for a million points.

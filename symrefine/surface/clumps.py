@@ -1,0 +1,109 @@
+"""Small groups of points that have no counterpart: apart from the body, or filling a volume beside it.
+
+What is decided here depends on the surroundings of a point alone, and on how large a part is, so that it breaks no
+symmetry: the parts of an object come in pairs, or on its axis.
+"""
+
+import numpy as np
+
+from symrefine.geometry import Array, Mask
+from symrefine.shape import Index
+from symrefine.surface.misses import SHARES
+from symrefine.surface.neighbourhoods import blobness, choose_neighbours, connected_parts, planes_of
+from symrefine.surface.surroundings import AROUND, Surroundings, around_some
+from symrefine.surface.tree import Tree
+
+# A clump holds at most this share of the points, so many that it counts, and has no counterpart: none of half its size.
+CLUMP, COUNTERPART = 0.1, 0.5
+# Neighbourhoods as thick as this, over that of points at random in a ball, fill a volume: the finest details of objects
+# reach 0.87 where noise leaves them visible at all.
+FILLED = 0.9
+
+
+def clumps(points: Array, around: Surroundings) -> list[Index]:
+    """Indices, ascending, of each group of points [N, 3] apart from the body that is small and has no counterpart.
+
+    Points hang together if each is among the nearest of the other, whatever the density: a few between two dense parts
+    join nothing. `around` tells of some of the points.
+    """
+    apart = [m for m in _lone(_parts(around)) if _gap(around, m)] if np.median(around.reach) > 0.0 else []
+    return _members(points, around, apart)
+
+
+def count_parts(points: Array, rng: np.random.Generator) -> int:
+    """How many parts points [N, 3] have, strays left out, that hang together and are so large that they count."""
+    if len(points) <= AROUND:
+        return 1
+    sizes = np.bincount(_parts(around_some(points, rng)))
+    return max(int((sizes > max(SHARES[-1] * sizes.sum(), AROUND)).sum()), 1)
+
+
+def _parts(around: Surroundings) -> Index:
+    """Number of the part that each of some points belongs to: they hang together if each is near the other."""
+    count = len(around.points)
+    one, other = np.repeat(np.arange(count), AROUND), around.near.ravel()
+    mutual = (around.near[other] == one[:, None]).any(axis=1)
+    return connected_parts(one[mutual], other[mutual], count)
+
+
+def filled(points: Array, around: Surroundings, rng: np.random.Generator) -> list[Index]:
+    """Indices, ascending, of each small group of points [N, 3] with no counterpart that fills a volume by the body.
+
+    Neighbourhoods there look like points at random in a ball: among some of the points, and among all in neighbourhoods
+    so large that noise does not make the surface look so too. `around` tells of some of the points.
+    """
+    thick = blobness(around.planes[2], AROUND)[around.near].mean(axis=1)
+    within = thick > FILLED
+    one, other = np.repeat(np.arange(len(within)), AROUND), around.near.ravel()
+    inside = within[one] & within[other]
+    part = np.where(within, connected_parts(one[inside], other[inside], len(within)), -1)
+    small = [part == k for k in np.flatnonzero(_small(np.bincount(part + 1)[1:], len(part)))]
+    if not small:
+        return []
+    tree = Tree(points)
+    size = 2 * choose_neighbours(points, tree, rng)
+    enough = 2 * size * len(part) / len(points)  # fewer tell nothing of neighbourhoods so large
+    for m in small:
+        if m.sum() < enough or np.median(_blobness(points, tree, around.points[m], size)) < FILLED:
+            part[m] = -1
+    return _members(points, around, [_grown(m, around) for m in _lone(part)])
+
+
+def _blobness(points: Array, tree: Tree, queries: Array, size: int) -> Array:
+    """`blobness` [Q] of what is around queries [Q, 3] among points [N, 3]."""
+    return blobness(planes_of(points, tree.query(queries, size)[1])[2], size)
+
+
+def _small(sizes: Index, count: int) -> Mask:
+    """Which parts of so many points are too small to be the body, and large enough to be seen."""
+    return np.asarray((sizes <= CLUMP * count) & (sizes > SHARES[-1] * count))
+
+
+def _lone(part: Index) -> list[Mask]:
+    """Small parts, given the number of each point's part, that none other is about as large as; -1 is no part."""
+    sizes = np.bincount(part + 1)[1:]
+    small = np.flatnonzero(_small(sizes, len(part)))
+    own = sizes[small, None]
+    alike = (sizes >= COUNTERPART * own) & (sizes <= own / COUNTERPART)
+    return [part == k for k in small[alike.sum(axis=1) == 1]]
+
+
+def _gap(around: Surroundings, some: Mask) -> bool:
+    """Whether nine in ten of some points stand farther from all others than from their own neighbours."""
+    between = Tree(around.points[~some]).nearest(around.points[some])[0]
+    return bool(np.quantile(between, 0.1) > np.median(around.reach[some]))
+
+
+def _grown(some: Mask, around: Surroundings) -> Mask:
+    """Some points with those that most neighbours of are among them: a core with its rim."""
+    while (more := some | (some[around.near].mean(axis=1) > 0.5)).sum() > some.sum():
+        some = more
+    return some
+
+
+def _members(points: Array, around: Surroundings, groups: list[Mask]) -> list[Index]:
+    """Indices of all points [N, 3] that belong to each of some groups, as the nearest of some points do."""
+    if not groups:
+        return []
+    nearest = around.tree.nearest(points)[1]
+    return [np.flatnonzero(m[nearest]) for m in groups]

@@ -1,0 +1,64 @@
+"""What is around the points of a cloud, or around some of them that stand for all."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from symrefine.geometry import Array
+from symrefine.shape import Index
+from symrefine.surface.neighbourhoods import planes_of, thickness_of
+from symrefine.surface.tree import Tree
+
+# Points that are asked first, and neighbours that tell of the surroundings of a point.
+ASKED, AROUND = 5000, 16
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surroundings:
+    """Points with what is around each of them, itself left out.
+
+    Attributes:
+        points: [N, 3].
+        tree: kd-tree over them.
+        away: [N, AROUND] distances of the neighbours, nearest first.
+        near: [N, AROUND] indices of the neighbours.
+    """
+
+    points: Array
+    tree: Tree
+    away: Array
+    near: Index
+
+    @classmethod
+    def of(cls, points: Array) -> "Surroundings":
+        """The surroundings of points [N, 3]; N > AROUND."""
+        tree = Tree(points)
+        away, near = tree.query(points, AROUND, skip=1)
+        return cls(points=points, tree=tree, away=away, near=near)
+
+    @property
+    def reach(self) -> Array:
+        """Distance [N] of the neighbour in the middle."""
+        return np.asarray(self.away[:, AROUND // 2 - 1])
+
+    @cached_property
+    def planes(self) -> tuple[Array, Array, Array]:
+        """Means, normals and variances (across first), all [N, 3], of the neighbours."""
+        return planes_of(self.points, self.near)
+
+    @property
+    def thickness(self) -> Array:
+        """Thickness over length [N] of what is around each point."""
+        return thickness_of(self.planes[2])
+
+
+def around_some(points: Array, rng: np.random.Generator) -> Surroundings:
+    """The surroundings of some of points [N, 3]."""
+    return Surroundings.of(points[some_of(points, rng)])
+
+
+def some_of(points: Array, rng: np.random.Generator) -> Index:
+    """Indices of points [N, 3] at random, and of the farthest, lest a few strays are missed."""
+    away = ((points - np.median(points, axis=0)) ** 2).sum(axis=1)
+    return np.union1d(rng.permutation(len(points))[:ASKED], np.argpartition(away, -1 - AROUND)[-AROUND:])
