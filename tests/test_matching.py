@@ -466,6 +466,10 @@ def test_neighbours_are_those_of_brute_force(dim, count):
     distance, near = Tree(points).query(queries, 2, skip=1)
     np.testing.assert_allclose(distance, away[:, 1:3])
     np.testing.assert_allclose(np.linalg.norm(queries[:, None] - points[near], axis=2), distance)
+    if count > 3:
+        many = Tree(points).query(queries, 200)[0]
+        np.testing.assert_allclose(many, away[:, :200])
+        np.testing.assert_allclose(many[:, 1:3], distance)
     first, index = Tree(points).nearest(queries)
     np.testing.assert_allclose(first, away[:, 0])
     np.testing.assert_allclose(np.linalg.norm(queries - points[index], axis=1), first)

@@ -208,29 +208,22 @@ def _blob_flatness(k: int) -> float:
 def fills_volume(points: Array, tree: Tree, rng: np.random.Generator) -> bool:
     """Whether points [N, 3] (RMS radius 1) fill a volume: at no width do neighbourhoods look flatter than a blob."""
     order = rng.permutation(len(points))
-    first = _flattest(points[order], tree, PROBES)
+    first = _flattest(points, tree, order[:PROBES])
     if abs(first - VOLUME) > UNCERTAIN:
         return first > VOLUME
-    return _flattest(points[order], tree, 5 * PROBES) > VOLUME
+    return _flattest(points, tree, order[: 5 * PROBES]) > VOLUME
 
 
-def _flattest(points: Array, tree: Tree, probes: int) -> float:
-    """Smallest median flatness of neighbourhoods of the first points, over that of a blob, at any size and width.
-
-    The points are in random order, so that the first half of them has neighbourhoods of half the size and equal width.
-    """
+def _flattest(points: Array, tree: Tree, pick: Index) -> float:
+    """Smallest median flatness of neighbourhoods of some points, over that of a blob, at any size and width."""
     size, flattest = NEIGHBOURS[0], np.inf
     while size <= max(len(points) // 8, NEIGHBOURS[0]):
-        distance, near = tree.query(points[:probes], size)
+        distance, near = tree.query(points[pick], size)
         if float(np.median(distance[:, -1])) > WIDEST_BLOB:
             break
-        values = planes_of(tree.points, near)[2]
+        values = planes_of(points, near)[2]
         flattest = min(flattest, float(np.median(flatness_of(values))) / _blob_flatness(size))
         if flattest < VOLUME - UNCERTAIN:
             break
-        if size < CELLS:
-            size *= 2
-        else:
-            points = points[: len(points) // 2]
-            tree = Tree(points)
+        size *= 2
     return flattest

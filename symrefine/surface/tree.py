@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,9 @@ import numpy as np
 from symrefine.geometry import Array
 from symrefine.shape import Index
 
-# Points in a leaf: of 6 to 32 the quickest for 1 to 12 neighbours.
-LEAF = 24
+# Points in a leaf: of 6 to 32 the quickest for 1 to 12 neighbours. Of more neighbours than so many scipy's tree is
+# quicker, which keeps them in a heap and not in a row.
+LEAF, ROW = 24, 128
 
 
 class Tree:
@@ -35,6 +36,9 @@ class Tree:
             bound: neighbours so far away, and those that there are not, are told with an infinite distance and index N.
         """
         last = skip + count
+        if last > ROW:
+            away, near = self._heap.query(queries, k=[*range(1 + skip, 1 + last)], distance_upper_bound=bound)
+            return np.asarray(away), np.asarray(near)
         if self._tree is None:
             return np.full((len(queries), count), np.inf), np.zeros((len(queries), count), dtype=np.int64)
         with _one_thread():
@@ -45,6 +49,12 @@ class Tree:
             missing = near >= len(self.points)
             away[missing], near[missing] = np.inf, len(self.points)
         return away, near
+
+    @cached_property
+    def _heap(self) -> Any:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.points, leafsize=LEAF, balanced_tree=False, compact_nodes=False)
 
     def nearest(self, queries: Array, *, bound: float = math.inf) -> tuple[Array, Index]:
         """Distance and index, both [Q], of the point nearest to each query; see `query`."""
