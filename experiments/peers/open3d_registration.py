@@ -1,5 +1,9 @@
 """Open3D's map between two clouds: feature matching and ICP, beside `align`."""
 
+from typing import Any
+
+import numpy as np
+
 from symrefine.geometry import Array
 from symrefine.load.open3d import open3d
 
@@ -24,15 +28,29 @@ def open3d_align(source: Array, target: Array, voxel: float) -> Array:
 
     a, coarse_a, features_a = prepared(source)
     b, coarse_b, features_b = prepared(target)
+    start = by_ransac(coarse_a, coarse_b, features_a, features_b, voxel)
+    b.estimate_normals(search(radius=2 * voxel, max_nn=30))
+    return by_icp(a, b, start, voxel)[:3, :3]
+
+
+def by_ransac(source: Any, target: Any, source_features: Any, target_features: Any, voxel: float) -> Array:
+    """Map [4, 4] of one cloud onto another that most of the pairs with like features agree on."""
+    registration = open3d().pipelines.registration
     checks = [
         registration.CorrespondenceCheckerBasedOnEdgeLength(0.9),
         registration.CorrespondenceCheckerBasedOnDistance(1.5 * voxel),
     ]
-    found = registration.registration_ransac_based_on_feature_matching(
-        coarse_a, coarse_b, features_a, features_b, True, 1.5 * voxel,
-        registration.TransformationEstimationPointToPoint(False), 3, checks,
-        registration.RANSACConvergenceCriteria(100000, 0.999),
+    return np.asarray(
+        registration.registration_ransac_based_on_feature_matching(
+            source, target, source_features, target_features, True, 1.5 * voxel,
+            registration.TransformationEstimationPointToPoint(False), 3, checks,
+            registration.RANSACConvergenceCriteria(100000, 0.999),
+        ).transformation
     )  # fmt: skip
-    b.estimate_normals(search(radius=2 * voxel, max_nn=30))
+
+
+def by_icp(source: Any, target: Any, start: Array, voxel: float) -> Array:
+    """Map [4, 4] of one cloud onto another that has normals, from a start, by the distances from its planes."""
+    registration = open3d().pipelines.registration
     plane = registration.TransformationEstimationPointToPlane()
-    return registration.registration_icp(a, b, 0.4 * voxel, found.transformation, plane).transformation[:3, :3]
+    return np.asarray(registration.registration_icp(source, target, 0.4 * voxel, start, plane).transformation)

@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from experiments.peers.open3d_registration import VOXEL, by_icp, by_ransac
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.open3d import open3d
 
-# As a fraction of the diagonal; see `open3d_registration`.
-VOXEL = 0.02
 # Distances beyond so many voxels count as that many: what only one of the two clouds shows says nothing.
 BEYOND = 2.0
 Method = Callable[[Array, Array, float], Array]
@@ -48,12 +47,6 @@ def _prepared(points: Array, voxel: float) -> tuple[Any, Any, Any]:
     return cloud, coarse, features
 
 
-def _icp(source: Any, target: Any, start: Array, voxel: float) -> Array:
-    registration = open3d().pipelines.registration
-    plane = registration.TransformationEstimationPointToPlane()
-    return np.asarray(registration.registration_icp(source, target, 0.4 * voxel, start, plane).transformation)
-
-
 def fast_global(source: Array, target: Array, voxel: float) -> Array:
     """Open3D: FPFH, fast global registration, point-to-plane ICP."""
     o3d = open3d()
@@ -62,25 +55,15 @@ def fast_global(source: Array, target: Array, voxel: float) -> Array:
     (a, coarse_a, features_a), (b, coarse_b, features_b) = (_prepared(p, voxel) for p in (source, target))
     option = registration.FastGlobalRegistrationOption(maximum_correspondence_distance=0.5 * voxel)
     found = registration.registration_fgr_based_on_feature_matching(coarse_a, coarse_b, features_a, features_b, option)
-    return _icp(a, b, found.transformation, voxel)
+    return by_icp(a, b, found.transformation, voxel)
 
 
 def ransac(source: Array, target: Array, voxel: float) -> Array:
     """Open3D: FPFH, RANSAC, point-to-plane ICP."""
     o3d = open3d()
     o3d.utility.random.seed(0)
-    registration = o3d.pipelines.registration
     (a, coarse_a, features_a), (b, coarse_b, features_b) = (_prepared(p, voxel) for p in (source, target))
-    checks = [
-        registration.CorrespondenceCheckerBasedOnEdgeLength(0.9),
-        registration.CorrespondenceCheckerBasedOnDistance(1.5 * voxel),
-    ]
-    found = registration.registration_ransac_based_on_feature_matching(
-        coarse_a, coarse_b, features_a, features_b, True, 1.5 * voxel,
-        registration.TransformationEstimationPointToPoint(False), 3, checks,
-        registration.RANSACConvergenceCriteria(100000, 0.999),
-    )  # fmt: skip
-    return _icp(a, b, found.transformation, voxel)
+    return by_icp(a, b, by_ransac(coarse_a, coarse_b, features_a, features_b, voxel), voxel)
 
 
 def kiss(source: Array, target: Array, voxel: float) -> Array:
