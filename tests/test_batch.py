@@ -374,15 +374,27 @@ def test_a_folder_that_cannot_be_written_is_told_in_one_line(run: Run, lab: Path
     refused(run("merge", "p.jsonl", "--out", "/sys/all.jsonl"), "/sys/all.jsonl: cannot be written")
 
 
+def half_way(line: str, file: Path) -> subprocess.Popen[str]:
+    """A command that is stopped with some of its ten rows written; begun anew if it was through before it could be."""
+    for _ in range(10):
+        process = start(line.split())
+        while process.poll() is None and not (file.exists() and file.read_bytes().count(b"\n")):
+            time.sleep(0.001)
+        process.send_signal(signal.SIGSTOP)
+        if process.poll() is None and file.read_bytes().count(b"\n") < 10:
+            break
+        process.send_signal(signal.SIGCONT)
+        assert process.communicate(timeout=60)[1] == ""
+        file.unlink()
+    return process
+
+
 @posix
 @pytest.mark.parametrize("line", ["batch objects -q --out r.jsonl", "run thirds.yaml -q --out r"])
 def test_of_two_writers_at_once_one_is_refused(lab: Path, line: str) -> None:
-    first = start(line.split())
     file = lab / ("r.jsonl" if line.startswith("batch") else "r/journal.jsonl")
-    deadline = time.monotonic() + 60
-    while not file.exists() and time.monotonic() < deadline:
-        time.sleep(0.01)
-    first.send_signal(signal.SIGSTOP)  # so that it does not end meanwhile
+    first, count = half_way(line, file), len(rows(file))
+    assert 0 < count < 10
     second = start(line.split())
     err = second.communicate(timeout=60)[1]
     first.send_signal(signal.SIGCONT)
