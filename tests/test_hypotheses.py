@@ -231,7 +231,7 @@ def test_a_true_group_is_found_from_a_start_three_degrees_off(name):
 def test_a_look_brings_a_start_nearer(name):
     surface, truth = scene(name)
     start = start_of(truth, 5)
-    moved, needs = looked_at(surface, start)
+    moved, needs = looked_at(surface, start, math.inf)
     before, after = (truth.group.distance_rad(p.group.operations()).max() for p in (start, moved))
     assert after < 0.5 * before
     assert needs < glances(surface, [start])[0]
@@ -275,7 +275,7 @@ def test_of_exact_atoms_a_true_group_needs_nothing(name, seed):
     surface = atoms_of(points / np.sqrt((points**2).sum(axis=1).mean()))
     found = fitted(surface, Placed(group=group, center=ORIGIN))
     assert found.need < 1e-9
-    moved, needs = looked_at(surface, Placed(group=group, center=ORIGIN))
+    moved, needs = looked_at(surface, Placed(group=group, center=ORIGIN), math.inf)
     assert needs < 1e-9
     assert line_angle_rad(moved.group.frame[2], group.frame[2]) < 1e-6
 

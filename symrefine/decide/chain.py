@@ -7,14 +7,12 @@ an exact element stays in it, and the group at any tolerance is read from the sa
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from symrefine.decide.hypotheses import (
-    DIRECTION_ERROR,
     NOTHING,
-    SAME_RAD,
     START_ERROR,
     Hypothesis,
     exact_need,
@@ -24,8 +22,9 @@ from symrefine.decide.hypotheses import (
     looked_at,
     single,
 )
+from symrefine.decide.pool import ALIKE, Pool, is_at
+from symrefine.decide.posterior import certain
 from symrefine.fit.placed import Placed
-from symrefine.groups import is_subgroup
 from symrefine.propose.candidates import Evidence, about, beside, prime_axes, proposals, voted_mirrors, voted_turns
 from symrefine.propose.votes import AGREE_RAD
 from symrefine.surface.misses import LIMITS
@@ -41,10 +40,8 @@ SUPPORTED = 0.15
 KEPT = 2.0 / 3.0
 # Mirrors or axes of a group from which on a hole often lies on one of them by chance, and its border is kept by that.
 PLACES = 3
-# A coarse fit on few points may need so many times what a fine one does.
+# A fit that is not settled may need so many times what it does then.
 COARSE = 3.5
-# Needs within this factor are the same, as the elements of a true group miss alike.
-ALIKE = 1.5
 # Candidates of a surface with openings that are looked at: where little was seen many seem possible at a glance.
 LOOKED = 24
 # Candidates turned down after a look that are fitted all the same where nothing else was: the nearest misses.
@@ -53,46 +50,7 @@ TOLD = 2
 SINGLY = 4
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Pool:
-    """What was found so far.
-
-    Attributes:
-        small: groups fitted and judged.
-        largest: the largest that holds within the limit.
-        failed: groups that the largest and another one generate, which do not hold.
-        looked: candidates turned down after a look, where a coarse fit put them, with what they seem to need.
-        hopeless: the same of those turned down at a glance.
-        at_least: whether there may be more that was not seen.
-    """
-
-    small: tuple[Hypothesis, ...] = ()
-    largest: Hypothesis = NOTHING
-    failed: tuple[Hypothesis, ...] = ()
-    looked: tuple[tuple[Placed, float], ...] = ()
-    hopeless: tuple[tuple[Placed, float], ...] = ()
-    at_least: bool = False
-
-    @property
-    def seen(self) -> list[tuple[Placed, float]]:
-        """Candidates where a fit put them, with what they need."""
-        return [*((h.placed, h.need) for h in self.small), *self.looked]
-
-    def has(self, placed: Placed, needs: float) -> bool:
-        """Whether a group is in one that was fitted and needs no more than it does."""
-        return any(h.need <= ALIKE * needs and h.holds(placed) for h in (self.largest, *self.small))
-
-    def met(self, placed: Placed) -> bool:
-        """Whether a group was fitted at this very place."""
-        near = [h.group for h in self.small if h.group.name == placed.group.name]
-        return any(is_subgroup(placed.group, g, DIRECTION_ERROR) for g in near)
-
-    def with_failed(self, failed: Hypothesis | None) -> "Pool":
-        """The pool that knows of a group, if there is one, that it does not hold."""
-        return self if failed is None or failed in self.failed else replace(self, failed=(*self.failed, failed))
-
-
-def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
+def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 0.0) -> Pool:
     """Fit and judge what the moments propose, and what may stand beside the largest group that holds.
 
     Of a surface with open borders all that is judged once as if it were whole, and then with what votes propose where
@@ -100,8 +58,10 @@ def explore(surface: Surface, evidence: Evidence, limit: float) -> Pool:
 
     Args:
         limit: what the largest group may need, as a fraction of the diagonal.
+        finest: the smallest tolerance that is asked for.
     """
-    whole = _of_whole(replace(surface, openings=None), evidence, limit)
+    nothing = max(ALIKE * exact_need(surface.floor), certain(finest))
+    whole = _of_whole(replace(surface, openings=None), evidence, limit, nothing)
     if surface.openings is None:
         return whole
     part = _of_part(surface, whole, limit)
@@ -138,19 +98,19 @@ def _places(seen: Hypothesis, found: Hypothesis) -> float:
     return sum(order % seen.group.symbol.fold == 0 for _, order in found.group.rotation_axes())
 
 
-def _of_whole(surface: Surface, evidence: Evidence, limit: float) -> Pool:
-    pool = Pool()
+def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float) -> Pool:
+    pool = Pool(nothing=nothing)
     for starts in proposals(evidence):
         pool = _with(surface, pool, starts, limit)
     for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
-        if glance < HOPELESS and not pool.has(axis, exact_need(surface.floor)):
+        if glance < HOPELESS and not pool.has(axis):
             pool = _with(surface, pool, about(evidence, axis.group.frame[2]), limit)
     nearest = sorted((*pool.looked, *pool.hopeless), key=lambda k: k[1])[:TOLD] if not pool.small else []
     return replace(pool, small=(*pool.small, *(fitted(surface, start) for start, _ in nearest)))
 
 
 def _of_part(surface: Surface, whole: Pool, limit: float) -> Pool:
-    pool = Pool()
+    pool = Pool(nothing=whole.nothing)
     for known in (whole.largest, *whole.small):
         pool = _grown(surface, pool, fitted(surface, known.placed), limit) if known.elements else pool
     pool = _with(surface, pool, voted_mirrors(surface.cloud), limit)
@@ -174,7 +134,7 @@ def _hopeless(surface: Surface) -> float:
 
 def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tuple[Placed, float]]:
     """The starts that are new with what they seem to need at a glance, large groups that look good first."""
-    new = [s for s in starts if not pool.has(s, exact_need(surface.floor))]
+    new = [s for s in starts if not pool.has(s)]
     seen = zip(new, glances(surface, new, _hopeless(surface)), strict=True)
     best = sorted(seen, key=lambda k: k[1] / math.log2(1.0 + _size(k[0])))
     return best if surface.openings is None else best[:LOOKED]
@@ -187,18 +147,17 @@ def _size(placed: Placed) -> float:
 def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float) -> Pool:
     """The pool with candidates fitted, but for those that the group so far has anyway."""
     for start, glance in _glanced(surface, pool, starts):
-        least = exact_need(surface.floor)
-        if pool.has(start, least) or _is_image(start, glance, pool):
+        if pool.has(start) or pool.shows(start, glance):
             continue
         if glance >= _hopeless(surface):
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
             continue
-        moved, needs = looked_at(surface, start)
-        if needs > COARSE * limit:
+        moved, needs = looked_at(surface, start, COARSE * limit)
+        if needs > ALIKE * limit:
             pool = replace(pool, looked=(*pool.looked, (moved, needs)))
-        elif not pool.has(moved, max(needs / COARSE, least)) and not pool.met(moved):
+        elif not pool.has(moved, needs) and not pool.met(moved):
             pool = _joined_at_once(surface, pool, moved) if needs <= limit and pool.largest.elements else pool
-            if not pool.has(moved, max(needs / COARSE, least)):
+            if not pool.has(moved, needs):
                 found = fitted(surface, moved)
                 if surface.openings is None or found.supported >= SUPPORTED:
                     pool = _grown(surface, pool, found, limit)
@@ -207,19 +166,22 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float)
 
 def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
     """The pool where a candidate and the largest group hold together as far as noise tells: no need to part them."""
-    both = _generated(surface, [pool.largest.placed, start], pool.failed, pool.largest.iterations)
-    if both is not None and both.need <= exact_need(surface.floor):
+    if pool.largest.holds(start):
+        return pool
+    parts, before = [pool.largest.placed, start], pool.largest.iterations
+    both = _generated(surface, parts, pool.failed, before, pool.nothing)
+    if both is not None and both.need <= pool.nothing:
         return replace(pool, largest=both)
     return pool.with_failed(both)
 
 
 def _grown(surface: Surface, pool: Pool, found: Hypothesis, limit: float) -> Pool:
     """The pool with what was fitted, and its largest group joined to it, if both hold together, or else the larger."""
-    if pool.has(found.placed, max(found.need, exact_need(surface.floor))):
+    if pool.has(found.placed, found.need):
         return pool
     if found.need > limit:
         return replace(pool, small=(*pool.small, found))
-    both = _join(surface, [pool.largest, found], pool.failed)
+    both = _join(surface, [pool.largest, found], pool.failed, limit)
     if both is not None and both.need <= limit:
         largest = both
     else:
@@ -229,34 +191,31 @@ def _grown(surface: Surface, pool: Pool, found: Hypothesis, limit: float) -> Poo
     return replace(pool, small=(*pool.small, *kept, found), largest=largest)
 
 
-def _is_image(start: Placed, glance: float, pool: Pool) -> bool:
-    """Whether the largest group carries a mirror or turn that was seen onto this one, which looks no better."""
-    if start.group.symbol.family not in ("C", "Ch") or not pool.largest.group.is_finite:
-        return False
-    images = pool.largest.group.operations() @ start.group.frame[2]
-    seen = [(p.group.frame[2], need) for p, need in pool.seen if p.group.name == start.group.name]
-    return any(need < ALIKE * glance and np.abs(images @ u).max() > np.cos(SAME_RAD) for u, need in seen)
+def _join(
+    surface: Surface, parts: list[Hypothesis], known: Iterable[Hypothesis], most: float = math.inf
+) -> Hypothesis | None:
+    """The group that hypotheses generate, fitted unless it is one of them or known; None if they generate none.
 
-
-def _same(a: Placed, b: Placed) -> bool:
-    """Whether two groups are one, as far as directions tell."""
-    return a.group.name == b.group.name and Hypothesis(placed=a, elements=(), need=0.0).holds(b)
-
-
-def _join(surface: Surface, parts: list[Hypothesis], known: Iterable[Hypothesis]) -> Hypothesis | None:
-    """The group that hypotheses generate, fitted unless it is one of them or known; None if they generate none."""
+    Nor is one told that seems to need more than `most`.
+    """
     placed = [h.placed for h in parts if h.elements]
-    return _generated(surface, placed, (*parts, *known), max(h.iterations for h in parts))
+    return _generated(surface, placed, (*parts, *known), max(h.iterations for h in parts), most)
 
 
 def _generated(
-    surface: Surface, parts: Sequence[Placed], known: Iterable[Hypothesis], before: int
+    surface: Surface, parts: Sequence[Placed], known: Iterable[Hypothesis], before: int, most: float
 ) -> Hypothesis | None:
     placed = joined(parts)
     if placed is None:
         return None
-    same = (h for h in known if h.history and _same(h.placed, placed))
-    return next(same, None) or fitted(surface, placed, before=before)
+    same = next((h for h in known if h.history and is_at(h.placed, placed)), None)
+    if same is not None:
+        return same
+    if most < math.inf and surface.openings is None:
+        placed, needs = looked_at(surface, placed, COARSE * most)
+        if needs > ALIKE * most:
+            return None
+    return fitted(surface, placed, before=before)
 
 
 def _worst(found: Hypothesis) -> tuple[float, float]:
@@ -274,7 +233,7 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
         here = links[-1]
         if rest[0].need > limit:
             break
-        level = max(ALIKE * rest[0].need, here.need, exact_need(surface.floor))
+        level = max(ALIKE * rest[0].need, here.need, exact_need(surface.floor), pool.nothing / ALIKE)
         batch = [h for h in rest if h.need <= level]
         found = _join(surface, [here, *batch], known)
         if found is None or found.need > ALIKE * level:

@@ -24,6 +24,8 @@ from symrefine.surface.surface import Coverage, Surface
 # Local planes that are moved: at a glance by each operation; in a look by all together; in a fit and when judged by all
 # together (a quarter of that by each at most) and by each at least, as 0.6 % of fewer are no sample.
 GLANCE, LOOK, MOVED, MOVED_EACH = 120, 600, 12000, 1200
+# Steps of a look after which those that will not come near end.
+SHORT = 3
 # How far the moments may put a start wrong (radians, RMS radii; 0.04 was the most of 698 true ones), and directions of
 # fitted elements.
 START_ERROR, DIRECTION_ERROR = 0.05, np.radians(1.5)
@@ -101,14 +103,22 @@ def _some(parts: list[Operations]) -> list[Operations]:
     return parts[:: max(1, len(parts) // 4)]
 
 
-def looked_at(surface: Surface, start: Placed) -> tuple[Placed, float]:
-    """A coarse fit on a few points, and what it needs by them."""
+def looked_at(surface: Surface, start: Placed, most: float) -> tuple[Placed, float]:
+    """A fit on a few points, and what it needs by them; one that needs more than `most` after `SHORT` steps ends."""
     state = start.framed()
     stride = surface.stride(max(GLANCE, LOOK // len(state.standard)))
-    for iterate in refine(surface.cloud, state, start_error_rad=start_error(surface), max_outer=3, stride=stride):
+    for iterate in refine(surface.cloud, state, start_error_rad=start_error(surface), stride=stride):
         state = iterate.state
+        if iterate.index == SHORT and not iterate.converged and _seems(surface, start.moved(state), GLANCE) > most:
+            break
     moved = start.moved(state)
-    return moved, glances(surface, [moved])[0]
+    return moved, _seems(surface, moved, LOOK)
+
+
+def _seems(surface: Surface, placed: Placed, sources: int) -> float:
+    """What a group where it stands needs, as a few operations tell on a few points."""
+    motions = [m for part in _some(elements(placed.group)) for m in part.motions(placed.center)]
+    return float(surface.needs(motions, sources=sources).max())
 
 
 def start_error(surface: Surface) -> float:

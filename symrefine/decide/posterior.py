@@ -90,6 +90,11 @@ def meant(link: Link, tolerance: float, noise: float = 0.0, curve: Curve = SPACE
     return float(1.0 / (1.0 + strained ** (sharpness(noise / tolerance, curve.steepness) / 2.0)))
 
 
+def certain(tolerance: float, curve: Curve = SPACE) -> float:
+    """The need up to which a group leaves less doubt at a tolerance than is worth telling."""
+    return float(curve.even * tolerance * LEAST ** (1.0 / curve.steepness))
+
+
 def strain(need: T, noise: T, even: T, unknown: float = UNKNOWN, blurred: float = BLURRED) -> T:
     """How far a group is from the middle of the curve, in squares; 1 there. Need and noise in tolerances."""
     return (need / even) ** 2 * (1.0 + (blurred * noise) ** 2) + (unknown * noise) ** 2

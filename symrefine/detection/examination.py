@@ -7,8 +7,9 @@ from functools import partial
 import numpy as np
 
 from symrefine.clock import Clock
-from symrefine.decide.chain import Pool, chain, explore
+from symrefine.decide.chain import chain, explore
 from symrefine.decide.hypotheses import Hypothesis
+from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide
 from symrefine.detection.measure import Measured, Outliers, doubt, gather, measure
 from symrefine.detection.sketch import Sample, Sketch, is_large, set_apart, sketched
@@ -127,7 +128,7 @@ def _examined(
     with clock("search"):
         # Where the tolerance asked for is too small to decide anything, the ladder is told from the first that is not.
         steps = [t for t in sorted({tolerance, *ladder}) if t >= tolerance and not doubt(measured, surface, t)]
-        pool = explore(surface, evidence, steps[0]) if steps else Pool()
+        pool = explore(surface, evidence, steps[0], min(tolerance, *ladder, 1.0)) if steps else Pool()
         links = chain(surface, pool, BEYOND * max((tolerance, *ladder)))
     return Examined(
         measured=measured,

@@ -293,6 +293,9 @@ def _surface(
     uneven = None if exact or np.ptp(weights) == 0.0 else weights
     whole = make_skin(local, rng, normals=normals, exact=exact, tree=tree)
 
+    def as_they_are(some: Index) -> tuple[Array, Index | None]:
+        return local[some], None if labels is None else labels[some]
+
     def half(some: Index) -> LocalPlanes:
         # As many neighbours as in the whole, so that noise is the same; exact normals need none.
         own = normals[some] if exact and normals is not None else None
@@ -306,7 +309,7 @@ def _surface(
     near = whole.near(pick, NEIGHBOURS) if len(local) >= NEIGHBOURS else None
     cloud = whole.local_planes(pick, labels, near)
     diagonal = tight_diagonal(cloud.points)
-    noise = noise_distances(len(local), half, rng)
+    noise = noise_distances(len(local), half, rng, exact=as_they_are if exact else None)
     surface = Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, tolerance=tolerance)
     # Where noise alone needs all that is allowed, nobody sees what is open.
     if tree is None or (surface.floor >= tolerance and not views):

@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from symrefine.errors import InputError
 from symrefine.geometry import Array, rotation, unit
 from symrefine.groups import PointGroup, is_subgroup, point_group
+from symrefine.shape import Index
 
 # Turns that stand for a continuous axis where the points themselves show no fold, and the fewest of them.
 TURNS, FEWEST_TURNS = 64, 8
@@ -73,17 +74,30 @@ def _ring_fold(points: Array, axis: Array) -> int:
         return 0
     tree = cKDTree(off)
     near = NEAR * float(np.median(tree.query(off, k=2)[0][:, 1]))
-    index = np.arange(0, len(off), max(1, len(off) // PROBES))
-    misses = {}
-    for fold in range(3, min(LARGEST_FOLD, len(off)) + 1):
-        # One step tells a fold from few, many steps tell it from the next one.
-        steps = (1, next(m for m in range(round(0.382 * fold), 0, -1) if math.gcd(m, fold) == 1))
-        found = [tree.query(off[index] @ rotation(axis, 2.0 * math.pi * m / fold).T) for m in steps]
-        if all(np.mean(near_rows != index) > 0.5 for _, near_rows in found):
-            misses[fold] = max(float(np.median(distance)) for distance, _ in found)
-    best = min(misses.values(), default=math.inf)
+    folds = np.arange(3, min(LARGEST_FOLD, len(off)) + 1)
+    # A few probes turn nearly all down: by other folds rings miss by half a spacing.
+    for probes in (PROBES // 10, PROBES):
+        index = np.arange(0, len(off), max(1, len(off) // probes))
+        misses = _misses(off, tree, axis, folds, index)
+        folds, misses = folds[misses < near], misses[misses < near]
+        if not folds.size:
+            return 0
+    best = float(misses.min())
     limit = max(ALIKE * best, min(CLEAN * near, LAX * best)) + _ALONG * near
-    return max((fold for fold, miss in misses.items() if miss <= limit), default=0) if best < near else 0
+    return int(folds[misses <= limit].max())
+
+
+def _misses(points: Array, tree: cKDTree, axis: Array, folds: Index, index: Index) -> Array:
+    """Median distances [F] from some points, turned by each fold, to others; infinite where most meet themselves."""
+    # One step tells a fold from few, many steps tell it from the next one.
+    many = [next(m for m in range(round(0.382 * k), 0, -1) if math.gcd(m, k) == 1) for k in folds.tolist()]
+    angles = 2.0 * np.pi * np.stack([np.ones(len(folds)), many]) / folds
+    along = np.outer(points[index] @ axis, axis)
+    across, aside = points[index] - along, np.cross(axis, points[index])
+    moved = along + np.cos(angles)[..., None, None] * across + np.sin(angles)[..., None, None] * aside
+    distance, rows = tree.query(moved)
+    stays = (rows == index).mean(axis=2) >= 0.5
+    return np.asarray(np.where(stays, np.inf, np.median(distance, axis=2)).max(axis=0))
 
 
 def _on_rings(points: Array, frame: Array, fold: int) -> Array:

@@ -206,7 +206,9 @@ def _solve(grams: Array, state: Framed, basis: Array, theta: float) -> Solution:
         full = frame_model(grams, state.standard, state.frame, state.center, basis @ y)
         return replace(full, gradient=basis.T @ full.gradient, hessian=basis.T @ full.hessian @ basis)
 
-    solution = minimise(linearise, basis.T @ np.array([0.0, 0.0, theta, 0.0, 0.0, 0.0]))
+    # What a last step leaves is quadratically smaller than the step, and the next iterate takes it.
+    start = basis.T @ np.array([0.0, 0.0, theta, 0.0, 0.0, 0.0])
+    solution = minimise(linearise, start, tolerance=0.1 * SETTLED)
     return replace(solution, x=basis @ solution.x, hessian=basis @ solution.hessian @ basis.T)
 
 

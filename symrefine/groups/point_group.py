@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.errors import InputError
-from symrefine.geometry import Array, orthogonal_factor, read_only, unit
+from symrefine.geometry import Array, frame_with_z, orthogonal_factor, read_only, unit
 from symrefine.groups.names import Symbol, parse
 from symrefine.groups.orthogonal import (
     EXACT,
@@ -77,6 +77,23 @@ class PointGroup:
         if not self.is_finite:
             raise InputError(f"{self.name} has infinitely many operations: take those of group.sampled(fold)")
         return np.asarray(self.frame.T @ standard_operations(self.symbol) @ self.frame)
+
+    def bringing(self, direction: Array, goal: Array) -> Array:
+        """Operations [k, 3, 3] among which those are that bring one direction [3] nearest to another; all if finite.
+
+        Either end of a direction will do. About a continuous axis a turn to the azimuth of the goal, after what each
+        connected part of the group does; of all of space, one of the turns from one to the other.
+        """
+        if self.is_finite:
+            return self.operations()
+        if self.symbol.family in ("K", "Kh"):
+            return (frame_with_z(goal).T @ frame_with_z(direction))[None]
+        parts = standard_operations(Symbol(family=self.symbol.family, fold=2))
+        every = np.concatenate([parts, parts])
+        ends = every @ (self.frame @ direction) * np.repeat([1.0, -1.0], len(parts))[:, None]
+        x, y, _ = self.frame @ goal
+        turns = about_z(1.0, 1.0, np.arctan2(y, x) - np.arctan2(ends[:, 1], ends[:, 0]))
+        return np.asarray(self.frame.T @ turns @ every @ self.frame)
 
     def mirrors(self) -> Array:
         """Unit normals [m, 3] of the mirror planes; a continuous family is represented by one member."""

@@ -7,8 +7,9 @@ from functools import reduce
 
 import numpy as np
 
-from symrefine.decide.chain import ALIKE, HOPELESS
+from symrefine.decide.chain import HOPELESS
 from symrefine.decide.hypotheses import DIRECTION_ERROR, EXACT, LOOK, START_ERROR, exact_need
+from symrefine.decide.pool import ALIKE
 from symrefine.decide.posterior import NEAR
 from symrefine.geometry import Array
 from symrefine.plane.outline import NOISES, Outlines

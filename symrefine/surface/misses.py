@@ -151,7 +151,13 @@ def spread_distance(own: Array, motion: Isometry) -> float:
     return float(np.sqrt(max(2.0 * (np.trace(own) - common), 0.0)))
 
 
-def noise_distances(count: int, planes: Callable[[Index], LocalPlanes], rng: np.random.Generator) -> Array:
+def noise_distances(
+    count: int,
+    planes: Callable[[Index], LocalPlanes],
+    rng: np.random.Generator,
+    *,
+    exact: Callable[[Index], tuple[Array, Index | None]] | None = None,
+) -> Array:
     """Distances [M] between the surfaces that two halves of a cloud make.
 
     An object with an exact symmetry differs from its image by no more: both are made of points of their own, closer to
@@ -160,9 +166,16 @@ def noise_distances(count: int, planes: Callable[[Index], LocalPlanes], rng: np.
     Args:
         count: points of the cloud.
         planes: the surface that some of them make, given their indices.
+        exact: some of them as they are, with their classes, if they lie on the surface without noise: of these one half
+            is enough for a surface, as either half tells the same.
     """
     order = rng.permutation(count)
-    one, other = (planes(np.sort(order[k::2])) for k in (0, 1))
+    halves = [np.sort(order[k::2]) for k in (0, 1)]
+    if exact is not None:
+        points, classes = exact(halves[1])
+        some = slice(None, None, max(1, len(points) // (2 * ASKED)))
+        return disc_distances(planes(halves[0]), points[some], None if classes is None else classes[some])
+    one, other = (planes(half) for half in halves)
     across = []
     for here, there in ((one, other), (other, one)):
         some = slice(None, None, max(1, len(there.points) // ASKED))

@@ -1,0 +1,84 @@
+"""What was found so far: groups fitted, joined, turned down, and which starts they make needless."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from symrefine.decide.hypotheses import DIRECTION_ERROR, NOTHING, SAME_RAD, Hypothesis
+from symrefine.fit.placed import Placed
+from symrefine.groups import PointGroup, is_subgroup
+
+# Needs within this factor are the same, as the elements of a true group miss alike.
+ALIKE = 1.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Pool:
+    """What was found so far.
+
+    Attributes:
+        small: groups fitted and judged.
+        largest: the largest that holds within the limit.
+        failed: groups that the largest and another one generate, which do not hold.
+        looked: candidates turned down after a look, where a coarse fit put them, with what they seem to need.
+        hopeless: the same of those turned down at a glance.
+        at_least: whether there may be more that was not seen.
+        nothing: what is as good as no need: noise hides it, or no tolerance that is asked for makes a doubt of it.
+    """
+
+    small: tuple[Hypothesis, ...] = ()
+    largest: Hypothesis = NOTHING
+    failed: tuple[Hypothesis, ...] = ()
+    looked: tuple[tuple[Placed, float], ...] = ()
+    hopeless: tuple[tuple[Placed, float], ...] = ()
+    at_least: bool = False
+    nothing: float = 0.0
+
+    @property
+    def seen(self) -> list[tuple[Placed, float]]:
+        """Candidates where a fit put them, with what they need."""
+        return [*((h.placed, h.need) for h in self.small), *self.looked]
+
+    def has(self, placed: Placed, needs: float = 0.0) -> bool:
+        """Whether a group is in one that was fitted and needs no more than it does, or as good as nothing."""
+        most = max(ALIKE * needs, self.nothing)
+        return any(h.need <= most and h.holds(placed) for h in (self.largest, *self.small))
+
+    def met(self, placed: Placed) -> bool:
+        """Whether a group was fitted at this very place."""
+        return any(is_at(h.placed, placed) for h in self.small)
+
+    def shows(self, start: Placed, glance: float) -> bool:
+        """Whether the largest group carries a group that was seen onto this one, which looks no better at a glance.
+
+        Of what is in a continuous group something may hold better than the rest, and a start is too rough to tell.
+        """
+        if not self.largest.group.is_finite and self.largest.holds(start):
+            return False
+        alike = [p for p, need in self.seen if p.group.name == start.group.name and need < ALIKE * glance]
+        return any(is_same(image, start) for p in alike for image in _images(p, self.largest.group, start))
+
+    def with_failed(self, failed: Hypothesis | None) -> "Pool":
+        """The pool that knows of a group, if there is one, that it does not hold."""
+        return self if failed is None or failed in self.failed else replace(self, failed=(*self.failed, failed))
+
+
+def is_at(a: Placed, b: Placed) -> bool:
+    """Whether two groups are one and stand at the very same place, as far as fitted directions tell."""
+    return a.group.name == b.group.name and is_subgroup(b.group, a.group, DIRECTION_ERROR)
+
+
+def is_same(a: Placed, b: Placed) -> bool:
+    """Whether two groups are one, as far as directions tell."""
+    return a.group.name == b.group.name and Hypothesis(placed=a, elements=(), need=0.0).holds(b)
+
+
+def _images(known: Placed, group: PointGroup, wanted: Placed) -> Iterator[Placed]:
+    """Where operations carry a placed group that bring its axis near that of another one."""
+    axis, goal = known.group.frame[2], wanted.group.frame[2]
+    for operation in group.bringing(axis, goal):
+        if abs(goal @ operation @ axis) > np.cos(SAME_RAD):
+            # A frame is right-handed; the inversion, which the operation may lack, changes no group's place.
+            frame = known.group.frame @ operation.T * np.sign(np.linalg.det(operation))
+            yield Placed(group=PointGroup(name=known.group.name, frame=frame), center=known.center)
