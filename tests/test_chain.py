@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.objects.shapes import box, join, sample
-from symrefine.decide.chain import Pool, chain, explore
-from symrefine.decide.hypotheses import NOTHING, SAME_RAD, fitted
+from symrefine.decide.chain import chain, explore
+from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted
+from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import Link, decide
 from symrefine.detection.measure import gather, measure
 from symrefine.fit.placed import Placed
@@ -218,6 +219,27 @@ def test_groups_that_generate_none_do_not_stop_the_chain():
     exact = [h.group.name for h in links if h.need < 0.001]
     assert exact[-1] == "C6"
     assert set(exact) <= {"C1", "C2", "C3", "C6"}
+
+
+@pytest.mark.parametrize("name", ["Cinfv", "Dinfh"])
+def test_a_round_group_shows_what_was_seen_across_its_axis_all_around_it(name):
+    """Of what stands across, one place tells of all; of what is inside, each place may hold better than the others."""
+    frame = random_orthogonal(np.random.default_rng(5), 3, 1)
+    largest = Hypothesis(
+        placed=Placed(group=point_group(name, frame), center=ORIGIN), elements=NOTHING.elements, need=0
+    )
+
+    def turned(group, angle, tilt=np.pi / 2):
+        across = rotation(frame[2], angle) @ rotation(frame[0], tilt) @ frame[2]
+        return Placed(group=point_group(group, frame_with_z(across)), center=ORIGIN)
+
+    tilt = 1.0
+    pool = Pool(largest=largest, looked=((turned("C3", 0.3, tilt), 0.03), (turned("Cs", 0.3), 0.03)))
+    assert pool.shows(turned("C3", 2.0, tilt), 0.03)
+    assert not pool.shows(turned("C3", 2.0, tilt), 0.01)
+    assert not pool.shows(turned("C3", 2.0, 0.7), 0.03)
+    assert not pool.shows(turned("C5", 2.0, tilt), 0.03)
+    assert not pool.shows(turned("Cs", 2.0), 0.03)
 
 
 # What is explored

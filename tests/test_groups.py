@@ -372,6 +372,20 @@ def test_the_nearest_operation_belongs_to_the_group_and_none_is_nearer(name, see
 # From noisy operations to the group
 
 
+@settings(max_examples=60, deadline=None)
+@given(st.sampled_from([*SMALL, *CONTINUOUS]), SEEDS)
+def test_what_brings_a_direction_to_its_image_is_among_the_operations_that_are_told(name, seed):
+    rng = np.random.default_rng(seed)
+    group = point_group(name, random_orthogonal(rng, 3, 1))
+    operation = rng.choice(group.operations() if group.is_finite else group.sampled(17).operations())
+    direction = rng.standard_normal(3) / 3.0
+    found = group.bringing(direction, operation @ direction)
+    assert group.distance_rad(found).max() < 1e-7
+    images = found @ direction
+    away = np.minimum(*(np.linalg.norm(images - sign * operation @ direction, axis=1) for sign in (1.0, -1.0)))
+    assert away.min() < 1e-9
+
+
 @pytest.mark.parametrize("noise_rad", [0.0, 1e-7, math.radians(0.5)])
 @pytest.mark.parametrize("name", FINITE)
 def test_identify_recovers_name_and_frame(name, noise_rad):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from symrefine.decide.posterior import Link, decide, meant
+from symrefine.decide.posterior import LEAST, Link, certain, decide, meant
 
 NEED = st.floats(0.0, 0.5)
 TOLERANCE = st.floats(1e-3, 0.2)
@@ -117,3 +117,10 @@ def test_what_is_inside_a_group_is_at_least_as_sure_in_whatever_order_needs_come
     found = decide(links, tolerance)
     assert all(b <= a for a, b in pairwise(found.inside))
     assert min(found.probabilities) >= 0.0
+
+
+@given(st.floats(1e-4, 0.2), st.booleans())
+def test_what_is_certain_leaves_no_doubt_worth_telling(tolerance, lone):
+    need = certain(tolerance)
+    assert 0.0 < need < tolerance
+    assert 1.0 - meant(Link(need=need, lone_mirror=lone), tolerance) <= LEAST
