@@ -8,6 +8,7 @@ import os
 import secrets
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from symrefine.errors import InputError
 
 # A writer fills the file it is given.
 Writer = Callable[[Path], object]
+# The files that were asked for since somebody wants to know.
+_asked: ContextVar[list[Path] | None] = ContextVar("asked", default=None)
 
 
 def check_target(path: Path) -> None:
@@ -156,6 +159,7 @@ def file_bytes(file: Path) -> bytes:
     Raises:
         InputError: it is missing, unreadable or empty.
     """
+    ask(file)
     try:
         data = file.read_bytes()
     except FileNotFoundError:
@@ -167,3 +171,20 @@ def file_bytes(file: Path) -> bytes:
     if not data:
         raise InputError("is empty (0 bytes)")
     return data
+
+
+def ask(file: Path) -> None:
+    """Tell those who want to know that a file is asked for, by a reader that does not come here."""
+    if (asked := _asked.get()) is not None and file not in asked:
+        asked.append(file)
+
+
+@contextmanager
+def asked_for() -> Iterator[list[Path]]:
+    """The files that are asked for as long as this lasts, each once, whether they are there or not."""
+    asked: list[Path] = []
+    token = _asked.set(asked)
+    try:
+        yield asked
+    finally:
+        _asked.reset(token)

@@ -203,6 +203,136 @@ def test_ids_of_bop_are_numbers(run: Run, lab: Path) -> None:
     refused(run("batch", "objects", "--manifest", "m.csv"), "and not both")
 
 
+# --- several objects in a file ----------------------------------------------------------------------------------------
+
+WATER = "3\nwater\nO 0 0 0.1173\nH 0 0.7572 -0.4692\nH 0 -0.7572 -0.4692\n"
+BENT = WATER.replace("-0.7572 -0.4692", "-0.7572 -0.2692")
+WRONG = WATER.replace("H 0 0.7572", "H 0 x")
+
+
+@pytest.fixture
+def trajectory(lab: Path) -> Path:
+    """The folder `chem`: a file with one molecule, one with three, and one whose second of two is damaged."""
+    folder = lab / "chem"
+    folder.mkdir()
+    for name, text in {"a": WATER, "b": WATER + BENT + WATER, "c": WATER + WRONG}.items():
+        (folder / f"{name}.xyz").write_text(text)
+    return folder
+
+
+@pytest.mark.usefixtures("trajectory")
+def test_each_object_of_a_file_has_the_row_that_detect_gives_it(run: Run) -> None:
+    status, out, err = run("batch", "chem", "--out", "rows.jsonl")
+    assert (status, err) == (1, "")
+    assert "3 files, 6 objects, 1 failed" in out
+    found = {row["file"]: row for row in rows("rows.jsonl")}
+    assert sorted(found) == ["a.xyz", "b.xyz#0", "b.xyz#1", "b.xyz#2", "c.xyz#0", "c.xyz#1"]
+    assert [found[f"b.xyz#{k}"]["point_group"] for k in range(3)] == ["C2v", "Cs", "C2v"]
+    assert found["c.xyz#1"]["error"].startswith("chem/c.xyz#1: ")
+    assert run("detect", "chem/b.xyz", "--json", "b.json")[0] == 0
+    for k, record in enumerate(json.loads(Path("b.json").read_text())):
+        row = found[f"b.xyz#{k}"]
+        assert {key: row[key] for key in record if key != "timings"} == {
+            key: record[key] for key in record if key != "timings"
+        }
+
+
+def test_objects_of_a_file_are_found_again_one_by_one(run: Run, trajectory: Path) -> None:
+    assert run("batch", "chem/b.xyz", "--out", "rows.jsonl", "--table", "whole.csv")[0] == 0
+    journal = Path("rows.jsonl")
+    lines = journal.read_text().splitlines(keepends=True)
+    journal.write_text("".join(lines[1:]))
+    assert "3 objects, 2 done before" in run("batch", "chem/b.xyz", "--out", "rows.jsonl", "--table", "again.csv")[1]
+    assert Path("again.csv").read_bytes() == Path("whole.csv").read_bytes()
+    assert run("batch", "chem/b.xyz", "--out", "rows.jsonl", "--frame", "1")[1].count("b.xyz") == 1
+    (trajectory / "b.xyz").write_text(WATER + BENT)
+    told = run("batch", "chem/b.xyz", "--out", "rows.jsonl")[1]
+    assert "2 objects" in told
+    assert "done before" not in told
+
+
+def test_who_does_them_changes_no_row_of_several_in_a_file(run: Run, trajectory: Path) -> None:
+    run("batch", "chem", "--table", "one.csv")
+    run("batch", "chem", "--workers", "2", "--table", "two.csv")
+    for number in (1, 2):
+        run("batch", "chem", "--shard", f"{number}/2", "--out", f"p{number}.jsonl")
+    (trajectory / "models.csv").write_text("path\na.xyz\nb.xyz\nc.xyz\n")
+    run("batch", "--manifest", "chem/models.csv", "--table", "manifest.csv")
+    assert run("merge", "p1.jsonl", "p2.jsonl", "--out", "all.jsonl", "--table", "merged.csv")[0] == 0
+    for name in ("two", "merged", "manifest"):
+        assert Path(f"{name}.csv").read_bytes() == Path("one.csv").read_bytes()
+    assert "6 done before" in run("batch", "chem", "--out", "all.jsonl")[1]
+
+
+def test_several_objects_at_an_address_are_fetched_once(
+    run: Run, trajectory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fsspec = pytest.importorskip("fsspec")
+    store = fsspec.filesystem("memory")
+    store.store.clear()
+    store.pipe("/chem/b.xyz", (trajectory / "b.xyz").read_bytes())
+    fetched: list[str] = []
+    get = store.get_file
+    monkeypatch.setattr(type(store), "get_file", lambda _, path, *rest: (fetched.append(path), get(path, *rest)))
+    assert run("batch", "memory://chem", "--out", "far.jsonl")[0] == 0
+    assert [row["source"] for row in rows("far.jsonl")] == [f"memory:///chem/b.xyz#{k}" for k in range(3)]
+    assert len(fetched) == 2  # to see how many there are, and for all of them
+    assert "3 done before" in run("batch", "memory://chem", "--out", "far.jsonl")[1]
+
+
+def test_an_object_of_bop_is_a_file(run: Run, trajectory: Path) -> None:
+    (trajectory / "b.xyz").rename(trajectory / "obj_000001.xyz")
+    status, out, _ = run("batch", "chem/obj_000001.xyz", "--bop", "info.json")
+    assert status == 1
+    assert "holds 3 frames; choose one with frame" in out
+
+
+# --- files beside a file ----------------------------------------------------------------------------------------------
+
+SQUARE = (
+    "mtllib s.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n"
+)
+
+
+def test_what_was_read_beside_a_file_counts_as_its_content(run: Run, lab: Path) -> None:
+    from PIL import Image
+
+    (lab / "s.obj").write_text(SQUARE)
+    line = ("batch", "s.obj", "--out", "rows.jsonl", "--texture")
+    assert run(*line)[0] == 1  # there is no s.mtl yet
+    assert rows("rows.jsonl")[0]["beside"] == {"s.mtl": None}
+    (lab / "images").mkdir()
+    (lab / "s.mtl").write_text("newmtl m\nmap_Kd images/skin.png\n")
+    Image.new("RGB", (8, 8), (200, 30, 30)).save(lab / "images" / "skin.png")
+    assert run(*line)[0] == 0
+    assert sorted(rows("rows.jsonl")[1]["beside"]) == ["images/skin.png", "s.mtl"]
+    assert "1 done before" in run(*line)[1]
+    halves = Image.new("RGB", (8, 8), (200, 30, 30))
+    halves.paste((30, 30, 200), (0, 0, 4, 8))
+    halves.save(lab / "images" / "skin.png")
+    assert "done before" not in run(*line)[1]
+    assert rows("rows.jsonl")[2]["textured"] != rows("rows.jsonl")[1]["textured"]
+    assert "1 done before" in run(*line)[1]
+    run("batch", "s.obj", "--out", "plain.jsonl")
+    assert "beside" not in rows("plain.jsonl")[0]  # what does not count is not read
+
+
+def test_the_buffers_of_a_gltf_count_as_its_content(run: Run, lab: Path) -> None:
+    import trimesh
+
+    def write(extents: Sequence[float]) -> None:
+        for name, data in trimesh.Scene(trimesh.creation.box(extents)).export(file_type="gltf").items():
+            (lab / name).write_bytes(data)
+
+    write((1, 2, 3))
+    line = ("batch", "model.gltf", "--out", "rows.jsonl")
+    assert run(*line)[0] == 0
+    assert "1 done before" in run(*line)[1]
+    write((1, 2, 2))
+    assert "done before" not in run(*line)[1]
+    assert [row["point_group"] for row in rows("rows.jsonl")] == ["D2h", "D4h"]
+
+
 # --- who does them ----------------------------------------------------------------------------------------------------
 
 

@@ -19,7 +19,7 @@ from symrefine.fleet.cluster import Dask
 from symrefine.fleet.crew import HERE, Executor, Processes, on_this_machine
 from symrefine.fleet.journal import opened
 from symrefine.fleet.limits import Limits, Lost
-from symrefine.fleet.shard import Shard, Whole, merged
+from symrefine.fleet.shard import Shard, Whole, merged, piece
 from symrefine.fleet.table import csv_text, flat, write_table
 from symrefine.fleet.tasks import finish, is_final
 
@@ -243,6 +243,22 @@ def test_of_several_rows_of_a_task_in_one_part_the_last_counts() -> None:
     found = parts(4, 2)
     found["p1"].append(found["p1"][0] | {"i": 99})
     assert sum(row["i"] == 99 for row in merged(found)) == 1
+
+
+def test_a_task_of_several_rows_is_whole_with_all_of_them() -> None:
+    whole, shard = Whole.of(2, "x"), Shard(number=1, of=1)
+
+    def rows(index: int, pieces: int, i: int) -> list[dict[str, Any]]:
+        return [{"i": i + k, "part": piece(whole.mark(shard, index)["part"], k, pieces)} for k in range(pieces)]
+
+    single = {"i": 9} | whole.mark(shard, 0)
+    assert merged({"p": [*rows(1, 3, 20)[::-1], single]}) == [{"i": 9}, {"i": 20}, {"i": 21}, {"i": 22}]
+    # Done again, when the file held two.
+    assert merged({"p": [*rows(1, 3, 20), single, *rows(1, 2, 30)]}) == [{"i": 9}, {"i": 30}, {"i": 31}]
+    with pytest.raises(InputError, match="shard 1/1 is not complete: 1 of its 2 tasks"):
+        merged({"p": [single, *rows(1, 3, 20)[1:]]})
+    with pytest.raises(InputError, match="p: is damaged"):
+        merged({"p": [{"part": piece(whole.mark(shard, 0)["part"], 3, 3)}]})
 
 
 @pytest.mark.parametrize(

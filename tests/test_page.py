@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial import cKDTree
 
 from experiments.objects.damage import cut
@@ -25,12 +26,13 @@ from symrefine.picture import words
 from symrefine.picture.draw import Found
 from symrefine.picture.rows import found_rows
 from symrefine.plane import detect_planar
-from symrefine.report import write_html
+from symrefine.report import model, write_html
 from symrefine.report.charts import bar_chart, decision_chart, line_chart
 from symrefine.report.markup import island, plain
 from symrefine.report.mesh import simplified, subdivided
 from symrefine.report.page import html_page
 from symrefine.shape import Shape
+from symrefine.texture import Texture
 
 Case = tuple[Detection, Shape]
 Pages = Callable[[Case], str]
@@ -329,6 +331,29 @@ def test_the_model_misses_by_what_its_image_is_away(shapeless: Case, pages: Page
         off = np.abs(np.minimum(away, model["limit"]) - own)
         assert off.mean() < 0.002
         assert np.quantile(off, 0.95) < 0.01
+
+
+@pytest.mark.parametrize("most", [model.MOST_TRIANGLES, 200])
+def test_the_model_shows_the_texture(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A brick, red above its middle and white below it, whether all of its triangles are shown or a few."""
+    monkeypatch.setattr(model, "MOST_TRIANGLES", most)
+    brick = trimesh.creation.box((1, 1.5, 2)).subdivide().subdivide().subdivide()
+    corners = brick.vertices[brick.faces]
+    painted = Texture(
+        images=(np.repeat(np.array([[[200, 30, 40]], [[250, 250, 250]]], dtype=np.uint8), 64, axis=0),),
+        uv=np.stack([0.0 * corners[:, :, 2], 0.5 + 0.49 * corners[:, :, 2]], axis=2),
+        image=np.zeros(len(corners), dtype=int),
+        plain=np.zeros((len(corners), 3)),
+    )
+    shape = Shape(points=brick.vertices, faces=brick.faces, texture=painted)
+    made = data_of(html_page(detect(shape), shape))["object"]
+    assert sorted(made["palette"]) == [[200, 30, 40], [250, 250, 250]]
+    heights = unpacked(made["positions"], "<u2").reshape(-1, 3)[:, 2] * made["step"] + made["low"][2]
+    middles = heights[unpacked(made["faces"], "<u2").reshape(-1, 3)].mean(axis=1)
+    clear = np.abs(middles) > 0.05
+    assert clear.sum() > 50
+    red = np.array(made["palette"])[unpacked(made["colours"], "u1"), 1] == 30
+    assert np.array_equal(red[clear], middles[clear] > 0.0)
 
 
 def test_atoms_have_one_miss_each(atoms: Case, pages: Pages) -> None:

@@ -110,6 +110,8 @@ def test_what_is_chosen_is_shown(tab: Tab, page: str, tmp_path: Path) -> None:
     tab.ask("((m) => { m.value = 0.5; m.dispatchEvent(new Event('input')); })(document.getElementById('morph'))")
     tab.settle()
     assert changed(tab.picture(), before, box) > 0.01
+    left, top, right, bottom = box
+    assert tab.picture()[top:bottom, left:right].max(axis=2).min() > 0.1, "what is flat half-way is lit"
     tab.key("Escape")
     assert not pressed(tab)
     assert tab.ask("document.getElementById('card').hidden")

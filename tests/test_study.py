@@ -346,6 +346,19 @@ def test_claims_are_judged(make: Make, lab: Path) -> None:
     assert [r["met"] for r in rows_of(lab / "out", "claims.csv")] == ["false", "true"]
 
 
+@pytest.mark.parametrize(
+    ("said", "total", "told"),
+    [
+        (">= 100", 12, "all"), (">= 95", 12, "all"), (">= 95", 40, "at least 38 of 40"), ("== 0", 5, "none"),
+        ("<= 25", 8, "at most 2 of 8"), ("40 to 60", 10, "4 to 6 of 10"), ("== 50", 4, "2 of 4"),
+        ("== 50", 3, "== 50 %"),
+        (">= 95", None, ">= 95"), ("== C4v", None, "== C4v"),
+    ],
+)  # fmt: skip
+def test_what_is_expected_of_counts_is_told_in_counts(said: str, total: int | None, told: str) -> None:
+    assert Expectation.read(Node(value=said, place="x", path="expect")).of(total) == told
+
+
 def test_failed_runs_become_rows_and_miss_claims(make: Make, lab: Path) -> None:
     for broken, message in (("refused", "no luck"), ("bug", "internal error: ZeroDivisionError: oops")):
         outcome = run_study(

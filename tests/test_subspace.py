@@ -130,7 +130,7 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert invoke(["detect", str(path)]) == 0
     shown = capsys.readouterr().out
     assert f"{path}: 1 hyperplane of symmetry in 4 dimensions" in shown
-    assert "their reflections generate a group of order 2" in shown
+    assert "its reflection generates a group of order 2" in shown
     assert "there may be more" not in shown
     assert invoke(["detect", str(path), "--json", "-"]) == 0
     record = json.loads(capsys.readouterr().out)

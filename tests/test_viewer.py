@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 from experiments.objects import damage
 from experiments.objects.shapes import asymmetric, bottle, sample, stool, table
@@ -20,7 +21,7 @@ from symrefine.errors import InputError, SymrefineError
 from symrefine.geometry import rotation, unit
 from symrefine.picture.scene import make_scene
 from symrefine.shape import Shape
-from symrefine.viewer import open_recording, opening, record, serve_recording
+from symrefine.viewer import open_recording, opening, record, recording, serve_recording
 
 Case = tuple[Detection, Shape, Path]
 
@@ -313,3 +314,45 @@ def test_opening_leaves_the_viewer_alone(shapeless: Case, monkeypatch: pytest.Mo
     open_recording(shapeless[2])
     assert started[0][-1] == str(shapeless[2])
     assert "127.0.0.1" in started[0]
+
+
+SHOWN = """
+import symrefine
+found = symrefine.detect("box.ply")
+found.show()
+"""
+# What a browser would be sent once it has loaded the viewer: no test has one that runs notebooks.
+WAITING = """
+from ipywidgets.widgets.widget import _instances
+from rerun_notebook import Viewer
+viewers = [widget for widget in _instances.values() if isinstance(widget, Viewer)]
+parts = [bytes(part) for viewer in viewers for _, buffers in viewer._event_queue for part in buffers or []]
+print(len(viewers), {part[:4].decode() for part in parts}, sum(map(len, parts)) > 100_000)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")  # those of Jupyter's packages about one another
+def test_a_notebook_shows_the_recording_inline(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    nbformat, client = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    pytest.importorskip("rerun_notebook")
+    pytest.importorskip("ipykernel")
+    trimesh.creation.box((1, 2, 3)).export(tmp_path / "box.ply")
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[1]))
+    monkeypatch.delenv("DISPLAY", raising=False)
+    made = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(text) for text in (SHOWN, WAITING)])
+    at = {"metadata": {"path": str(tmp_path)}}
+    client.NotebookClient(made, timeout=120, kernel_name="python3", resources=at).execute()
+    shown, waiting = ([*cell.outputs] for cell in made.cells)
+    assert "application/vnd.jupyter.widget-view+json" in shown[-1].data
+    assert "rerun_notebook.Viewer" in shown[-1].data["text/plain"]
+    assert waiting[0].text == "1 {'RRF2'} True\n"
+
+
+def test_a_notebook_without_its_half_of_rerun_says_what_to_install(
+    shapeless: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recording, "find_spec", lambda _: None)
+    with pytest.raises(SymrefineError, match=r'pip install "symrefine\[notebook\]"'):
+        recording.show_inline(*shapeless[:2])

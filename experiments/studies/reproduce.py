@@ -19,7 +19,6 @@ from symrefine.errors import InputError, SymrefineError
 if TYPE_CHECKING:
     from symrefine.study.claims import Verdict
     from symrefine.study.runner import Outcome
-    from symrefine.study.schema import Claim
 
 HOME = Path(__file__).parents[2]
 CONFIG = HOME / "configs" / "reproduce.yaml"
@@ -169,17 +168,9 @@ def main_table(verdicts: Sequence["Verdict"]) -> str:
         unit = f" {claim.unit}" if claim.unit else ""
         others = [f"{name} {p.text}{unit if p.text != EMPTY else ''}" for name, p in verdict.peers.items()]
         paper = claim.paper if isinstance(claim.paper, str) else short(claim.paper) + unit
-        missed = f"<br>missed: {_expected(claim)} expected" if verdict.met is False else ""
+        missed = f"<br>missed: {verdict.expected} expected" if verdict.met is False else ""
         lines.append([claim.claim, paper, f"**{verdict.ours.text}{unit}**{missed}", "<br>".join(others)])
     return grid(["", "paper", "symrefine", "others, same data, same judge"], lines)
-
-
-def _expected(claim: "Claim") -> str:
-    """What is expected, in words where runs are counted: what counts are held against is their share in percent."""
-    said = claim.expect.said
-    if claim.value.how != "tally":
-        return said
-    return "all" if said == ">= 100" else f"{said} %"
 
 
 def misses(parts: Sequence[Part]) -> str:
@@ -199,7 +190,7 @@ def _miss(verdict: "Verdict") -> str:
     claim = verdict.claim
     unit = f" {claim.unit}" if claim.unit else ""
     note = f" ({claim.note})" if claim.note else ""
-    return f"{claim.claim}: ours {verdict.ours.text}{unit}, expected {_expected(claim)}; paper: {claim.paper}{note}"
+    return f"{claim.claim}: ours {verdict.ours.text}{unit}, expected {verdict.expected}; paper: {claim.paper}{note}"
 
 
 def _chapter(part: Part) -> str:

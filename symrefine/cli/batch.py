@@ -17,7 +17,7 @@ from symrefine.cli.outputs import (
     print_lines,
     write_all,
 )
-from symrefine.cli.signs import progress
+from symrefine.cli.signs import counting
 from symrefine.cli.values import (
     add_class_options,
     add_detection_options,
@@ -39,10 +39,10 @@ DESCRIPTION = (
     "Detect the symmetries of every mesh and cloud that PATH or a manifest names and print a line for each as soon as "
     "it is done. PATH is a directory, a file, a pattern, or an address that fsspec knows (s3://bucket/models/; needs "
     "the extra remote). With --out, also append a JSON row for each; run again, files whose content and options have a "
-    "row are not done again. A file that cannot be used gives a row with its error, the others go on, and the exit "
-    "status is 1. --workers, --dask and --shard change the order of the rows, but no row. With --bop, files are named "
-    "as BOP names models, obj_000001.ply for object 1, or numbered by the ids of the manifest, and one "
-    "models_info.json holds all of them."
+    "row are not done again. A file of several molecules, models or volumes gives a row for each, called FILE#0 and so "
+    "on. A file that cannot be used gives a row with its error, the others go on, and the exit status is 1. --workers, "
+    "--dask and --shard change the order of the rows, but no row. With --bop, files are named as BOP names models, "
+    "obj_000001.ply for object 1, or numbered by the ids of the manifest, and one models_info.json holds all of them."
 )
 # What tells an object of BOP in a manifest.
 _BOP_ID = re.compile(r"[0-9]{1,9}")
@@ -66,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--recursive", action="store_true", help="directories inside directories too")
     add_fleet_options(parser, "file")
     add_class_options(parser)
-    add_frame_option(parser)
+    add_frame_option(parser, otherwise="each of them; with --bop there has to be one")
     add_scan_options(parser)
     add_detection_options(parser)
 
@@ -78,26 +78,31 @@ def run(args: argparse.Namespace) -> int:
     one_thread_each()  # before anything heavy is imported
     jobs, numbers = _jobs(args)
     does = executor(args)
-    from symrefine.cli.objects import detected, holds
+    from symrefine.cli.objects import detected, holds, known_apart
     from symrefine.cli.rows import ROW_HEAD, row_line
 
     with opened(Path(args.out)) if args.out else nullcontext() as out:
         if out and out.torn:
             note(f"{args.out}: the last row is incomplete; it is removed and done again")
         before = {row["file"]: row for row in out.rows} if out else {}
-        rows = {job.name: before[job.name] for job in jobs if holds(before.get(job.name), job, does.limits)}
-        new = [job for job in jobs if job.name not in rows]
-        print_lines([ROW_HEAD, *(row_line(name, row) for name, row in rows.items())])
-        with progress("detecting", len(jobs), len(rows)) as advance:
-            for job, row in detected(new, does, out):
-                rows[job.name] = row
+        known = known_apart(jobs, before, does.limits)
+        done = [(job, before[job.name]) for job in known if holds(before.get(job.name), job, does.limits)]
+        kept = {job.name for job, _ in done}
+        print_lines([ROW_HEAD, *(row_line(job.name, row) for job, row in done)])
+        with counting("detecting", len(known), len(done)) as doing:
+            new = [job for job in known if job.name not in kept]
+            for job, row in detected(new, does, out, expect=doing.expect):
+                done.append((job, row))
                 _show(row)
-                advance()
-    kept, failed = len(jobs) - len(new), sum(row["error"] is not None for row in rows.values())
-    parts = [f"{len(jobs)} files", f"{kept} done before" if kept else "", f"{failed} failed" if failed else ""]
+                doing.advance()
+    order = {job.name: place for place, job in enumerate(jobs)}
+    rows = [row for _, row in sorted(done, key=lambda one: (order[one[0].whole], one[0].frame or 0))]
+    failed = sum(row["error"] is not None for row in rows)
+    parts = [f"{len(jobs)} files", f"{len(rows)} objects" if len(rows) > len(jobs) else ""]
+    parts += [f"{len(kept)} done before" if kept else "", f"{failed} failed" if failed else ""]
     print_lines([", ".join(part for part in parts if part)])
-    write_rows(args.table, [rows[job.name] for job in jobs])
-    left_out = _write_bop(args, rows, numbers) if args.bop else 0
+    write_rows(args.table, rows)
+    left_out = _write_bop(args, {row["file"]: row for row in rows}, numbers) if args.bop else 0
     return int(left_out > 0 or failed > 0)
 
 

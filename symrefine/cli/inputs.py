@@ -67,12 +67,12 @@ def readable(name: str, suffix: str | None) -> Iterator[str]:
         file = Path(folder, NAME).with_suffix(_known_suffix(suffix))
         with file.open("wb") as copy:
             shutil.copyfileobj(sys.stdin.buffer, copy)
-        with _called(str(file), NAME):
+        with told_as(str(file), NAME):
             yield str(file)
 
 
 @contextmanager
-def _called(file: str, name: str) -> Iterator[None]:
+def told_as(file: str, name: str) -> Iterator[None]:
     """Tell what is wrong with a file under another name."""
     try:
         yield
@@ -156,7 +156,7 @@ def _objects_in(file: str, called: str, read: Callable[[str], Any]) -> Iterator[
 def _made(frames: Any, number: int, file: str, called: str) -> "Shape | Stream | Exception":
     """One of the shapes in a file, under the name that people call that, or why there is none."""
     try:
-        with _called(file, called):
+        with told_as(file, called):
             shape = frames[number]
         return shape if called == file else replace(shape, source=shape.source.replace(file, called))
     except Exception as error:  # noqa: BLE001 - one object must not end the others

@@ -7,7 +7,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from symrefine.cli.streams import aside
+from symrefine.cli.streams import aside, check_stdout
 from symrefine.errors import InputError, one_line, printable
 from symrefine.files import Writer, check_target, json_text, text_writer
 from symrefine.files import write_all as write_all
@@ -31,7 +31,10 @@ def check_outputs(outputs: dict[str, str | None], inputs: list[Path]) -> None:
     """
     taken = {path.resolve(): "the input" for path in inputs}
     for option, name in outputs.items():
-        if name is None or (option == "--json" and name == STDOUT):
+        if option == "--json" and name == STDOUT:
+            check_stdout()
+            continue
+        if name is None:
             continue
         path = Path(name)
         if name != STDOUT:
@@ -110,7 +113,12 @@ def print_lines(lines: Iterable[Any]) -> None:
 
 
 def say(text: str) -> None:
-    """Write to stdout as it stands."""
+    """Write to stdout, as it stands, what was asked to be there.
+
+    Raises:
+        InputError: stdout is closed.
+    """
+    check_stdout()
     sys.stdout.write(text)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from symrefine.cli.fleet import add_fleet_options, check_table_option, executor, write_rows
-from symrefine.cli.outputs import check_outputs, complain, is_quiet, note, print_lines, say, say_lines
+from symrefine.cli.outputs import check_outputs, complain, is_quiet, note, print_lines, say_lines
 from symrefine.cli.signs import progress
 from symrefine.cli.values import count
 from symrefine.errors import InputError
@@ -72,8 +72,7 @@ def run(args: argparse.Namespace) -> int:
             replace=args.replace,
             progress=progress,
         )
-    if outcome.tables and not is_quiet():
-        say(outcome.tables + "\n")
+    print_lines(outcome.tables.split("\n") if outcome.tables else [])
     for row in [row for row in outcome.rows if row["error"] is not None][:5]:
         (complain if is_quiet() else note)(f"a run failed: {row['error']}")
     parts = [f"{len(outcome.rows)} runs", f"{outcome.resumed} done before" if outcome.resumed else ""]

@@ -203,7 +203,9 @@ def hyperplane_lines(record: Record) -> Iterator[Table | str]:
     yield f"{record['source']}: {f'undetermined: {doubt}' if doubt else f'{told} in {dim} dimensions'}"
     order = record["reflection_group_order"]
     if found and order is not None:
-        yield f"their reflections generate a group of order {order}"
+        from symrefine.picture.words import generated
+
+        yield generated(len(found), order)
     if record["incomplete"]:
         yield f"there may be more: {record['incomplete']}"
     yield f"n-tuples of rank {record['ntuples']['rank']}; turns are not looked for in {dim} dimensions"

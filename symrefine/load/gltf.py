@@ -7,6 +7,7 @@ from typing import Any
 from urllib.parse import unquote
 
 from symrefine.errors import InputError
+from symrefine.files import ask
 from symrefine.load.content import Content
 from symrefine.load.scene import flattened
 from symrefine.load.text import shorten
@@ -45,6 +46,8 @@ def read_gltf(data: bytes, path: Path, *, texture: bool = False) -> Content:
 def _read(data: bytes, text: bytes, kind: str, path: Path, *, texture: bool) -> Content:
     tree = _parse(text)
     _check_tree(tree)
+    for name in _beside(tree, "buffers", *(["images"] if texture else [])):
+        ask(path.parent / name)
     if texture:
         _check_textures(tree, path.parent)
     import trimesh  # here, for it takes half a second
@@ -120,6 +123,12 @@ def _referred(tree: Json, key: str, number: Any, what: str) -> Json:
     if not _is_whole(number, 0) or number >= len(things):
         raise InputError(f"{what} {number!r}; expected one of {len(things)} {key}")
     return things[number]
+
+
+def _beside(tree: Json, *kinds: str) -> list[str]:
+    """Names of the files that a text refers to; others of these kinds lie in it."""
+    uris = [thing.get("uri") for kind in kinds for thing in _objects(tree, kind)]
+    return [unquote(uri) for uri in uris if isinstance(uri, str) and not uri.startswith("data:")]
 
 
 def _check_textures(tree: Json, folder: Path) -> None:

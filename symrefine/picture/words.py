@@ -96,8 +96,15 @@ def subspace_headline(detection: SubspaceDetection) -> str:
     if not number:
         return f"None: no hyperplane of symmetry in {dim} dimensions"
     order = detection.reflection_group_order
-    group = "" if order is None else f"; their reflections generate a group of order {order:,}"
+    group = "" if order is None else f"; {generated(number, order)}"
     return f"{number}: {'hyperplane' if number == 1 else 'hyperplanes'} of symmetry in {dim} dimensions{group}"
+
+
+def generated(hyperplanes: int, order: int) -> str:
+    """What the reflections in some hyperplanes generate."""
+    return (
+        f"{'its reflection generates' if hyperplanes == 1 else 'their reflections generate'} a group of order {order:,}"
+    )
 
 
 def symbol(name: str) -> str:

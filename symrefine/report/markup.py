@@ -87,7 +87,7 @@ def table(heads: Iterable[str], rows: Sequence[Sequence[str]], *, caption: str) 
 
 def facts(pairs: Iterable[tuple[str, str]]) -> str:
     """Names with values, side by side."""
-    items = "".join(f"<div><dt>{plain(name)}</dt><dd>{plain(value)}</dd></div>" for name, value in pairs)
+    items = "".join(f"<div><dt>{plain(name)}</dt><dd>{prose(value)}</dd></div>" for name, value in pairs)
     return f"<dl>{items}</dl>"
 
 

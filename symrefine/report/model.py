@@ -17,16 +17,19 @@ from symrefine.report.elements import Element
 from symrefine.report.mesh import simplified, subdivided
 from symrefine.shape import Index, Shape
 from symrefine.surface.tree import Tree
+from symrefine.texture import corner_weights
 
 # Of the page, which is to stay below 3 MB: triangles, points, and misses (vertices times elements) that it carries.
 MOST_TRIANGLES, MOST_POINTS, MOST_MISSES = 40_000, 24_000, 700_000
-# Longest edge of a triangle in diagonals: finer than most details that count.
-EDGE = 1.0 / 60.0
+# Longest edge of a triangle in diagonals: finer than most details that count, and than letters on a can.
+EDGE, EDGE_TEXTURED = 1.0 / 60.0, 1.0 / 120.0
 # Steps of a position along the longest side, and of a miss; the last of these means that nobody looked there.
 POSITIONS, MISSES, UNSEEN = 65535, 250, 255
 # The deepest colour stands for so many tolerances: what no symmetry may miss by anywhere, and a little more.
 DEEPEST = 2.0
 FOV_RAD = np.radians(26.0)
+# Of a palette that a byte points into.
+COLOURS = 256
 # Directions in which the outermost points are looked for.
 OUTLINE = 200
 
@@ -86,10 +89,31 @@ def _mesh(surface: Surface, scene: Scene, most: int) -> dict[str, Any]:
     diagonal = scene.stage.diagonal
     assert surface.faces is not None
     points, faces = simplified(surface.points, surface.faces, most)
-    colours = surface.colours if len(faces) == len(surface.faces) else np.tile(surface.colours[:1], (len(faces), 1))
-    points, faces, owner = subdivided(points, faces, EDGE * diagonal, max(most, len(faces) + 1))
+    is_whole = len(faces) == len(surface.faces)
+    colours = surface.colours if is_whole else np.tile(surface.colours[:1], (len(faces), 1))
+    edge = EDGE if surface.texture is None else EDGE_TEXTURED
+    points, faces, owner = subdivided(points, faces, edge * diagonal, max(most, len(faces) + 1))
     points, faces, kept = _joined(points, faces, diagonal)
-    return _solid(points, faces, colours[owner[kept]], diagonal)
+    if surface.texture is None:
+        return _solid(points, faces, colours[owner[kept]], diagonal)
+    middles = points[faces].mean(axis=1)
+    if is_whole:
+        return _solid(points, faces, _textured(surface, middles, owner[kept]), diagonal)
+    # Triangles that were simplified are small: that of the object which is nearest shows what they do.
+    near = Tree(surface.points[surface.faces].mean(axis=1)).nearest(middles)[1]
+    return _solid(points, faces, _textured(surface, middles, near), diagonal)
+
+
+def _textured(surface: Surface, places: Array, triangles: Index) -> Array:
+    """Colours [N, 3], 0 to 1, of places on triangles [N] of a surface with a texture, `COLOURS` of them at most."""
+    from PIL import Image
+
+    assert surface.texture is not None
+    assert surface.faces is not None
+    weights = corner_weights(places, surface.points[surface.faces[triangles]])
+    colours = surface.texture.colours(triangles, weights).round().astype(np.uint8)
+    few = Image.fromarray(colours[None]).quantize(COLOURS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    return np.asarray(few.convert("RGB"), dtype=np.float64)[0] / 255.0
 
 
 def _balls(surface: Surface, scene: Scene) -> dict[str, Any]:

@@ -108,7 +108,7 @@ def _hyperplanes(title: str, listed: Sequence[Hyperplane], first: int, diameter:
         )
     told = "Asymmetry and noise in % of the moments, the largest miss in % of the diameter."
     heads = ("", "normal", "offset", "asymmetry", "noise", "largest miss", "matrix")
-    return section(title, told, table(heads, rows, caption=title))
+    return section(title, told, f'<div class="hyper">{table(heads, rows, caption=title)}</div>')
 
 
 def _tuples(d: SubspaceDetection) -> str:

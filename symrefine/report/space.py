@@ -93,7 +93,7 @@ def _hint(d: Detection, elements: Sequence[Element], left_out: str) -> str:
 
 
 def _facts(d: Detection, shape: Shape) -> str:
-    kind = f"{len(shape.points):,} points"
+    kind = f"{len(shape.points):,} {'atoms' if shape.elements else 'points'}"
     if shape.faces is not None:
         kind = f"{len(shape.faces):,} triangles, {shape.measure}"
     pairs = [
@@ -107,7 +107,7 @@ def _facts(d: Detection, shape: Shape) -> str:
         sure = "" if d.textured.undetermined else f", {d.textured.confidence:.2f}"
         pairs.append(("With its texture", f"{symbol(d.textured.point_group)}{sure}"))
     if said := scanned(d):
-        pairs.append(("Scan", said))
+        pairs.append(("Scan" if d.exact is None else "Vertices", said))
     return facts(pairs)
 
 
@@ -185,7 +185,7 @@ def _decision(d: Detection) -> str:
     if any(a.forgiven for a in d.alternatives):
         told += ", the miss of its worst element that would have to be forgiven"
     if d.staircase:
-        told += ", and the tolerances (in % of the diagonal) at which it is the answer: an exact symmetry stands at all"
+        told += ", and the tolerances (in % of the diagonal) at which it is the answer: at all of them, if it is exact"
     steps = [(s.tolerance, "undetermined" if s.undetermined else s.point_group) for s in d.staircase]
     own = [] if d.undetermined else [(d.point_group, d.confidence, 0.0)]
     others = [(a.point_group, a.probability, a.forgiven) for a in d.alternatives]

@@ -22,6 +22,11 @@ class Verdict:
     peers: dict[str, Summary]
     met: bool | None
 
+    @property
+    def expected(self) -> str:
+        """What ours should be, counted as ours is."""
+        return self.claim.expect.of(self.ours.total)
+
 
 def judge(claim: Claim, rows: Sequence[Row], experiment: Experiment) -> Verdict:
     """Our figure and those of others, and whether ours is as expected; a failed run of ours is a miss."""
@@ -65,7 +70,7 @@ def claims_table(verdicts: Sequence[Verdict], *, source: bool = True) -> str:
 def _line(verdict: Verdict, peers: Sequence[str], *, source: bool) -> list[str]:
     claim = verdict.claim
     figures = [verdict.peers[name].text if name in verdict.peers else "" for name in peers]
-    word = "" if verdict.met is None else f"{'yes' if verdict.met else '**no**'} ({claim.expect.said})"
+    word = "" if verdict.met is None else f"{'yes' if verdict.met else '**no**'} ({verdict.expected})"
     unit = f" {claim.unit}" if claim.unit else ""
     shown = [text + unit if text not in ("", EMPTY) else text for text in (verdict.ours.text, *figures)]
     paper = claim.paper if isinstance(claim.paper, str) else short(claim.paper) + unit

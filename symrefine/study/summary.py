@@ -50,10 +50,14 @@ class Measure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Summary:
-    """A figure as text, and the values it stands for: one, or the ends of a range; none for no rows."""
+    """A figure as text, and the values it stands for: one, or the ends of a range; none for no rows.
+
+    `total` is how many rows were counted, where the text tells a count; its value is the share in percent.
+    """
 
     text: str
     values: tuple[Scalar, ...]
+    total: int | None = None
 
 
 def summarise(rows: Sequence[Row], measure: Measure) -> Summary:
@@ -72,7 +76,7 @@ def summarise(rows: Sequence[Row], measure: Measure) -> Summary:
         raise measure.node.error(f"{measure.column} is text, such as {values[0]!r}; {measure.how} takes numbers")
     figure = float(_NUMBERS[measure.how](numbers))
     if measure.how == "tally":
-        return Summary(text=f"{sum(numbers):.0f} of {len(numbers)}", values=(figure,))
+        return Summary(text=f"{sum(numbers):.0f} of {len(numbers)}", values=(figure,), total=len(numbers))
     return Summary(text=short(figure) + (" %" if measure.how == "share" else ""), values=(figure,))
 
 
@@ -146,6 +150,20 @@ class Expectation:
     def holds(self, summary: Summary) -> bool:
         """Whether every value of the summary satisfies it; without values nothing does."""
         return bool(summary.values) and all(self._fits(v) for v in summary.values)
+
+    def of(self, total: int | None) -> str:
+        """What is expected, in counts where a number of rows is counted: "all", "at least 9 of 12"."""
+        if total is None or self.text:
+            return self.said
+        counts = [k for k in range(total + 1) if self._fits(100.0 * k / total)]
+        if not counts or counts != [*range(counts[0], counts[-1] + 1)]:
+            return f"{self.said} %"
+        least, most = counts[0], counts[-1]
+        if least == most:
+            return "all" if least == total else "none" if least == 0 else f"{least} of {total}"
+        if most == total:
+            return f"at least {least} of {total}"
+        return f"at most {most} of {total}" if least == 0 else f"{least} to {most} of {total}"
 
     def _fits(self, value: Scalar) -> bool:
         if self.text:

@@ -60,7 +60,7 @@ def show_inline(detection: Detection, shape: Shape) -> None:
         SymrefineError: the notebook's half of rerun is not installed.
     """
     if find_spec("rerun_notebook") is None:
-        raise SymrefineError("a notebook shows recordings by another package: pip install 'rerun-sdk[notebook]'")
+        raise SymrefineError('a notebook shows recordings by another package: pip install "symrefine[notebook]"')
     scene, stream = make_scene(detection, shape), _stream(detection, shape)
     _log(stream, detection, shape, scene)
     stream.notebook_show(blueprint=blueprint(detection, scene, display_scale(scene)))

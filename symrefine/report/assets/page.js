@@ -51,7 +51,7 @@
     if (chosen < 0) return;
     const element = data.elements[chosen];
     byId("chosen").textContent = element.title;
-    byId("told").textContent = element.told;
+    byId("told").textContent = element.told.replaceAll(" %", "\u00a0%");
     byId("copy").hidden = element.matrix === null;
     started = animated && !still.matches ? performance.now() : -DURATION_MS;
     requestAnimationFrame(advance);
@@ -219,12 +219,14 @@
   /** The map of an element a share of the way from doing nothing: flattening onto a mirror, turning about an axis. */
   function partial({ kind, axis, point, angle }, share) {
     const place = new THREE.Vector3(...point), u = new THREE.Vector3(...axis);
+    // From 1 to -1. Half-way nothing would be left that light falls on: it stays a little thick.
+    const left = (t) => (Math.abs(1 - 2 * t) < 0.02 ? 0.02 : 1 - 2 * t);
     const flatten = (t) => {
-      const [x, y, z] = axis;
+      const [x, y, z] = axis, s = left(t) - 1;
       return new THREE.Matrix4().set(
-        1 - 2 * t * x * x, -2 * t * x * y, -2 * t * x * z, 0,
-        -2 * t * y * x, 1 - 2 * t * y * y, -2 * t * y * z, 0,
-        -2 * t * z * x, -2 * t * z * y, 1 - 2 * t * z * z, 0,
+        1 + s * x * x, s * x * y, s * x * z, 0,
+        s * y * x, 1 + s * y * y, s * y * z, 0,
+        s * z * x, s * z * y, 1 + s * z * z, 0,
         0, 0, 0, 1);
     };
     const turn = (t) => new THREE.Matrix4().makeRotationAxis(u, t * angle);
@@ -232,7 +234,7 @@
       plane: () => flatten(share),
       axis: () => turn(share),
       improper: () => flatten(Math.max(0, 2 * share - 1)).multiply(turn(Math.min(1, 2 * share))),
-      inversion: () => new THREE.Matrix4().makeScale(1 - 2 * share, 1 - 2 * share, 1 - 2 * share),
+      inversion: () => new THREE.Matrix4().makeScale(left(share), left(share), left(share)),
     };
     const back = new THREE.Matrix4().makeTranslation(place.clone().negate());
     return new THREE.Matrix4().makeTranslation(place).multiply(maps[kind]()).multiply(back);
