@@ -15,13 +15,14 @@ import pytest
 
 import symrefine
 from symrefine.cli import batch, invoke, objects, values
-from symrefine.cli.rows import ROW_HEAD, row_line
+from symrefine.cli.rows import MAP_HEAD, ROW_HEAD, row_line
 from symrefine.cli.tables import detection_lines, headline
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.files import naming, whole
 from symrefine.fleet.journal import Journal, Row
 from symrefine.geometry import random_orthogonal
+from symrefine.groups.orthogonal import turn_rad
 from symrefine.ntuples import notation
 from symrefine.ntuples.affine import derive_affine
 from symrefine.ntuples.derive import derive
@@ -204,7 +205,9 @@ def test_the_tolerance_of_the_command_line_is_that_of_detect() -> None:
         ("detect", "PATH"),
         ("detect box.ply --frobnicate", "--frobnicate"),
         ("detect box.ply --tol 0.1", "--tol"),
-        ("align box.ply scalene.ply cloud.xyz", "unknown argument: cloud.xyz"),
+        ("align box.ply -", "-: align reads files"),
+        ("align nothing.ply box.ply scalene.ply", "nothing.ply: no such file"),
+        ("align box.ply *.nothing", "no file matches this pattern"),
         ("detect nothing.ply", "nothing.ply: no such file"),
         ("detect .", "is a directory"),
         ("detect box.json", "unknown suffix"),
@@ -516,6 +519,47 @@ def test_align_does_not_tell_a_misfit_as_an_answer(
     found = json.loads((tmp_path / "a.json").read_text())
     assert found["misfit"] is True
     assert {"status", "matrix", "sigma_rad", "exact", "observable"} <= set(found)
+
+
+def registry() -> Any:
+    """The schemas, each under its name."""
+    from referencing import Registry, Resource
+
+    folder = Path(symrefine.__file__).parent / "schema"
+    every = [Resource.from_contents(json.loads(path.read_text())) for path in folder.glob("*.json")]
+    return Registry().with_resources([(str(resource.id()), resource) for resource in every])
+
+
+def test_align_takes_several_targets(run: Run, data: Path, tmp_path: Path) -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    matrix = random_orthogonal(np.random.default_rng(4), det=-1)
+    (tmp_path / "turned.ply").write_text(ply(np.array(SCALENE) @ matrix.T + [3.0, 4.0, 5.0], SCALENE_SIDES))
+    (tmp_path / "other.ply").write_text(ply([[0, 0, 0], [6, 3, 0], [1, -3, 1], [3, 1, 3]], SCALENE_SIDES))
+    targets = [tmp_path / "turned.ply", tmp_path / "none.ply", tmp_path / "other.ply"]
+    status, out, err = run("align", data / "scalene.ply", *targets)
+    assert (status, err) == (2, "")
+    head, turned, missing, other = out.splitlines()
+    assert head == MAP_HEAD
+    assert all(row.index(str(tmp_path)) == head.index("target") for row in (turned, other))
+    assert turned.split()[:4] == ["ok", "1.00", "-1", f"{np.degrees(turn_rad(matrix)):.2f}"]
+    assert missing == f"failed: {tmp_path / 'none.ply'}: no such file"
+    assert other.split()[0] == "misfit"
+    assert other.endswith("of the diagonal"), "the reason"
+    status, out, err = run("align", data / "scalene.ply", *targets, "--json", "-")
+    assert (status, err) == (2, f"symrefine: {tmp_path / 'none.ply'}: no such file\n")
+    found = json.loads(out, parse_constant=not_json)
+    rule = json.loads((Path(symrefine.__file__).parent / "schema" / "alignments.schema.json").read_text())
+    jsonschema.Draft202012Validator(rule, registry=registry()).validate(found)
+    assert set(found[1]) == {"source", "target", "error"}
+    alone = json.loads(run("align", data / "scalene.ply", targets[0], "--json", "-")[1])
+    assert found[0] | {"timings": 0} == alone | {"timings": 0}
+
+
+def test_align_strict_ends_with_a_status_of_its_own(run: Run, data: Path, tmp_path: Path) -> None:
+    (tmp_path / "other.ply").write_text(ply([[0, 0, 0], [6, 3, 0], [1, -3, 1], [3, 1, 3]], SCALENE_SIDES))
+    one, other = data / "scalene.ply", tmp_path / "other.ply"
+    targets = {(one,): 0, (other,): 3, (one, one): 0, (one, other): 3, (other, tmp_path / "none.ply"): 2}
+    assert {names: run("align", one, *names, "--strict")[0] for names in targets} == targets
 
 
 # --- derive -----------------------------------------------------------------------------------------------------------

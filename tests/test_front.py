@@ -292,7 +292,9 @@ def test_a_schema_refuses_what_is_no_such_record(found):
 
 
 def test_schemas_are_schemas():
-    for name in ("detection", "detection2d", "detection_nd", "alignment", "symmetrized", "completed", "info"):
+    for name in (
+        "detection", "detection2d", "detection_nd", "alignment", "alignments", "symmetrized", "completed", "info",
+    ):  # fmt: skip
         jsonschema.Draft202012Validator.check_schema(schema(name))
 
 
@@ -449,6 +451,31 @@ def test_an_alignment_says_how_sure_it_is(found):
     assert unlike.status != "ok"
 
 
+def test_one_object_is_aligned_with_several(tmp_path):
+    np.savetxt(tmp_path / "a.xyz", POINTS[::2])
+    turned = POINTS[1::2] @ [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    targets = [tmp_path / "a.xyz", turned, (CORNERS, TRIANGLES), symrefine.Shape(POINTS[:900])]
+    every = symrefine.align(POINTS, targets)
+    assert [answer.target.source for answer in every] == [str(targets[0]), "target 1", "target 2", "array"]
+    for answer, target in zip(every, targets, strict=True):
+        np.testing.assert_array_equal(answer.matrix, symrefine.align(POINTS, target).matrix)
+    with pytest.raises(InputError, match="target 1: "):
+        symrefine.align(POINTS, [POINTS, np.zeros((4, 7, 3))])
+
+
+ONE_OBJECT = {
+    "rows": [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]],
+    "tuples": [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 3.0)],
+    "rows of numpy": list(CORNERS),
+    "a mesh": (CORNERS, TRIANGLES),
+}
+
+
+@pytest.mark.parametrize("target", ONE_OBJECT.values(), ids=ONE_OBJECT)
+def test_a_list_of_rows_is_one_object(target):
+    assert isinstance(symrefine.align(target, target), symrefine.Alignment)
+
+
 def test_the_front_page_shows_promises_only():
     assert dir(symrefine) == sorted(symrefine.__all__)
     assert not [name for name in dir(symrefine) if name.startswith("_") and name != "__version__"]
@@ -457,6 +484,6 @@ def test_the_front_page_shows_promises_only():
 
 def test_schemas_stand_beside_the_code():
     assert {p.name.split(".")[0] for p in Path(str(files("symrefine"))).glob("schema/*.json")} == {
-        "detection", "detection2d", "detection_nd", "alignment", "symmetrized", "completed", "info",
+        "detection", "detection2d", "detection_nd", "alignment", "alignments", "symmetrized", "completed", "info",
         "decisions", "labels",
     }  # fmt: skip

@@ -19,6 +19,7 @@ from symrefine.groups import (
     is_subgroup,
     point_group,
 )
+from symrefine.groups.orthogonal import turn_rad
 
 SEEDS = st.integers(0, 2**32 - 1)
 FOLDS = range(2, 13)
@@ -680,3 +681,12 @@ def test_continuous_and_bad_groups_of_the_plane():
     for name in ("C0", "S4", "C4v", "c4", f"D{MAX_FOLD + 1}"):
         with pytest.raises(InputError, match="no point group of the plane"):
             PointGroup2D(name=name)
+
+
+@pytest.mark.parametrize("det", [1, -1])
+def test_the_turn_of_a_map_is_the_angle_it_was_made_with(det: int) -> None:
+    axis, angle = [1.0, 2.0, -1.0], 0.7
+    made = rotation(axis, angle) if det > 0 else rotoreflection(axis, angle)
+    assert turn_rad(made) == pytest.approx(angle)
+    assert turn_rad(det * np.eye(1)) == turn_rad(np.diag([1.0, 1.0, det])) == 0.0
+    assert turn_rad(np.diag([-1.0, -1.0, 1.0, det])) == pytest.approx(np.pi)

@@ -1,58 +1,151 @@
-"""`symrefine align`: the map that takes one object onto another."""
+"""`symrefine align`: the map that takes one object onto another, or onto each of several."""
 
 import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from symrefine.cli.inputs import FRAMES, STDIN, Object, expanded, objects
 from symrefine.cli.outputs import check_outputs, json_writer, tell, write_all
-from symrefine.cli.signs import waiting
+from symrefine.cli.rows import MAP_HEAD, map_line
+from symrefine.cli.several import UNDETERMINED, Many, check_alone
+from symrefine.cli.signs import counting
 from symrefine.cli.values import add_detection_options, natural
 from symrefine.clock import Clock
+from symrefine.errors import InputError
+from symrefine.files import Writer
 
-HELP = "find the map that takes one object onto another, reflections included"
+if TYPE_CHECKING:
+    from symrefine.front.aligned import Alignment
+    from symrefine.load import Frames
+    from symrefine.shape import Shape
+
+HELP = "find the map that takes one object onto another, or onto each of several, reflections included"
 DESCRIPTION = (
     "Find the orthogonal matrix M and the translation t that take the mesh or cloud A onto B, b = M a + t, without "
-    "correspondences; det M = -1 means a mirror image. Also tells which other maps do as well, because B is symmetric."
+    "correspondences; det M = -1 means a mirror image. Also tells which other maps do as well, because B is symmetric. "
+    "Several B, or a pattern in quotes, or a file of several molecules, models or volumes, give a line for each; one "
+    "that cannot be used is told on its line, the others go on, and the exit status is 2."
 )
+# Options whose files are of one pair, and the suffixes of these.
+_OF_ONE: dict[str, str] = {}
+# Status of an answer that can be relied upon.
+_OK = "ok"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("source", metavar="A", help="mesh or point cloud to be moved")
-    parser.add_argument("target", metavar="B", help="mesh or point cloud to move it onto")
-    parser.add_argument("--json", metavar="FILE|-", help="write the whole result as JSON; - is stdout, with no table")
+    parser.add_argument("target", metavar="B", nargs="+", help="meshes or point clouds to move it onto, or patterns")
+    parser.add_argument(
+        "--json",
+        metavar="FILE|-",
+        help="write the whole result as JSON, of several B an array; - is stdout, with no table",
+    )
     parser.add_argument("--scale", action="store_true", help="let the size differ too: b = s M a + t")
+    others = {"source": "there has to be one", "target": "each of them"}
     for name, letter in (("source", "A"), ("target", "B")):
         parser.add_argument(
             f"--{name}-frame",
             type=natural,
             metavar="N",
-            help=f"which of several molecules, models or volumes in {letter}, from 0 (default: there has to be one)",
+            help=f"which of several molecules, models or volumes in {letter}, from 0 (default: {others[name]})",
         )
     parser.add_argument("--rotations-only", action="store_true", help="admit det M = +1 only")
+    parser.add_argument(
+        "--strict", action="store_true", help=f"end with status {UNDETERMINED} where the status of an answer is not ok"
+    )
     add_detection_options(parser, counts_as="agreement")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Align, write the file that was asked for, print."""
-    check_outputs({"--json": args.json}, [Path(args.source), Path(args.target)])
-    with waiting("aligning"):
-        record = _record(args)
-    write_all(writers := json_writer(args.json, record))
-    tell(args.json, record, None, writers)
-    return 0
-
-
-def _record(args: argparse.Namespace) -> dict[str, Any]:
-    from symrefine.front.verbs import align
+    """Align, write the files that were asked for, print."""
     from symrefine.load import load
 
+    paths = expanded(args.target)
+    _check(args, paths)
     clock = Clock()
-    with clock("load"):
-        given = ((args.source, args.source_frame), (args.target, args.target_frame))
-        source, target = (load(path, measure=args.measure, frame=frame) for path, frame in given)
-    asked = {"tolerance": args.tolerance, "units": args.units, "scale": args.scale, "seed": args.seed}
-    found = align(source, target, allow_reflection=not args.rotations_only, **asked)
+    with counting("aligning", len(paths)) as doing:
+        with clock("load"):
+            source = load(args.source, measure=args.measure, frame=args.source_frame)
+        given = objects(paths, None, partial(_targets, args=args))
+        first = next(given)
+        aligned = partial(_aligned, args, source, clock.seconds["load"])
+        many = Many(
+            json_to=args.json,
+            head=MAP_HEAD,
+            line=map_line,
+            record=lambda one: aligned(one)[1],
+            beside=lambda one: {"source": source.source, "target": one.name},
+        )
+        if several := len(paths) > 1 or first.frames > 1:
+            check_alone(_of_one(args), f"{paths[0]} holds {first.frames}", "choose one with --target-frame")
+            records = list(many.told(chain([first], given), doing))
+        else:
+            found, record = aligned(first)
+            writers = json_writer(args.json, record) | _writers(args, found)
+            write_all(writers)
+    if several:
+        return many.end(records, undetermined=args.strict and any(r.get("status", _OK) != _OK for r in records))
+    tell(args.json, record, None, writers)
+    return UNDETERMINED if args.strict and record["status"] != _OK else 0
+
+
+def _check(args: argparse.Namespace, paths: Sequence[str]) -> None:
+    """Refuse, before any work, outputs that cannot be written or do not fit together, and what is for one pair."""
+    if STDIN in (args.source, *paths):
+        raise InputError("-: align reads files; write what comes on stdin to one, with its suffix")
+    check_outputs({"--json": args.json} | _of_one(args), [Path(path) for path in (args.source, *paths)])
+    if len(paths) > 1:
+        check_alone(_of_one(args), f"B names {len(paths)}", "call `align` for each")
+    for name, suffix in _OF_ONE.items():
+        given = getattr(args, name)
+        if given is not None and name == "picture" and Path(given).suffix.lower() != suffix:
+            raise InputError(f"--{name} {given}: expected a name that ends in {suffix}")
+
+
+def _of_one(args: argparse.Namespace) -> dict[str, str | None]:
+    """The outputs that are of one pair, with the files that they are to fill."""
+    return {f"--{name}": getattr(args, name) for name in _OF_ONE}
+
+
+def _targets(path: str, args: argparse.Namespace) -> "Frames[Shape]":
+    """The objects in a file: all, or the one that is chosen."""
+    from symrefine.load import Frames, load, load_frames
+
+    if args.target_frame is not None:
+        return Frames("objects", 1, lambda _: load(path, measure=args.measure, frame=args.target_frame))
+    found = load_frames(path, measure=args.measure)
+    if len(found) > FRAMES:
+        raise InputError(f"{path}: holds {len(found)} {found.what}, more than {FRAMES}; choose one with --target-frame")
+    return found
+
+
+def _aligned(
+    args: argparse.Namespace, source: "Shape", load_s: float, given: Object
+) -> tuple["Alignment", dict[str, Any]]:
+    """The map onto an object in a file, and its JSON record; `load_s` are the seconds that reading the source took."""
+    from symrefine.front.verbs import align
+
+    found = align(
+        source,
+        given.shape,
+        allow_reflection=not args.rotations_only,
+        tolerance=args.tolerance,
+        units=args.units,
+        scale=args.scale,
+        seed=args.seed,
+    )
     frames = {"source_frame": args.source_frame, "target_frame": args.target_frame}
+    frames |= {} if given.frame is None else {"target_frame": given.frame}
     chosen = {"measure": args.measure} | {name: k for name, k in frames.items() if k is not None}
-    return found.to_dict(options={**found.options, **chosen}, load_s=clock.seconds["load"])
+    found = replace(found, options={**found.options, **chosen})
+    return found, found.to_dict(load_s=load_s + given.load_s)
+
+
+def _writers(args: argparse.Namespace, found: "Alignment") -> dict[str, Writer]:
+    """Writers of the files that are of one pair."""
+    return {getattr(args, name): found.writer(suffix) for name, suffix in _OF_ONE.items() if getattr(args, name)}

@@ -1,29 +1,27 @@
 """`symrefine detect`: files in, the symmetries of the objects in them out."""
 
 import argparse
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from symrefine.cli.inputs import STDIN, TEXTURE, Object, expanded, failure, objects, read_scan, scans
+from symrefine.cli.inputs import STDIN, TEXTURE, Object, expanded, objects, read_scan, scans
 from symrefine.cli.outputs import (
-    STDOUT,
     check_beside,
     check_outputs,
     complain,
-    is_quiet,
     is_verbose,
     json_writer,
     note,
-    print_lines,
-    say,
     tell,
     write_all,
 )
-from symrefine.cli.signs import Doing, counting
+from symrefine.cli.rows import ROW_HEAD, row_line
+from symrefine.cli.several import UNDETERMINED, Many, check_alone
+from symrefine.cli.signs import counting
 from symrefine.cli.values import (
     add_class_options,
     add_depth_options,
@@ -38,14 +36,12 @@ from symrefine.cli.values import (
 )
 from symrefine.clock import Clock
 from symrefine.errors import InputError
-from symrefine.files import Writer, json_array_text, text_writer
+from symrefine.files import Writer, text_writer
 
 if TYPE_CHECKING:
     from symrefine.shape import Shape
     from symrefine.stream import Stream
 
-# Exit status of `--strict` where nothing is decided, and where one of several files could not be used.
-UNDETERMINED, REFUSED = 3, 2
 # Options whose files are of one object.
 _OF_ONE = ("bop", "recording", "report", "picture")
 HELP = "find the planes, axes and point group of a mesh, cloud or picture"
@@ -110,18 +106,19 @@ def run(args: argparse.Namespace) -> int:
     paths = expanded(args.path)
     _check(args, paths)
     read = partial(scans, options=detection_options(args), in_chunks=True, **_picture(args))
+    many = Many(json_to=args.json, head=ROW_HEAD, line=row_line, record=lambda given: _examined(args, given)[2])
     with counting("detecting", len(paths)) as doing:
         given = objects(paths, args.format, read)
         first = next(given)
         if several := len(paths) > 1 or first.frames > 1:
-            _check_alone(args, f"{paths[0]} holds {first.frames}", "choose one with --frame")
-            records = list(_told(args, chain([first], given), doing))
+            check_alone(_of_one(args), f"{paths[0]} holds {first.frames}", "choose one with --frame")
+            records = list(many.told(chain([first], given), doing))
         else:
             shape, detection, record = _examined(args, first)
             writers = json_writer(args.json, record) | _writers(args, shape, detection)
             write_all(writers)
     if several:
-        return _end(args, records)
+        return many.end(records, undetermined=args.strict and any(r.get("undetermined") for r in records))
     for text in _notes(args, shape, detection, record):
         note(text)
     tell(args.json, record, None, writers)
@@ -130,14 +127,13 @@ def run(args: argparse.Namespace) -> int:
 
 def _check(args: argparse.Namespace, paths: Sequence[str]) -> None:
     """Refuse, before any work, outputs that cannot be written or do not fit together, and what is for one file."""
-    outputs = {f"--{name}": getattr(args, name) for name in ("json", *_OF_ONE)}
-    check_outputs(outputs, [Path(path) for path in paths if path != STDIN])
+    check_outputs({"--json": args.json} | _of_one(args), [Path(path) for path in paths if path != STDIN])
     check_beside("--bop", args.bop, {"--bop-id": args.bop_id, "--bop-scale": args.bop_scale})
     if len(paths) > 1:
         if STDIN in paths:
             raise InputError("-: stdin is one file; name no others beside it")
         of_bop = "`symrefine batch DIR --bop FILE` takes a directory"
-        _check_alone(args, f"PATH names {len(paths)}", of_bop if args.bop else "call `detect` for each")
+        check_alone(_of_one(args), f"PATH names {len(paths)}", of_bop if args.bop else "call `detect` for each")
     if args.picture is not None and Path(args.picture).suffix.lower() != ".png":
         raise InputError(f"--picture {args.picture}: expected a name that ends in .png")
     if args.bop is not None:
@@ -146,11 +142,9 @@ def _check(args: argparse.Namespace, paths: Sequence[str]) -> None:
         read_models_info(Path(args.bop))
 
 
-def _check_alone(args: argparse.Namespace, there: str, remedy: str) -> None:
-    """Refuse what is for one object."""
-    for name in _OF_ONE:
-        if (given := getattr(args, name)) is not None:
-            raise InputError(f"--{name} {given}: is for one object, and {there}; {remedy}")
+def _of_one(args: argparse.Namespace) -> dict[str, str | None]:
+    """The outputs that are of one object, with the files that they are to fill."""
+    return {f"--{name}": getattr(args, name) for name in _OF_ONE}
 
 
 def _picture(args: argparse.Namespace) -> dict[str, Any]:
@@ -168,46 +162,6 @@ def _examined(args: argparse.Namespace, given: Object) -> tuple["Shape", Any, di
         points = len(shape.points) if sample is None else sample["of"]
         complain(f"{points:,} points in {seconds:.2f} s, {points / seconds:,.0f} points/s")
     return shape, detection, record
-
-
-def _told(args: argparse.Namespace, given: Iterable[Object], doing: Doing) -> Iterator[dict[str, Any]]:
-    """The record of each of several objects, a line as soon as it is done; one that fails does not end the others."""
-    from symrefine.cli.rows import ROW_HEAD, row_line
-
-    in_lines = args.json != STDOUT and not is_quiet()
-    if in_lines:
-        print_lines([ROW_HEAD])
-    for one in given:
-        if not one.frame:
-            doing.expect(one.frames - 1)
-        record = _record_or_error(args, one)
-        if in_lines:
-            print_lines([row_line(one.name, {"error": None} | record)])
-        elif "error" in record:
-            complain(record["error"])
-        doing.advance()
-        yield record
-
-
-def _record_or_error(args: argparse.Namespace, given: Object) -> dict[str, Any]:
-    """The record of one of several objects, or what was wrong with it."""
-    try:
-        return _examined(args, given)[2]
-    except Exception as error:  # noqa: BLE001 - one object must not end the others
-        return {"source": given.name, "error": failure(given.name, error)}
-
-
-def _end(args: argparse.Namespace, records: Sequence[dict[str, Any]]) -> int:
-    """Write the records of several objects, and tell whether all went well."""
-    text = json_array_text(records)
-    if args.json == STDOUT:
-        say(text)
-    elif args.json is not None:
-        write_all({args.json: text_writer(text)})
-        print_lines([f"wrote {args.json}"])
-    if any("error" in record for record in records):
-        return REFUSED
-    return UNDETERMINED if args.strict and any(record["undetermined"] for record in records) else 0
 
 
 def _notes(args: argparse.Namespace, shape: "Shape", detection: Any, record: dict[str, Any]) -> Iterator[str]:

@@ -26,7 +26,7 @@ _COMMANDS = (detect, info, align, derive, export, symmetrize, complete, batch, l
 _DESCRIPTION = "Symmetry of 3-D shapes: mirror planes, rotation axes and the point group of a mesh or a point cloud."
 _EPILOG = (
     "`symrefine COMMAND --help` explains a command. Exit status: 0 done, 1 some files of a batch or runs failed, 2 bad "
-    "input or options, 3 undetermined (`detect --strict`), 130 interrupted, 141 nobody read on."
+    "input or options, 3 undetermined (`--strict`), 130 interrupted, 141 nobody read on."
 )
 
 
@@ -80,8 +80,10 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     """
     argv = _joined(argv)
     args, rest = grammar().parse_known_args(argv)
-    if isinstance(getattr(args, "path", None), list) and not any(word.startswith("-") for word in rest):
-        args.path, rest = args.path + rest, []  # argparse takes only files that stand together
+    several = next((name for name in ("path", "target") if isinstance(getattr(args, name, None), list)), None)
+    if several and not any(word.startswith("-") for word in rest):
+        setattr(args, several, getattr(args, several) + rest)  # argparse takes only files that stand together
+        rest = []
     if rest:
         args.parser.unknown(rest[0])
     return args

@@ -1,5 +1,6 @@
 """What was found in one of many objects, on one line."""
 
+import math
 from typing import Any
 
 from symrefine.errors import one_line
@@ -11,11 +12,17 @@ _ROW = "{:<13}  {:>6}  {:>4}  {:>6}  {:>10}  {:>7}  {}"
 ROW_HEAD = _ROW.format("group", "planes", "axes", "p95 %", "confidence", "seconds", "file")
 
 
+# One of many targets of an alignment.
+_MAP_ROW = "{:<6}  {:>5}  {:>3}  {:>7}  {:>34}  {:>7}  {:>9}  {:>5}  {:>7}  {}"
+MAP_HEAD = _MAP_ROW.format(
+    "status", "conf.", "det", "turn °", "translation", "rms %", "overlap %", "equiv", "seconds", "target"
+)
+
+
 def row_line(name: str, row: Record) -> str:
     """What was found in one of many files, or what was wrong with it; the name stands last and whole."""
     if row["error"] is not None:
-        told, name = one_line(row["error"]), one_line(name)
-        return f"failed: {told}" if name in told else f"failed: {name}: {told}"
+        return _failed(name, row["error"])
     if "hyperplanes" in row:
         told, mirrors, turns = f"{row['dimension']}-D", row["hyperplanes"], None
     else:
@@ -33,6 +40,39 @@ def row_line(name: str, row: Record) -> str:
         seconds(row),
         one_line(name),
     )
+
+
+def map_line(name: str, row: Record) -> str:
+    """The map onto one of many targets, or what was wrong with it; of a misfit nothing that looks like an answer."""
+    if row["error"] is not None:
+        return _failed(name, row["error"])
+    status, fits = row["status"], not row["misfit"]
+    word = status if status == "ok" else "open" if fits else "misfit"
+    met = "/".join(f"{100 * row['overlap'][side]:.0f}" for side in ("source", "target"))
+    shift = " ".join(f"{x + 0.0:.5g}".rjust(10) for x in row["translation"])
+    told = (
+        f"{row['confidence']:.2f}",
+        f"{row['determinant']:+d}",
+        f"{math.degrees(_turn_rad(row['matrix'])):.2f}",
+        shift,
+        percentage(row["rms"]),
+        met,
+        "inf" if row["free"] else len(row["equivalents"]),
+    )
+    shown = told if fits else ("", "", "", "", told[4], "", "")
+    reason = "" if status == "ok" else f": {one_line(status)}"
+    return _MAP_ROW.format(word, *shown, seconds(row), f"{one_line(name)}{reason}")
+
+
+def _turn_rad(matrix: list[list[float]]) -> float:
+    from symrefine.groups.orthogonal import turn_rad
+
+    return turn_rad(matrix)
+
+
+def _failed(name: str, error: str) -> str:
+    told, name = one_line(error), one_line(name)
+    return f"failed: {told}" if name in told else f"failed: {name}: {told}"
 
 
 def inversions(record: Record) -> list[Record]:

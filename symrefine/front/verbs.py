@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
 
 from numpy.typing import ArrayLike
 
@@ -11,7 +11,7 @@ from symrefine.errors import InputError
 from symrefine.front.answers import Found, check_kind
 from symrefine.front.asked import seed_of, told
 from symrefine.lengths import relative_tolerance
-from symrefine.load.objects import shape_of, stream_of
+from symrefine.load.objects import objects_of, shape_of, stream_of
 from symrefine.shape import Shape
 from symrefine.stream import Stream
 from symrefine.surface.misses import TOLERANCE
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from symrefine.front.beyond import SubspaceDetection
     from symrefine.front.planar import PlanarDetection
     from symrefine.front.space import Detection
+    from symrefine.geometry import Array
 
     Detected: TypeAlias = Detection | PlanarDetection | SubspaceDetection
 
@@ -169,6 +170,34 @@ def detect_in_space(
     return found
 
 
+@overload
+def align(
+    source: Any,
+    target: "Sequence[Path | Shape] | list[str] | list[Array]",
+    *,
+    scale: bool = ...,
+    polish: bool = ...,
+    allow_reflection: bool = ...,
+    tolerance: float | str = ...,
+    units: str | None = ...,
+    seed: int = ...,
+) -> "list[Alignment]": ...
+
+
+@overload
+def align(
+    source: Any,
+    target: Any,
+    *,
+    scale: bool = ...,
+    polish: bool = ...,
+    allow_reflection: bool = ...,
+    tolerance: float | str = ...,
+    units: str | None = ...,
+    seed: int = ...,
+) -> "Alignment": ...
+
+
 def align(
     source: Any,
     target: Any,
@@ -179,12 +208,13 @@ def align(
     tolerance: float | str = TOLERANCE,
     units: str | None = None,
     seed: int = 0,
-) -> "Alignment":
+) -> "Alignment | list[Alignment]":
     """The orthogonal map and the translation that take one object onto another; samplings and formats may differ.
 
     Args:
         source: whatever `detect` takes.
-        target: whatever `detect` takes.
+        target: whatever `detect` takes; or a list of such, or the frames of a file, for a list of answers: the source
+            is read once.
         scale: whether the objects may differ in size; then `target ~ scale * matrix @ source + translation`.
         polish: refine on the points (3-space only); without it the moments have the last word, in half of the time.
         allow_reflection: whether determinant -1 is an answer.
@@ -199,15 +229,21 @@ def align(
     from symrefine.align import story
     from symrefine.front.aligned import Alignment
 
-    moved, met = shape_of(source, name="source"), shape_of(target, name="target")
-    used, seed = relative_tolerance(tolerance, met, units=units), seed_of(seed)
-    found = story.align(
-        moved, met, scale=scale, polish=polish, allow_reflection=allow_reflection, tolerance=used, seed=seed
-    )
-    options = told(tolerance, units) | {"scale": bool(scale), "seed": seed}
-    options |= {"relative_tolerance": used} if isinstance(tolerance, str) else {}
-    options |= {"measure": None, "rotations_only": not allow_reflection}
-    return Alignment.of(found, source=moved, target=met, options=options)
+    moved, several = shape_of(source, name="source"), objects_of(target)
+    chosen: dict[str, Any] = {"scale": scale, "polish": polish, "allow_reflection": allow_reflection}
+
+    def onto(given: Any, name: str) -> Alignment:
+        met = shape_of(given, name=name)
+        used, whole = relative_tolerance(tolerance, met, units=units), seed_of(seed)
+        found = story.align(moved, met, **chosen, tolerance=used, seed=whole)
+        options = told(tolerance, units) | {"scale": bool(scale), "seed": whole}
+        options |= {"relative_tolerance": used} if isinstance(tolerance, str) else {}
+        options |= {"measure": None, "rotations_only": not allow_reflection}
+        return Alignment.of(found, source=moved, target=met, options=options)
+
+    if several is None:
+        return onto(target, "target")
+    return [onto(given, f"target {k}") for k, given in enumerate(several)]
 
 
 def report(given: Any, path: str | Path) -> "Detected":

@@ -1,7 +1,8 @@
 """What people hold, to shapes: told by what it offers, so that no library is imported for it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from numbers import Number
 from operator import index
 from os import PathLike
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike
 from symrefine.errors import InputError, about
 from symrefine.load import load
 from symrefine.load.content import Content, Polygons, Values, as_float64, check_distinct, check_finite, polygons
+from symrefine.load.frames import Frames
 from symrefine.load.mesh import mesh_arrays
 from symrefine.load.scene import flattened
 from symrefine.load.stream import STREAMED, stream_if_large
@@ -74,6 +76,21 @@ def shape_of(
     with about(name):
         _check_size(points)
     return Shape(points, **told, source=name)
+
+
+def objects_of(given: Any) -> Sequence[Any] | None:
+    """The objects of a list that holds one in each place, or the frames of a file; None of what is one object itself.
+
+    A list of rows of numbers is one object: its points.
+    """
+    if isinstance(given, Frames):
+        return given
+    if not isinstance(given, list) or not given:
+        return None
+    first = given[0]
+    if isinstance(first, list | tuple):
+        return given if any(isinstance(v, list | tuple) or getattr(v, "ndim", 0) for v in first) else None
+    return given if getattr(first, "ndim", 2) > 1 and not isinstance(first, Number) else None
 
 
 def stream_of(given: Any) -> Stream | None:
