@@ -27,6 +27,14 @@ def harmonic_pair(source: Moments, target: Moments) -> MomentPair:
     return MomentPair(source=a, target=b, weights=1.0 / variance, action=Harmonics(rows=rows))
 
 
+def least_misfit(pair: MomentPair) -> float:
+    """Cost per number of a harmonic pair below which no orthogonal map comes: that of the lengths which all keep."""
+    assert isinstance(pair.action, Harmonics)
+    starts = np.cumsum([0, *(2 * l + 1 for l in pair.action.rows[:-1])])
+    source, target = (np.sqrt(np.add.reduceat(v[0] ** 2, starts)) for v in (pair.source, pair.target))
+    return float(pair.weights[starts] @ (source - target) ** 2) / pair.size
+
+
 @lru_cache(maxsize=1)
 def grid_rotations() -> Array:
     """Even rotations [GRID, 3, 3] (super-Fibonacci spirals; Alexa 2022)."""

@@ -16,7 +16,7 @@ from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import ntuples
 from symrefine.propose.folds import azimuthal_spectrum
 from symrefine.shape import Shape
-from symrefine.surface.misses import disc_distances
+from symrefine.surface.misses import disc_distances, needs
 from symrefine.surface.neighbourhoods import NEIGHBOURS
 from symrefine.surface.skin import FEW, LocalPlanes, Skin, isolated_points, make_skin
 from symrefine.surface.surface import Surface
@@ -25,6 +25,9 @@ from symrefine.surface.surface import Surface
 SOURCE_PLANES, TARGET_PLANES = 800, 2000
 # Flatness of thin sheets and edges without noise (0.13 at most at the lower quartile); noise of 0.2 % makes it 0.17.
 THIN = 0.15
+
+# Spacings that a plane reaches.
+REACH = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -154,6 +157,24 @@ class Evidence:
     def excess(self, motion: Isometry) -> float:
         """The largest statistic of the miss over its limit; <= 1 if the surfaces agree. Of atoms every one counts."""
         return float(self.judge.needed(self.misses(motion)[None], [motion])[0]) / self.tolerance
+
+    def agree(self, motion: Similarity) -> bool:
+        """Whether the surfaces do under a map: at once where they would even if nothing they miss by were noise.
+
+        That is told from the planes of the target that are met, which the judge need not be made for.
+        """
+        return self._at_most(motion) <= self.tolerance or self.excess(motion) <= 1.0
+
+    def _at_most(self, motion: Similarity) -> float:
+        """What tolerance suffices for a map if nothing is noise; infinite for points that stand for themselves."""
+        if self.met.isolated:
+            return np.inf
+        moved = motion.apply(self.moving.points)
+        away, met = self.met.met_by(moved)
+        across = np.abs(np.einsum("ij,ij->i", moved - met.points, met.normals))
+        # A plane reaches as far as the points that it was fitted to; beyond, the point that is nearest counts.
+        misses = np.where(away < REACH * self.met.spacing, across, np.maximum(away, across))
+        return float(needs(misses / tight_diagonal(self.moving.points), np.empty(0)))
 
     def _rng(self) -> np.random.Generator:
         return np.random.default_rng(self.seed)

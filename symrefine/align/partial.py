@@ -35,6 +35,8 @@ from symrefine.surface.surface import HOPELESS
 PLANES, AROUND, WITHIN, MATCHES = 1500, 0.1, 0.04, 500
 # A side with so many times the surface gets as many more local planes, up to a number.
 COARSER, MOST_PLANES = 1.5, 6000
+# Points that tell whether a side has strays or is uneven: a few strays matter to no map.
+ASKED = 2000
 # One in so many local planes is moved by the polish, and by the first look at the maps that are proposed.
 MOVED, LOOK = 2, 3
 # Maps of each determinant that are polished, if they meet at least such a share of what the best does.
@@ -73,7 +75,7 @@ class Shown:
         if side.is_mesh:
             points, normals = sample_surface(side.shape, SAMPLES, rng)[0], None
         else:
-            seen = sampling(points, np.random.default_rng(0), outliers=True, groups=False)
+            seen = sampling(points, np.random.default_rng(0), outliers=True, groups=False, asked=ASKED)
             points, weights = points[seen.even], seen.shares
             normals, views = (None if v is None else v[seen.even] for v in (normals, views))
         local = (points - side.moments.center) / unit

@@ -5,18 +5,22 @@ phi = (s R, t, 1), as the residual of a symmetry is; here the unknowns are a sma
 the scale. Everything is in units of the target: RMS radius 1 about its centre.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from symrefine.align.moment_fit import LONGEST
-from symrefine.fit.gauss_newton import Linearisation, minimise
 from symrefine.fit.matching import SCALE_FLOOR, each_coordinate, geman_mcclure, meet, robust_scale, worth
 from symrefine.fit.refine import MAX_OUTER, SETTLED, WITHIN_NOISE
 from symrefine.fit.residual import SIZE, design_rows, gram, turn_frame
 from symrefine.geometry import Array, Isometry, cross_matrix
 from symrefine.surface.skin import LocalPlanes, Skin
+
+# One in so many of the planes of the source moves until the motion changes by less than the spacing, of sources with
+# more planes than so many for each.
+COARSE, ENOUGH = 4, 100
+# What small turns about the three axes add to a vector.
+TURNS = np.stack([cross_matrix(axis) for axis in np.eye(3)])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -86,22 +90,27 @@ def polish(
     prior = prior if scale else prior[:6, :6]
     x, reach = np.zeros(len(prior)), error
     covariance: Array = np.linalg.pinv(known, rcond=1e-12, hermitian=True)
+    few = COARSE if len(source.points) > COARSE * ENOUGH else 1
     for index in range(1, MAX_OUTER + 1):
-        met = _met(source, target, start.moved(x), reach)
+        met = _met(source, target, start.moved(x), reach, few)
         if len(met.worth) == 0:
             return Polished(motion=start.moved(x), covariance=covariance, steps=index - 1, converged=False)
         before, settled = x, False
         for _ in range(MAX_OUTER):
-            errors = met.errors(start.moved(x))
-            scale_now = robust_scale(errors, target.spacing, reach)
-            step, inverse, sigmas = _step(_model(met, start, errors, prior, scale_now), x, scale_now)
+            motion = start.moved(x)
+            squares = met.squares(motion)
+            scale_now = robust_scale(np.sqrt(squares), target.spacing, reach)
+            step, inverse, sigmas = _step(*_normal_equations(met, motion, squares, scale_now, prior, x))
             x, covariance, length = x + step, inverse[:6, :6], float(np.linalg.norm(step))
             settled = scale_now > reach and (length < SETTLED or sigmas < WITHIN_NOISE)
             reach = min(reach, 4.0 * length)
             if settled:
                 break
-        if settled and float(np.linalg.norm(x - before)) < SCALE_FLOOR * target.spacing:
+        moved = float(np.linalg.norm(x - before))
+        if settled and few == 1 and moved < SCALE_FLOOR * target.spacing:
             return Polished(motion=start.moved(x), covariance=covariance, steps=index, converged=True)
+        if settled and moved < target.spacing:
+            few = 1
     return Polished(motion=start.moved(x), covariance=covariance, steps=MAX_OUTER, converged=False)
 
 
@@ -114,17 +123,18 @@ class _Met:
     each: int
     redundancy: float
 
-    def errors(self, motion: Similarity) -> Array:
-        """Distances [P] that the pairs are left with."""
-        return np.asarray(np.linalg.norm((self.rows @ _phi(motion)).reshape(-1, self.each), axis=1))
+    def squares(self, motion: Similarity) -> Array:
+        """Squared distances [P] that the pairs are left with."""
+        squares = (self.rows @ _phi(motion)) ** 2
+        return squares if self.each == 1 else np.asarray(squares.reshape(-1, self.each).sum(axis=1))
 
 
 def _phi(motion: Similarity) -> Array:
     return np.concatenate([(motion.scale * motion.matrix).ravel(), motion.shift, [1.0]])
 
 
-def _met(source: LocalPlanes, target: Skin | LocalPlanes, motion: Similarity, reach: float) -> _Met:
-    own, met = meet(source, target, motion, reach)
+def _met(source: LocalPlanes, target: Skin | LocalPlanes, motion: Similarity, reach: float, stride: int) -> _Met:
+    own, met = meet(source, target, motion, reach, stride=stride)
     if target.isolated:
         rows = design_rows(*each_coordinate(own.points, met.points))
         return _Met(rows=rows, worth=np.ones(len(own.points)), each=3, redundancy=1.0)
@@ -133,53 +143,40 @@ def _met(source: LocalPlanes, target: Skin | LocalPlanes, motion: Similarity, re
     return _Met(rows=rows, worth=worth(own.flatness, met.flatness), each=1, redundancy=redundancy)
 
 
-def _model(met: _Met, start: Similarity, errors: Array, prior: Array, scale: float) -> Callable[[Array], Linearisation]:
-    """Robust cost over the pairs, in units of the variance that their present errors [P] show, and of the prior."""
-    first = errors**2
-    weights = met.worth * geman_mcclure(first, scale)
-    squares = float(weights @ first) / (met.each * float(weights.sum()))
-    variance = max(met.redundancy * squares, float(np.finfo(float).eps))
+def _normal_equations(
+    met: _Met, motion: Similarity, squares: Array, scale: float, prior: Array, x: Array
+) -> tuple[Array, Array]:
+    """Gradient and Gauss-Newton matrix at x of the robust cost over the pairs, and of the prior.
 
-    def linearise(x: Array) -> Linearisation:
-        motion = start.moved(x)
-        phi, error2 = _phi(motion), met.errors(motion) ** 2
-        weights = np.repeat(met.worth * geman_mcclure(error2, scale), met.each)
-        g, jacobian = gram(met.rows, weights), _jacobian(motion, len(x))
-        cost = float(met.worth @ (scale**2 * error2 / (scale**2 + error2)))
-        return Linearisation(
-            cost=cost / variance + float(x @ prior @ x),
-            gradient=jacobian.T @ g @ phi / variance + prior @ x,
-            hessian=jacobian.T @ g @ jacobian / variance + prior,
-        )
-
-    return linearise
+    In units of the variance that the present squares [P] of the pairs show. Least squares with these weights lies above
+    the robust cost and touches it here, so that a step which lowers the one lowers the other.
+    """
+    weights = met.worth * geman_mcclure(squares, scale)
+    variance = met.redundancy * float(weights @ squares) / (met.each * float(weights.sum()))
+    variance = max(variance, float(np.finfo(float).eps))
+    g, jacobian = gram(met.rows, np.repeat(weights, met.each)), _jacobian(motion, len(x))
+    gradient = jacobian.T @ (g @ _phi(motion)) / variance + prior @ x
+    return gradient, jacobian.T @ g @ jacobian / variance + prior
 
 
 def _jacobian(motion: Similarity, size: int) -> Array:
     """Derivatives [13, size] of phi by rotation, shift and log scale."""
     matrix = motion.scale * motion.matrix
     jacobian: Array = np.zeros((SIZE, 7))
-    for k, axis in enumerate(np.eye(3)):
-        jacobian[:9, k] = (cross_matrix(axis) @ matrix).ravel()
-        jacobian[9 + k, 3 + k] = 1.0
+    jacobian[:9, :3] = (TURNS @ matrix).reshape(3, 9).T
+    jacobian[9:12, 3:6] = np.eye(3)
     jacobian[:9, 6] = matrix.ravel()
     return jacobian[:, :size]
 
 
-def _step(linearise: Callable[[Array], Linearisation], at: Array, scale: float) -> tuple[Array, Array, float]:
-    """Gauss-Newton over what is observable: the way from x, the covariance, zero elsewhere, and the way over that.
+def _step(gradient: Array, hessian: Array) -> tuple[Array, Array, float]:
+    """The Gauss-Newton step over what is observable, the covariance, zero elsewhere, and the step over that.
 
-    It ends with a step below the robust scale: a smaller scale is due then. Motions uncertain by more than the longest
-    step of a fit are left alone: gliding along a cylinder is an example.
+    Motions uncertain by more than the longest step of a fit are left alone: gliding along a cylinder is an example.
     """
-    here = linearise(at)
-    values, vectors = np.linalg.eigh(here.hessian)
-    basis = vectors[:, values > max(1e-9 * values[-1], LONGEST**-2)]
-
-    def within(y: Array) -> Linearisation:
-        full = linearise(at + basis @ y) if y.any() else here
-        return replace(full, gradient=basis.T @ full.gradient, hessian=basis.T @ full.hessian @ basis)
-
-    found = minimise(within, np.zeros(basis.shape[1]), tolerance=scale)
-    sigmas = float(np.sqrt(found.x @ found.hessian @ found.x / max(1, len(found.x))))
-    return basis @ found.x, basis @ np.linalg.inv(found.hessian) @ basis.T, sigmas
+    values, vectors = np.linalg.eigh(hessian)
+    seen = values > max(1e-9 * values[-1], LONGEST**-2)
+    values, basis = values[seen], vectors[:, seen]
+    along = basis.T @ gradient / values
+    sigmas = float(np.sqrt(along @ (values * along) / max(1, len(along))))
+    return -(basis @ along), (basis / values) @ basis.T, sigmas

@@ -21,6 +21,7 @@ from symrefine.geometry import Array, frame_with_z, rotation
 from symrefine.moments.action import FLOOR
 from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.propose.folds import BINS_PER_ORDER, MAX_FOLD
+from symrefine.surface.misses import LIMITS
 from symrefine.surface.skin import LocalPlanes, Skin
 
 # Hills of the landscape that are climbed, and rivals judged, for each determinant.
@@ -131,16 +132,41 @@ def _judged(evidence: Evidence, rivals: Fits, covariance: Array, *, brief: bool)
 
 
 def _first_good(evidence: Evidence, matrices: Iterable[Array], covariance: Array) -> tuple[Similarity, float]:
-    """Polish and judge one after the other until one is good; else the first, unless another clearly misses by less."""
+    """Polish and judge one after the other until one is good; else the first, unless another clearly misses by less.
+
+    Those that miss by more than a polish may make up for are not polished, unless all do.
+    """
     found: list[tuple[Similarity, float]] = []
+    hopeless: list[tuple[Similarity, float]] = []
     for m in matrices:
         start = Similarity(matrix=m, shift=np.zeros(3))
-        motion = polished(evidence, evidence.judge.cloud, start, covariance).motion
-        found.append((motion, evidence.excess(motion)))
+        if (rough := evidence.excess(start)) > 1.0 + _gain(evidence, covariance):
+            hopeless.append((start, rough))
+            continue
+        found.append(_improved(evidence, start, covariance))
         if found[-1][1] <= GOOD:
             return found[-1]
+    if not found:
+        return _improved(evidence, min(hopeless, key=lambda h: h[1])[0], covariance)
     best = min(found, key=lambda f: f[1])
     return found[0] if found[0][1] <= best[1] + GOOD else best
+
+
+def _improved(evidence: Evidence, start: Similarity, covariance: Array) -> tuple[Similarity, float]:
+    """A map after the polish on the judge's own planes, and what it misses by."""
+    motion = polished(evidence, evidence.judge.cloud, start, covariance).motion
+    return motion, evidence.excess(motion)
+
+
+def _gain(evidence: Evidence, covariance: Array) -> float:
+    """By how much less a start may miss after the polish, over the limit: as far as the moments leave open its points.
+
+    A turn w with covariance C moves a point x by w cross x, which is `tr(C) |x|^2 - x'Cx` in the mean square.
+    """
+    points = evidence.judge.cloud.points
+    squares = np.trace(covariance) * (points**2).sum(axis=1) - np.einsum("ni,ij,nj->n", points, covariance, points)
+    shift = SIGNIFICANT * float(np.sqrt(squares.mean()))
+    return shift / (LIMITS[0] * evidence.tolerance * evidence.judge.diagonal)
 
 
 def _phases(evidence: Evidence, matrix: Array, rivals: Fits) -> Iterator[Array]:
@@ -162,9 +188,13 @@ def _phases(evidence: Evidence, matrix: Array, rivals: Fits) -> Iterator[Array]:
 
 def polished(evidence: Evidence, target: Skin | LocalPlanes, start: Similarity, covariance: Array) -> Polished:
     """Polish on the points of the evidence from a start whose rotation the moments know with this covariance [3, 3]."""
-    error = min(SIGNIFICANT * float(np.sqrt(np.trace(covariance))), LONGEST)
     known = information(evidence, covariance)
-    return polish(evidence.moving, target, start, error=error, known=known, scale=evidence.scale)
+    return polish(evidence.moving, target, start, error=_error(covariance), known=known, scale=evidence.scale)
+
+
+def _error(covariance: Array) -> float:
+    """How far a start may be off, radians and RMS radii, whose rotation the moments know with a covariance [3, 3]."""
+    return min(SIGNIFICANT * float(np.sqrt(np.trace(covariance))), LONGEST)
 
 
 def information(evidence: Evidence, covariance: Array) -> Array:

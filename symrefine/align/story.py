@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from symrefine.align.alignment import OK, OPEN, Alignment, Miss
 from symrefine.align.coset import Coset, coset_of_group, coset_of_list, coset_of_maps, lifted
+from symrefine.align.landscape import least_misfit
 from symrefine.align.moment_fit import MISFIT, ROUNDING
 from symrefine.align.pair import Evidence, Side, few
 from symrefine.align.partial import Meeting, partial_meeting
@@ -21,7 +22,7 @@ from symrefine.align.polish import Similarity
 from symrefine.align.rivals import Choice, choose, information, polished
 from symrefine.align.span import span_fit
 from symrefine.clock import Clock
-from symrefine.detection.measure import FLAT, PARTS
+from symrefine.detection.measure import FLAT, PARTS, SAMPLES
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, check_tolerance, cross_matrix
@@ -32,6 +33,7 @@ from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
 from symrefine.plane import detect_planar
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
+from symrefine.surface.skin import drawn
 
 __all__ = ["Alignment", "align"]
 
@@ -70,6 +72,7 @@ def align(
     _check(a, b, tolerance)
     clock = Clock()
     with clock("moments"):
+        a, b = _looked_at(a, b, seed) if polish else (a, b)
         parts = 0 if few(a, b) else PARTS
         sides = _side(a, parts), _side(b, parts)
     ranks = [_rank(s.moments) for s in sides]
@@ -88,6 +91,43 @@ def align(
 
 def _shape(values: Shape | ArrayLike, name: str) -> Shape:
     return values if isinstance(values, Shape) else Shape(points=np.asarray(values), source=name)
+
+
+def _looked_at(source: Shape, target: Shape, seed: int) -> tuple[Shape, Shape]:
+    """Some of the points of large clouds in 3-space: a polish on the points makes up for what moments lose by that.
+
+    All of those that may be the same points in another pose, which their spreads tell, and of flat sets.
+    """
+    if source.dim != 3:
+        return source, target
+    spreads = [_spread(s) for s in (source, target) if s.faces is None]
+    alike = len(spreads) == 2 and np.abs(spreads[0] - spreads[1]).max() < ROUNDING
+    if (alike and len(source.points) == len(target.points)) or min((s[0] for s in spreads), default=0.0) <= FLAT:
+        return source, target
+    return _some(source, seed), _some(target, seed)
+
+
+def _spread(cloud: Shape) -> Array:
+    """Variances [n] of the points along their principal axes, ascending, as shares of all."""
+    weights = np.ones(len(cloud.points)) if cloud.weights is None else cloud.weights
+    local = cloud.points - cloud.points[0]
+    local -= weights @ local / weights.sum()
+    values = np.linalg.eigvalsh((local * weights[:, None]).T @ local)
+    return np.asarray(values / max(float(values.sum()), 1e-300))
+
+
+def _some(shape: Shape, seed: int) -> Shape:
+    """Of a large cloud without weights as many points as a surface is known by; meshes as they are."""
+    if shape.faces is not None or shape.weights is not None or len(shape.points) <= SAMPLES:
+        return shape
+    pick = drawn(len(shape.points), SAMPLES, np.random.default_rng(seed))
+    return replace(
+        shape,
+        points=shape.points[pick],
+        normals=None if shape.normals is None else shape.normals[pick],
+        labels=None if shape.labels is None else shape.labels[pick],
+        viewpoint=None if shape.viewpoint is None else shape.viewpoint[pick],
+    )
 
 
 def _check(source: Shape, target: Shape, tolerance: float) -> None:
@@ -133,6 +173,9 @@ def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: boo
     """The story in 3-space. Objects of unlike size are compared at one size, even where the scale is not asked for."""
     surfaces = evidence.has_points and not few(evidence.source.shape, evidence.target.shape)
     partly = polish and not scale and surfaces
+    tried = partly and least_misfit(evidence.harmonics) > MISFIT
+    if tried and (part := _in_part(evidence, reflections, clock)) is not None:
+        return part
     with clock("choose"):
         choice = choose(evidence, reflections=reflections, brief=partly)
     whole, motion = choice.evidence, choice.motion
@@ -145,12 +188,9 @@ def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: boo
         with clock("polish"):
             done = polished(whole, whole.met, motion, choice.covariance)
             motion, covariance = done.motion, done.covariance
-        agree &= not partly or whole.excess(motion) <= 1.0
-    if partly and not agree:
-        with clock("partial"):
-            meeting = partial_meeting(evidence, reflections=reflections)
-        if meeting is not None and meeting.status:
-            return _met_in_part(meeting, evidence, clock)
+        agree &= not partly or whole.agree(motion)
+    if partly and not (agree or tried) and (part := _in_part(evidence, reflections, clock)) is not None:
+        return part
     evidence = whole
     matrix, translation, factor = _in_input_units(evidence, motion, scale)
 
@@ -169,6 +209,13 @@ def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: boo
         _coset=coset,
         _miss=lambda: _miss(choice, motion, scale, reflections),
     )
+
+
+def _in_part(evidence: Evidence, reflections: bool, clock: Clock) -> Alignment | None:
+    """The answer for surfaces that share a part only; None where there is nothing to be said for it."""
+    with clock("partial"):
+        meeting = partial_meeting(evidence, reflections=reflections)
+    return _met_in_part(meeting, evidence, clock) if meeting is not None and meeting.status else None
 
 
 def _met_in_part(meeting: Meeting, evidence: Evidence, clock: Clock) -> Alignment:

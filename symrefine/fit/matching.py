@@ -61,14 +61,15 @@ def match(
 
 
 def meet(
-    source: LocalPlanes, target: Skin | LocalPlanes, motion: Isometry, uncertainty: float
+    source: LocalPlanes, target: Skin | LocalPlanes, motion: Isometry, uncertainty: float, *, stride: int = 1
 ) -> tuple[Planes, Planes]:
-    """The local planes of one object that, moved, meet planes of another by the same rules, and these planes."""
-    distance, met = target.met_by(motion.apply(source.points))
+    """Every `stride`-th local plane of one object that, moved, meets one of another by the same rules, and these."""
+    some = source.chosen(slice(None, None, stride))
+    distance, met = target.met_by(motion.apply(some.points))
     keep = distance < _reach(target.spacing, uncertainty)
     if not target.isolated:
-        keep &= _facing(motion.turn(source.normals), met.normals)
-    return source.chosen(keep), met.chosen(keep)
+        keep &= _facing(motion.turn(some.normals), met.normals)
+    return some.chosen(keep), met.chosen(keep)
 
 
 def _reach(spacing: float, uncertainty: float) -> float:

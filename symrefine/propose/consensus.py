@@ -16,6 +16,8 @@ import numpy as np
 
 from symrefine.geometry import Array, Mask, orthogonal_factor
 
+Single = np.ndarray[tuple[int, ...], np.dtype[np.float32]]
+
 # By how much the invariants of compatible pairs may differ: normals of 15 degrees off move them by so much.
 INVARIANT, HANDEDNESS = 0.3, 0.15
 # Maps that are grown from the best matches for each determinant, how many are told, and rounds that each takes.
@@ -47,13 +49,8 @@ class Proposal:
 
 def consensus(matches: Matches, within: float) -> list[Proposal]:
     """The maps of either determinant that most matches agree with to a distance, best first."""
-    here, there = (
-        pair_invariants(p, n)
-        for p, n in (
-            (matches.source, matches.source_normals),
-            (matches.target, matches.target_normals),
-        )
-    )
+    here = pair_invariants(matches.source, matches.source_normals)
+    there = pair_invariants(matches.target, matches.target_normals)
     allowed = np.abs(here[0] - there[0]) < within
     allowed &= here[0] > 2.0 * within
     for a, b in zip(here[1:-1], there[1:-1], strict=True):
@@ -65,17 +62,23 @@ def consensus(matches: Matches, within: float) -> list[Proposal]:
     return sorted(found, key=lambda p: -p.support)
 
 
-def pair_invariants(points: Array, normals: Array) -> tuple[Array, ...]:
+def pair_invariants(points: Array, normals: Array) -> tuple[Single, ...]:
     """Distances [N, N] of all pairs of local planes, and what of their angles no sign of a normal changes.
 
-    The last one is the handedness, which a reflection reverses.
+    The last one is the handedness, which a reflection reverses. All are products of matrices, in single precision:
+    they are compared with limits of a few hundredths.
     """
-    across = points[None] - points[:, None]
-    distance = np.sqrt(np.einsum("ijk,ijk->ij", across, across))
-    across /= np.maximum(distance, 1e-300)[:, :, None]
-    first, second = np.einsum("ijk,ik->ij", across, normals), np.einsum("ijk,jk->ij", across, normals)
-    between, leaning = normals @ normals.T, first * second
-    volume = np.einsum("ijk,ijk->ij", across, np.cross(normals[:, None], normals[None]))
+    x, n = (v.astype(np.float32) for v in (points - points.mean(axis=0), normals))
+    squares = (x**2).sum(axis=1)
+    distance = np.sqrt(np.maximum(squares[:, None] + squares - 2.0 * (x @ x.T), 0.0))
+    shrink = 1.0 / np.maximum(distance, np.float32(1e-12))
+    high = n @ x.T
+    first = (high - np.diag(high)[:, None]) * shrink  # (x_j - x_i).n_i, over the distance
+    second = -first.T
+    # (x_j - x_i) . (n_i cross n_j)
+    leaves = np.cross(x, n)
+    volume = -(n @ leaves.T + leaves @ n.T) * shrink
+    between, leaning = n @ n.T, first * second
     return distance, first**2, second**2, between**2, leaning * between, leaning * volume
 
 

@@ -19,16 +19,19 @@ SHELLS, BINS = 3, 6
 def signatures(cloud: LocalPlanes, radius: float) -> Array:
     """Histograms [M, SHELLS * 3 * BINS] of the neighbours within a radius of each local plane."""
     count, points, normals = len(cloud.points), cloud.points, cloud.normals
-    pairs = pairs_within(cloud.tree.points, radius)
-    one, other = np.concatenate([pairs, pairs[:, ::-1]]).T
-    toward = points[other, :3] - points[one]
+    one, other = pairs_within(cloud.tree.points, radius).T
+    own = np.concatenate([one, other])
+    toward = points[other] - points[one]
     length = np.maximum(np.linalg.norm(toward, axis=1), 1e-300)
-    across = np.einsum("ki,ki->k", toward, normals[one])
-    bent = np.where(np.bincount(one, across, count) < 0.0, -1.0, 1.0)[one]
-    height = 0.5 + 0.5 * bent * across / length
-    turned = np.abs(np.einsum("ki,ki->k", normals[one], normals[other]))
-    leaning = np.abs(np.einsum("ki,ki->k", toward, normals[other])) / length
-    shell = one * SHELLS + np.minimum((length / radius) ** 2 * SHELLS, SHELLS - 1).astype(np.int64)
+    # Of either end: how high the other stands over its plane.
+    ends = np.einsum("ki,ki->k", toward, normals[one]), -np.einsum("ki,ki->k", toward, normals[other])
+    bent = np.where(np.bincount(own, np.concatenate(ends), count) < 0.0, -1.0, 1.0)
+    slopes = ends[0] / length, ends[1] / length
+    height = 0.5 + 0.5 * bent[own] * np.concatenate(slopes)
+    turned = np.tile(np.abs(np.einsum("ki,ki->k", normals[one], normals[other])), 2)
+    leaning = np.abs(np.concatenate(slopes[::-1]))
+    shell = np.minimum((length / radius) ** 2 * SHELLS, SHELLS - 1).astype(np.int64)
+    shell = own * SHELLS + np.tile(shell, 2)
     found = np.stack([_histograms(shell, v, count * SHELLS) for v in (height, turned, leaning)], axis=1)
     return found.reshape(count, -1)
 
@@ -42,8 +45,9 @@ def _histograms(owner: Index, values: Array, count: int) -> Array:
     low = np.minimum(place.astype(np.int64), BINS - 2)
     part = place - low
     at = owner * BINS + low
-    found = np.bincount(at, 1.0 - part, count * BINS) + np.bincount(at + 1, part, count * BINS)
-    found = found.reshape(count, BINS)
+    here, next_ = np.bincount(at, minlength=count * BINS), np.bincount(at, part, count * BINS)
+    found = (here - next_).reshape(count, BINS)
+    found[:, 1:] += next_.reshape(count, BINS)[:, :-1]
     return found / np.maximum(found.sum(axis=1, keepdims=True), 1.0)
 
 
@@ -52,9 +56,12 @@ def mutual_matches(source: Array, target: Array) -> tuple[Index, Index]:
 
     Those come first that are least like a plane, which is like any other.
     """
-    squares = (target**2).sum(axis=1) - 2.0 * source @ target.T + (source**2).sum(axis=1)[:, None]
-    nearest = squares.argmin(axis=1)
-    mutual = np.flatnonzero(squares.argmin(axis=0)[nearest] == np.arange(len(source)))
+    # In single precision, which is quick and far finer than signatures are; numpy finds the least of rows, not columns.
+    a, b = source.astype(np.float32), target.astype(np.float32)
+    squares = (b**2).sum(axis=1) - 2.0 * (a @ b.T)
+    squares += (a**2).sum(axis=1)[:, None]
+    nearest, back = squares.argmin(axis=1), np.ascontiguousarray(squares.T).argmin(axis=1)
+    mutual = np.flatnonzero(back[nearest] == np.arange(len(source)))
     turned = source.reshape(len(source), SHELLS, 3, BINS)[mutual, :, 1, -1].mean(axis=1)
     mutual = mutual[np.argsort(turned, kind="stable")]
     return mutual, nearest[mutual]

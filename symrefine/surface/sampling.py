@@ -12,7 +12,7 @@ from symrefine.geometry import Array, Mask
 from symrefine.shape import Index
 from symrefine.surface.clumps import clumps, filled
 from symrefine.surface.neighbourhoods import FLAT, WIDEST, fills_volume, planes_of, thickness_of
-from symrefine.surface.surroundings import AROUND, Surroundings, around_some, some_of
+from symrefine.surface.surroundings import AROUND, ASKED, Surroundings, around_some, some_of
 from symrefine.surface.tree import Tree
 
 # A stray has its neighbours so many times as far away as half of the points have theirs: what 8 neighbours vary by on
@@ -61,18 +61,19 @@ def sampling(
     groups: bool = True,
     apart: bool = True,
     blobs: bool = False,
+    asked: int = ASKED,
 ) -> Sampling:
     """How points [N, 3] were sampled; with `outliers` those that belong to no surface are set apart.
 
     With `apart` clumps apart from the body are as well, and with `blobs` those that touch it; without `groups` nobody
-    looks for either. Of points that fill a volume none is set apart, and all are kept.
+    looks for either. `asked` points tell whether there is anything to be done. Of points that fill a volume none is set apart, and all are kept.
     """
     kept: Index = np.arange(len(points))
     taken: list[Index] = []
     lone: list[Index] = []
     if len(points) <= AROUND or points.std() == 0.0:
         return Sampling(kept=kept, even=kept, strays=kept[:0])
-    some = some_of(points, rng)
+    some = some_of(points, rng, asked)
     spread = points[some].std()
     points = (points - points[some].mean(axis=0)) / spread
     around = Surroundings.of(points[some])
@@ -80,7 +81,7 @@ def sampling(
         return Sampling(kept=kept, even=kept, strays=kept[:0])
     if outliers and _alone(around).any():
         kept = _without_strays(points)
-        around = around_some(points[kept], rng)
+        around = around_some(points[kept], rng, asked)
     strays = np.setdiff1d(np.arange(len(points)), kept)
     if outliers and groups and apart and (found := clumps(points[kept], around)):
         taken += [kept[c] for c in found]

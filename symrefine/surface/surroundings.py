@@ -53,12 +53,12 @@ class Surroundings:
         return thickness_of(self.planes[2])
 
 
-def around_some(points: Array, rng: np.random.Generator) -> Surroundings:
+def around_some(points: Array, rng: np.random.Generator, asked: int = ASKED) -> Surroundings:
     """The surroundings of some of points [N, 3]."""
-    return Surroundings.of(points[some_of(points, rng)])
+    return Surroundings.of(points[some_of(points, rng, asked)])
 
 
-def some_of(points: Array, rng: np.random.Generator) -> Index:
-    """Indices of points [N, 3] at random, and of the farthest, lest a few strays are missed."""
+def some_of(points: Array, rng: np.random.Generator, asked: int = ASKED) -> Index:
+    """Indices of so many of points [N, 3] at random, and of the farthest, lest a few strays are missed."""
     away = ((points - np.median(points, axis=0)) ** 2).sum(axis=1)
-    return np.union1d(rng.permutation(len(points))[:ASKED], np.argpartition(away, -1 - AROUND)[-AROUND:])
+    return np.union1d(rng.permutation(len(points))[:asked], np.argpartition(away, -1 - AROUND)[-AROUND:])
