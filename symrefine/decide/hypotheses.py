@@ -24,6 +24,9 @@ from symrefine.surface.surface import Coverage, Surface
 # Local planes that are moved: at a glance by each operation; in a look by all together; in a fit and when judged by all
 # together (a quarter of that by each at most) and by each at least, as 0.6 % of fewer are no sample.
 GLANCE, LOOK, MOVED, MOVED_EACH = 120, 600, 12000, 1200
+# A glance allows for the worst of the operations of a group that it takes: without, the share that details may have
+# (0.6 %) is less than one of its points, and a single stray among them turns down every candidate.
+GLANCED = 4
 # How far the moments may put a start wrong (radians, RMS radii; 0.04 was the most of 698 true ones), and directions of
 # fitted elements.
 START_ERROR, DIRECTION_ERROR = 0.05, np.radians(1.5)
@@ -92,13 +95,13 @@ def glances(surface: Surface, starts: Sequence[Placed], most: float = math.inf) 
     for limit in (LIMITS[1], LIMITS[-1]) if surface.openings is None else LIMITS[-1:]:
         asked = np.flatnonzero(found[owner] < most)
         if asked.size:
-            needs = surface.needs([every[i] for i in asked], sources=GLANCE, bound=limit * most)
+            needs = surface.needs([every[i] for i in asked], sources=GLANCE, bound=limit * most, tests=GLANCED)
             np.maximum.at(found, owner[asked], needs)
     return found.tolist()
 
 
 def _some(parts: list[Operations]) -> list[Operations]:
-    return parts[:: max(1, len(parts) // 4)]
+    return parts[:: max(1, len(parts) // GLANCED)]
 
 
 def looked_at(surface: Surface, start: Placed) -> tuple[Placed, float]:

@@ -81,7 +81,6 @@ def sampling(
     if outliers and _alone(around).any():
         kept = _without_strays(points)
         around = around_some(points[kept], rng)
-    strays = np.setdiff1d(np.arange(len(points)), kept)
     if outliers and groups and apart and (found := clumps(points[kept], around)):
         taken += [kept[c] for c in found]
         kept = np.setdiff1d(kept, np.concatenate(taken))
@@ -91,7 +90,9 @@ def sampling(
     if blobs and lone:
         taken += lone
         kept = np.setdiff1d(kept, np.concatenate(lone))
+        kept = kept[_without_strays(points[kept])]  # the rim of what fills a volume is alone once that is gone
         around = around_some(points[kept], rng)
+    strays = np.setdiff1d(np.arange(len(points)), np.concatenate([kept, *taken]))
     even, shares = _evened(points[kept], rng) if _is_uneven(around) else (slice(None), None)
     return Sampling(
         kept=kept,
