@@ -26,6 +26,9 @@ from symrefine.surface.surface import Coverage, Surface
 GLANCE, LOOK, MOVED, MOVED_EACH = 120, 600, 12000, 1200
 # Steps of a look after which those that will not come near end.
 SHORT = 3
+# A glance allows for the worst of the operations of a group that it takes: without, the share that details may have
+# (0.6 %) is less than one of its points, and a single stray among them turns down every candidate.
+GLANCED = 4
 # How far the moments may put a start wrong (radians, RMS radii; 0.04 was the most of 698 true ones), and directions of
 # fitted elements.
 START_ERROR, DIRECTION_ERROR = 0.05, np.radians(1.5)
@@ -94,13 +97,13 @@ def glances(surface: Surface, starts: Sequence[Placed], most: float = math.inf) 
     for limit in (LIMITS[1], LIMITS[-1]) if surface.openings is None else LIMITS[-1:]:
         asked = np.flatnonzero(found[owner] < most)
         if asked.size:
-            needs = surface.needs([every[i] for i in asked], sources=GLANCE, bound=limit * most)
+            needs = surface.needs([every[i] for i in asked], sources=GLANCE, bound=limit * most, tests=GLANCED)
             np.maximum.at(found, owner[asked], needs)
     return found.tolist()
 
 
 def _some(parts: list[Operations]) -> list[Operations]:
-    return parts[:: max(1, len(parts) // 4)]
+    return parts[:: max(1, len(parts) // GLANCED)]
 
 
 def looked_at(surface: Surface, start: Placed, most: float) -> tuple[Placed, float]:
@@ -118,7 +121,7 @@ def looked_at(surface: Surface, start: Placed, most: float) -> tuple[Placed, flo
 def _seems(surface: Surface, placed: Placed, sources: int) -> float:
     """What a group where it stands needs, as a few operations tell on a few points."""
     motions = [m for part in _some(elements(placed.group)) for m in part.motions(placed.center)]
-    return float(surface.needs(motions, sources=sources).max())
+    return float(surface.needs(motions, sources=sources, tests=GLANCED).max())
 
 
 def start_error(surface: Surface) -> float:

@@ -52,9 +52,12 @@ class Examined:
         found = zip(self.links, self.decided(tolerance).probabilities, strict=True)
         return tuple(Alternative(point_group=h.group.name, probability=p, forgiven=h.need) for h, p in found)
 
-    def order(self, tolerance: float) -> float:
-        """Order of the group that is decided, 0 if none is."""
-        return 0 if self.doubt(tolerance) else self.links[self.decided(tolerance).index].group.order
+    def size(self, tolerance: float) -> tuple[float, float]:
+        """Order of the group that is decided, and of what stands for it if that is infinite; 0 if none is."""
+        if self.doubt(tolerance):
+            return 0.0, 0.0
+        group = self.links[self.decided(tolerance).index].group
+        return group.order, group.sampled(7).order
 
     def doubt(self, tolerance: float) -> str:
         """Why the data support no decision at a tolerance, or nothing if they do."""
@@ -96,7 +99,7 @@ def examined(
     if found.measured.blobs:
         # What fills a volume beside a surface is taken for a clump only where it alone hides a symmetry.
         without = examine(apart=apart, blobs=True)
-        if without.order(tolerance) > found.order(tolerance) and not _has_parts_apart(without, tolerance):
+        if without.size(tolerance) > found.size(tolerance) and not _has_parts_apart(without, tolerance):
             return without
     return found
 

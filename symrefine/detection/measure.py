@@ -34,8 +34,9 @@ SAME_MASS = 0.01
 # Variance across, as a fraction of that along, below which points lie on a line: rounding of float32.
 FLAT = 1e-12
 # Share of the points of a scan that others hide from the cameras given, from which on these are wrong: of true views,
-# rough ones too, up to 0.03 seem to be; of whole objects, half of which is hidden, 0.17 to 0.20 are found to be.
-HIDDEN = 0.15
+# rough ones too, up to 0.027 seem to be; of whole objects, half of which is hidden, 0.12 to 0.22 are found to be. Half
+# way between the two, as ratios go.
+HIDDEN = 0.06
 # Points so many times as far out as 99 % of all set the scale: 2 % of their diagonal is 10 % of the object.
 STRAY = 5.0
 

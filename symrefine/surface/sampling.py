@@ -66,7 +66,8 @@ def sampling(
     """How points [N, 3] were sampled; with `outliers` those that belong to no surface are set apart.
 
     With `apart` clumps apart from the body are as well, and with `blobs` those that touch it; without `groups` nobody
-    looks for either. `asked` points tell whether there is anything to be done. Of points that fill a volume none is set apart, and all are kept.
+    looks for either. `asked` points tell whether there is anything to be done. Of points that fill a volume none is set
+    apart, and all are kept.
     """
     kept: Index = np.arange(len(points))
     taken: list[Index] = []
@@ -82,7 +83,6 @@ def sampling(
     if outliers and _alone(around).any():
         kept = _without_strays(points)
         around = around_some(points[kept], rng, asked)
-    strays = np.setdiff1d(np.arange(len(points)), kept)
     if outliers and groups and apart and (found := clumps(points[kept], around)):
         taken += [kept[c] for c in found]
         kept = np.setdiff1d(kept, np.concatenate(taken))
@@ -92,7 +92,9 @@ def sampling(
     if blobs and lone:
         taken += lone
         kept = np.setdiff1d(kept, np.concatenate(lone))
+        kept = kept[_without_strays(points[kept])]  # the rim of what fills a volume is alone once that is gone
         around = around_some(points[kept], rng)
+    strays = np.setdiff1d(np.arange(len(points)), np.concatenate([kept, *taken]))
     even, shares = _evened(points[kept], rng) if _is_uneven(around) else (slice(None), None)
     return Sampling(
         kept=kept,

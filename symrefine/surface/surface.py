@@ -117,10 +117,15 @@ class Surface:
         """The smallest tolerance at which a surface holds that operations together miss so [K, N]."""
         return float(needs(misses.ravel(), self.noise)) if self.cloud.body == "surface" else 0.0
 
-    def needs(self, motions: Sequence[Isometry], *, sources: int = 10**9, bound: float = math.inf) -> Array:
-        """The smallest tolerances [K] at which each of K operations holds, as far as it was seen; see `misses`."""
+    def needs(
+        self, motions: Sequence[Isometry], *, sources: int = 10**9, bound: float = math.inf, tests: int = 1
+    ) -> Array:
+        """The smallest tolerances [K] at which each of K operations holds, as far as it was seen.
+
+        `sources` and `bound` as of `misses`, `tests` as of `needed`.
+        """
         misses = self.misses(motions, sources=sources, bound=bound)
-        return self.needed(self.seen(misses, motions, sources=sources), motions)
+        return self.needed(self.seen(misses, motions, sources=sources), motions, tests)
 
     def need(self, motions: Sequence[Isometry], *, sources: int = 10**9) -> float:
         """The smallest tolerance at which all of some operations hold."""
