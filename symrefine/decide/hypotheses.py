@@ -15,6 +15,7 @@ from symrefine.decide.posterior import EVEN, EVEN_MIRROR
 from symrefine.errors import DegenerateShapeError
 from symrefine.fit.placed import Operations, Placed, common_center, elements
 from symrefine.fit.refine import Iterate, refine
+from symrefine.fit.vertices import ROUNDED as EXACT
 from symrefine.geometry import Array, Isometry, frame_with_z
 from symrefine.groups import PointGroup, from_elements, is_subgroup
 from symrefine.propose.votes import AGREE_RAD
@@ -29,8 +30,6 @@ GLANCE, LOOK, MOVED, MOVED_EACH = 120, 600, 12000, 1200
 START_ERROR, DIRECTION_ERROR = 0.05, np.radians(1.5)
 # Elements nearer than this (radians) are the same.
 SAME_RAD = np.radians(4.0)
-# What rounding of coordinates to five digits leaves needs no more.
-EXACT = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -21,6 +21,7 @@ from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.skin import FEW
 
+# Parts of the jackknife, and dimensions up to which moments of order 5 are few enough.
 PARTS = 16
 LARGEST_DIM = 8
 
