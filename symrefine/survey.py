@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from symrefine.decide.doubts import FLAT
 from symrefine.detection.measure import is_few
 from symrefine.detection.sketch import is_large, sampled
 from symrefine.errors import DegenerateShapeError
@@ -23,8 +24,6 @@ from symrefine.surface.tree import Tree
 SPARSE = 2000
 # Points below which one for points that fill a volume is.
 SPARSE_VOLUME = 20_000
-# Standard deviation across a plane, over that along it, below which all points lie in it: rounding of float32.
-FLAT = 1e-6
 # Steps of float32 at the place of the object, as a fraction of its diagonal, that a surface should not be made of.
 COARSE = 1e-4
 
@@ -198,7 +197,7 @@ def doubts(found: Survey) -> Iterator[str]:
         yield f"{found.repeated:,} points stand where others do: these places weigh more"
     if found.kind == "points" and len(found.spread) == 3:
         yield "so few points stand for themselves, as atoms do; of a surface give more than 250"
-    flat = int((found.spread < FLAT * found.spread[0]).sum())
+    flat = int((found.spread**2 < FLAT * found.spread[0] ** 2).sum())
     if flat:
         left = {1: "a line", 2: "a plane"}.get(len(found.spread) - flat, f"{len(found.spread) - flat} dimensions")
         yield f"all points lie in {left}" if left != "a line" else "all points lie on a line"

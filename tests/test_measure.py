@@ -1,5 +1,7 @@
 """What is known before any symmetry is looked for: n-tuples as measured, and what supports no decision."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,10 @@ from symrefine.detection.measure import doubt, gather, is_few, measure, part
 from symrefine.geometry import random_orthogonal
 from symrefine.groups import point_group
 from symrefine.moments.moments import central_moments
+from symrefine.ndim import detect_nd
 from symrefine.ntuples.contract import ntuples
 from symrefine.ntuples.rank import fixed_subspace
+from symrefine.plane import detect_planar
 from symrefine.surface.misses import TOLERANCE
 
 RANKS = {"vanish": 0, "axis": 1, "plane": 2, "none": 3}
@@ -72,6 +76,29 @@ def test_points_that_stick_out_a_little_are_no_strays(far):
     radius = np.linalg.norm(TABLE - TABLE.mean(axis=0), axis=1).max()
     cloud = np.concatenate([TABLE, TABLE.mean(axis=0) + far * radius * np.array([[0.6, 0.48, 0.64]])])
     assert "stand more than" not in reason(cloud)
+
+
+@pytest.mark.parametrize("dim", [2, 3, 4])
+@pytest.mark.parametrize("count", [12, 900])
+@pytest.mark.parametrize("far", [100.0, 1e8])
+def test_in_any_dimension_a_stray_point_invents_no_symmetry(dim, count, far):
+    points = np.random.default_rng(8).random((count, dim))
+    cloud = np.concatenate([points, np.full((1, dim), far)])
+    ask = {2: detect_planar, 3: partial(detect, outliers="none"), 4: detect_nd}[dim]
+    assert "strays" in ask(cloud).undetermined
+
+
+@pytest.mark.parametrize("dim", [2, 4])
+@pytest.mark.parametrize("count", [2, 7, 400])
+def test_in_any_dimension_points_on_a_line_say_nothing(dim, count):
+    ask = {2: detect_planar, 4: detect_nd}[dim]
+    assert "on a line" in ask(np.outer(np.linspace(-1, 1, count), np.arange(1.0, dim + 1)) + 5).undetermined
+
+
+@pytest.mark.parametrize("high", [2.0, 8.0])
+def test_the_tip_of_few_points_is_no_stray(high):
+    base = np.array([[1.0, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, high]])
+    assert detect(base @ random_orthogonal(np.random.default_rng(9)).T).point_group == "C4v"
 
 
 @pytest.mark.parametrize("heavy", [1e3, 1e6])

@@ -13,7 +13,7 @@ import numpy as np
 
 from symrefine.align.moment_fit import LONGEST, Fits, MomentPair, as_good, best_fits, covariance, exact, misfit
 from symrefine.align.procrustes import Procrustes, procrustes
-from symrefine.detection.measure import FLAT
+from symrefine.decide.doubts import FLAT
 from symrefine.geometry import Array
 from symrefine.moments.action import FLOOR, Monomials, skew
 from symrefine.moments.moments import Moments, deviations, exponents, occurrences

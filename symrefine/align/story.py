@@ -22,7 +22,8 @@ from symrefine.align.polish import Similarity
 from symrefine.align.rivals import Choice, choose, information, polished
 from symrefine.align.span import span_fit
 from symrefine.clock import Clock
-from symrefine.detection.measure import FLAT, PARTS, SAMPLES
+from symrefine.decide.doubts import FLAT
+from symrefine.detection.measure import PARTS, SAMPLES
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, check_tolerance, cross_matrix

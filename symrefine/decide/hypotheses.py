@@ -15,6 +15,7 @@ from symrefine.decide.posterior import EVEN, EVEN_MIRROR
 from symrefine.errors import DegenerateShapeError
 from symrefine.fit.placed import Operations, Placed, common_center, elements
 from symrefine.fit.refine import Iterate, refine
+from symrefine.fit.vertices import ROUNDED
 from symrefine.geometry import Array, Isometry, frame_with_z
 from symrefine.groups import PointGroup, from_elements, is_subgroup
 from symrefine.propose.votes import AGREE_RAD
@@ -34,8 +35,6 @@ GLANCED = 4
 START_ERROR, DIRECTION_ERROR = 0.05, np.radians(1.5)
 # Elements nearer than this (radians) are the same.
 SAME_RAD = np.radians(4.0)
-# What rounding of coordinates to five digits leaves needs no more.
-EXACT = 1e-5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -207,7 +206,7 @@ def _seen_judged(surface: Surface, parts: _Parts, misses: Array) -> tuple[tuple[
 
 def exact_need(floor: float) -> float:
     """The need up to which noise, which alone needs `floor`, or the rounding of coordinates tells nothing apart."""
-    return max(EXACT, 0.5 * floor)
+    return max(ROUNDED, 0.5 * floor)
 
 
 def _belief(found: Element) -> float:

@@ -6,6 +6,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from symrefine.decide.doubts import on_a_line, set_by_strays
 from symrefine.decide.posterior import UNKNOWN
 from symrefine.errors import InputError
 from symrefine.geometry import Array, tight_diagonal
@@ -31,14 +32,10 @@ ORDER, PARTS = 8, 16
 PLANES, SAMPLES = 8000, 20000
 # Masses of atoms that differ by more than this fraction are masses of different kinds.
 SAME_MASS = 0.01
-# Variance across, as a fraction of that along, below which points lie on a line: rounding of float32.
-FLAT = 1e-12
 # Share of the points of a scan that others hide from the cameras given, from which on these are wrong: of true views,
 # rough ones too, up to 0.027 seem to be; of whole objects, half of which is hidden, 0.12 to 0.22 are found to be. Half
 # way between the two, as ratios go.
 HIDDEN = 0.06
-# Points so many times as far out as 99 % of all set the scale: 2 % of their diagonal is 10 % of the object.
-STRAY = 5.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,7 +68,7 @@ class Measured:
     @cached_property
     def flaw(self) -> str:
         """Why the shape supports no decision at any tolerance, or nothing if it does."""
-        return _on_a_line(self) or _few_decide(self) or _not_seen_from(self.views)
+        return _few_decide(self) or _on_a_line(self) or _not_seen_from(self.views)
 
     @cached_property
     def views(self) -> tuple[Camera, ...]:
@@ -170,28 +167,21 @@ def doubt(measured: Measured, surface: Surface, tolerance: float) -> str:
 
 
 def _on_a_line(measured: Measured) -> str:
-    """Points on a line look the same from all sides, whatever they were taken from; atoms are a molecule."""
-    _, middle, largest = np.linalg.eigvalsh(measured.moments.covariance)
-    if middle > FLAT * largest or (is_few(measured.shape) and measured.shape.labels is not None):
+    """Points on a line; but atoms there are a molecule."""
+    if is_few(measured.shape) and measured.shape.labels is not None:
         return ""
-    return "all points lie on a line, which says nothing of the rest; label them if they are the atoms of a molecule"
+    said = on_a_line(measured.moments.covariance)
+    return said and f"{said}; label them if they are the atoms of a molecule"
 
 
 def _few_decide(measured: Measured) -> str:
     """A stray point that sets the scale, or weights that leave all to a few points."""
     shape = measured.shape
-    if is_few(shape) or shape.faces is not None:
+    if shape.faces is not None:
         return ""
-    away = np.linalg.norm(shape.points - np.median(shape.points, axis=0), axis=1)
-    most = float(np.quantile(away, 0.99))
-    strays = int((away > STRAY * most).sum())
-    if strays:
-        return (
-            f"{strays} of {len(away)} points stand more than {STRAY:g} times as far out as 99 % of them, and set the "
-            "scale that misses are measured by; remove them if they are strays"
-        )
-    if shape.weights is None:
-        return ""
+    strays = set_by_strays(shape.points, few=is_few(shape))
+    if strays or is_few(shape) or shape.weights is None:
+        return strays
     count = float(shape.weights.sum() / shape.weights.max())
     if count > FEW:
         return ""

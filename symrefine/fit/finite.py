@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array, rotation, unit
-from symrefine.groups import PointGroup, is_subgroup, point_group
+from symrefine.groups import MAX_FOLD, PointGroup, is_subgroup, point_group
 from symrefine.shape import Index
 
 # Turns that stand for a continuous axis where the points themselves show no fold, and the fewest of them.
@@ -17,7 +17,8 @@ TURNS, FEWEST_TURNS = 64, 8
 SECTOR = 30
 # Folds tried on the rings of a lathed mesh, on so many of its points; how near they must come, in spacings, and a
 # larger fold is taken although it misses by more, up to ALIKE times more, or LAX times where that is next to nothing.
-LARGEST_FOLD, PROBES, NEAR, ALIKE, LAX, CLEAN = 360, 200, 0.25, 1.3, 3.0, 0.2
+PROBES, NEAR, ALIKE, LAX, CLEAN = 200, 0.25, 1.3, 3.0, 0.2
+# What rounding leaves of a length that is none, as a fraction of the whole.
 _ALONG = 1e-6
 
 
@@ -74,7 +75,7 @@ def _ring_fold(points: Array, axis: Array) -> int:
         return 0
     tree = cKDTree(off)
     near = NEAR * float(np.median(tree.query(off, k=2)[0][:, 1]))
-    folds = np.arange(3, min(LARGEST_FOLD, len(off)) + 1)
+    folds = np.arange(3, min(MAX_FOLD, len(off)) + 1)
     # A few probes turn nearly all down: by other folds rings miss by half a spacing.
     for probes in (PROBES // 10, PROBES):
         index = np.arange(0, len(off), max(1, len(off) // probes))

@@ -23,6 +23,7 @@ from symrefine.fit.residual import (
 from symrefine.geometry import Array, Isometry, Plane, ReadOnly, frame_with_z, householder
 from symrefine.surface.skin import LocalPlanes
 
+# Outer iterations at most; two or three settle what can be settled.
 MAX_OUTER = 10
 # An outer iteration that moves nothing by more than this (radians, RMS radii) ends the refinement ...
 SETTLED = 2e-4

@@ -18,6 +18,7 @@ import numpy as np
 from symrefine.fit.gauss_newton import Linearisation, Linearisations
 from symrefine.geometry import Array, Isometry
 
+# Rows and columns of a Gram matrix: the nine entries of the operation, its shift, and one.
 SIZE = 13
 
 

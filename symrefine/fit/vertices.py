@@ -14,6 +14,7 @@ from symrefine.fit.finite import finite_group
 from symrefine.fit.placed import Placed
 from symrefine.geometry import Array, orthogonal_factor, tight_diagonal
 from symrefine.groups import PointGroup
+from symrefine.groups.standard import GOLDEN
 from symrefine.shape import Index, Shape
 
 # Rounds that fit a group's place to points that correspond, the step that counts as none, and that from which on steps
@@ -23,9 +24,8 @@ ROUNDS, STILL, ROUNDING = 30, 1e-15, 1e-12
 NEAR, LARGEST = 2e-3, 5_000_000
 # A shape is exact where no vertex misses its counterpart by more than what rounding to five digits leaves.
 ROUNDED = 1e-5
-# Vertices of parts that touch are one where they are nearer than single precision tells; where the walls of the grid
-# stand that finds them: round numbers, of which designs are full, lie nowhere near.
-WELD, WALL = 1e-6, 0.3819660112501051
+# Vertices of parts that touch are one where they are nearer than single precision tells.
+WELD = 1e-6
 # Vertices that are asked first, and rounds of these: where they have no counterparts the others are not asked.
 ASKED, GLANCES = 200, 6
 
@@ -51,7 +51,8 @@ class Distinct:
         """
         local = (shape.points - center) / diagonal
         labels = shape.labels if shape.faces is None else None
-        place = np.floor(local / weld + WALL) if weld else local
+        # Round numbers, of which designs are full, lie nowhere near the walls of this grid.
+        place = np.floor(local / weld + GOLDEN) if weld else local
         key = place if labels is None else np.column_stack([place, labels])
         order = np.lexsort(key.T[::-1])
         first = np.append(True, (np.diff(key[order], axis=0) != 0.0).any(axis=1))

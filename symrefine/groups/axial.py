@@ -13,7 +13,9 @@ from symrefine.geometry import Array, frame_with_z, rotation
 from symrefine.groups.names import MAX_FOLD
 from symrefine.groups.orthogonal import Index, about_z, angles_about_z, axes_and_angles, determinants, nearest_in_span
 
+# N^2 times the error of angles up to which a fold is taken as exact: at random it is of the order of N.
 _EXACT = 1e-3
+# Folds that would fit as well by accident, from which on none is believed.
 _ACCIDENTS = 2.0
 Step = tuple[int, int, int]
 

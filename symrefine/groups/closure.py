@@ -20,6 +20,7 @@ from symrefine.groups.orthogonal import Index, nearest_orthogonal, register
 from symrefine.groups.point_group import PointGroup
 from symrefine.groups.standard import standard_operations
 
+# Folds of groups that operations are closed to, unless more are asked for.
 DEFAULT_MAX_FOLD = 120
 
 

@@ -16,6 +16,7 @@ from symrefine.groups.orthogonal import EXACT, axes_and_angles, fit_frame, half_
 from symrefine.groups.point_group import PointGroup
 from symrefine.groups.standard import standard_operations
 
+# By how much directions of elements that somebody found may be off: several times what a fit leaves at 1 % noise.
 DEFAULT_TOLERANCE_RAD = math.radians(2.0)
 GivenAxis = tuple[ArrayLike, float | Literal["inf"]]
 

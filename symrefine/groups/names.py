@@ -7,6 +7,7 @@ from functools import lru_cache
 
 from symrefine.errors import InputError
 
+# The largest fold that a group may have: beyond it nobody tells a polygon from round.
 MAX_FOLD = 360
 _AXIAL = {"C", "Cv", "Ch", "S", "D", "Dh", "Dd"}
 _CONTINUOUS = {"C", "Cv", "Ch", "D", "Dh"}

@@ -17,6 +17,7 @@ from symrefine.groups.names import Symbol
 from symrefine.groups.orthogonal import EXACT, Index, about_z, axes_and_angles, determinants, unique_lines
 
 OrderedAxis = tuple[Array, float]
+# The golden section, in which icosahedra are cut.
 GOLDEN = (1.0 + np.sqrt(5.0)) / 2.0
 
 

@@ -7,19 +7,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
+from symrefine.decide.doubts import on_a_line, set_by_strays
 from symrefine.decide.posterior import NEAR
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance, positive
 from symrefine.moments.moments import shape_moments
 from symrefine.ndim import sampled as samples
 from symrefine.ndim.matched import Points
-from symrefine.ndim.search import among_points, among_samples
+from symrefine.ndim.search import Search, among_points, among_samples
 from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
 from symrefine.ntuples.rank import FLOOR, FixedSubspace, fixed_subspace
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.skin import FEW
 
+# Parts of the jackknife, and dimensions up to which moments of order 5 are few enough.
 PARTS = 16
 LARGEST_DIM = 8
 
@@ -109,8 +111,11 @@ def detect_nd(
     cloud = Points(points=points, masses=masses, diameter=diameter)
     low = samples.block(moments, samples.LOW)
     known = [fixed.directions[-1], *np.linalg.eigh(moments.covariance)[1].T]
+    flaw = set_by_strays(points, few=not sampled) or on_a_line(moments.covariance)
     with clock("search"):
-        if sampled:
+        if flaw:
+            search = Search(holds=[], rejected=[], incomplete=[], order=None, undetermined=flaw)
+        elif sampled:
             rng = np.random.default_rng(seed)
             # Masses that differ make up for a density that does.
             neighbours = samples.Neighbours(points, diameter, rng) if np.ptp(masses) == 0.0 else None

@@ -19,6 +19,7 @@ from symrefine.moments.moments import Moments, tensor_index
 from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.surface.misses import LIMITS
 
+# Orders of the moments that are asked first, and of those that look closer.
 LOW, HIGH = (2, 3, 4), (5, 6)
 # What the asymmetry of a mirror that was turned until it fits best may reach, in standard deviations of its sampling
 # noise; one that others imply may reach more, as this would lose one in ten.

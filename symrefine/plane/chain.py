@@ -8,9 +8,10 @@ from functools import reduce
 import numpy as np
 
 from symrefine.decide.chain import HOPELESS
-from symrefine.decide.hypotheses import DIRECTION_ERROR, EXACT, LOOK, START_ERROR, exact_need
+from symrefine.decide.hypotheses import DIRECTION_ERROR, LOOK, START_ERROR, exact_need
 from symrefine.decide.pool import ALIKE
 from symrefine.decide.posterior import NEAR
+from symrefine.fit.vertices import ROUNDED
 from symrefine.geometry import Array
 from symrefine.plane.outline import NOISES, Outlines
 from symrefine.plane.placed import Placed, fitted
@@ -104,7 +105,7 @@ def _distinct(outlines: Outlines, starts: Iterable[Placed], limit: float) -> Ite
 
     def known(placed: Placed) -> bool:
         """Whether a group fitted before is the same, or has it and holds exactly."""
-        return any(h.placed.holds(placed) and (h.need <= EXACT or h.placed.order == placed.order) for h in seen)
+        return any(h.placed.holds(placed) and (h.need <= ROUNDED or h.placed.order == placed.order) for h in seen)
 
     for start in starts:
         if known(start):

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
+from symrefine.decide.doubts import on_a_line, set_by_strays
 from symrefine.decide.posterior import BEYOND, NEAR, PICTURE, Alternative, Decision, Link, alternatives, decide
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance, toward_positive
@@ -127,12 +128,14 @@ def detect_planar(
         outlines = make_outlines(shape.points, shape.weights, frame.center, frame.scale, np.random.default_rng(seed))
         moments = shape_moments(shape, ORDER, parts=PARTS if outlines.sampled else 0)
         doublets = classify_doublets(moments, tolerance, outlines.pixel_noise)
+    flaw = _flaw(shape, frame, outlines)
     with clock("search"):
-        pool = explore(outlines, None if doublets.kind == "centre" else doublets.angle_rad, BEYOND * tolerance)
+        hint = None if doublets.kind == "centre" else doublets.angle_rad
+        pool = () if flaw else explore(outlines, hint, BEYOND * tolerance)
         links = chain(outlines, pool, BEYOND * tolerance)
     with clock("decide"):
         decision, hopeless = _decided(links, tolerance)
-        reason = "" if hopeless else _doubt(outlines, tolerance)
+        reason = flaw or ("" if hopeless else _doubt(outlines, tolerance))
     return _report(links, pool, decision, reason, moments, doublets, outlines, tolerance, clock)
 
 
@@ -143,6 +146,13 @@ def _decided(links: Sequence[Hypothesis], tolerance: float) -> tuple[Decision, b
         for k in range(len(NOISES))
     ]
     return Decision.of(np.mean([d.inside for d in each], axis=0).tolist()), not any(d.index for d in each)
+
+
+def _flaw(shape: Shape, frame: Moments, outlines: Outlines) -> str:
+    """Why the points support no decision at any tolerance, or nothing if they do; a picture may have specks."""
+    points = shape.points if shape.weights is None else shape.points[shape.weights > 0]
+    strays = "" if outlines.pixel_noise else set_by_strays(points, few=not outlines.sampled)
+    return strays or on_a_line(frame.covariance)
 
 
 def _doubt(outlines: Outlines, tolerance: float) -> str:

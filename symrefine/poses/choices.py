@@ -16,13 +16,13 @@ import numpy as np
 
 from symrefine.geometry import Array, batches
 from symrefine.groups.orthogonal import Index, about_z
+from symrefine.groups.standard import GOLDEN
 from symrefine.poses.symmetry import Symmetry
 
 # Turns that a search looks at before it goes closer: finer than the 315 of `bop_toolkit` as BOP is evaluated.
 _TURNS = 360
 # Each step of a golden section leaves 0.618 of the width, 45 of them a billionth of a degree.
 _SECTIONS = 45
-_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,12 +162,12 @@ def _lowest(e: Array, p: Array, q: Array) -> tuple[Array, Array]:
 
 def _golden(at: Callable[[Array], Array], low: Array, high: Array) -> Array:
     """Where functions [n] of one variable are lowest between low and high [n], if each has one bottom there."""
-    inner, outer = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+    inner, outer = high - (high - low) / GOLDEN, low + (high - low) / GOLDEN
     left, right = at(inner), at(outer)
     for _ in range(_SECTIONS):
         down = left < right
         low, high = np.where(down, low, inner), np.where(down, outer, high)
-        inner, outer = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        inner, outer = high - (high - low) / GOLDEN, low + (high - low) / GOLDEN
         left, right = at(inner), at(outer)
     return 0.5 * (low + high)
 

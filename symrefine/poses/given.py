@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from symrefine.errors import InputError, about
 from symrefine.geometry import Array, Axis, frame_with_z, homogeneous, numbers
 from symrefine.groups import MAX_FOLD, PointGroup, identify, point_group
+from symrefine.groups.elements import DEFAULT_TOLERANCE_RAD as TILT_RAD
 from symrefine.groups.orthogonal import chord_angles, determinants
 from symrefine.poses.symmetry import Symmetry, checked_poses
 
@@ -19,9 +20,6 @@ _IDENTITY_RAD = 0.1 * 2.0 * np.pi / MAX_FOLD
 _MEET_REL = 0.01
 # What is shorter is rounding, in any unit in which things that one can hold have poses.
 _ROUNDING = 1e-6
-# By how much operations may be off their group, tilt an axis of revolution, and two such axes differ: as in
-# `groups.from_elements`.
-_TILT_RAD = np.radians(2.0)
 _BOP = ("symmetries_discrete", "symmetries_continuous")
 
 
@@ -102,7 +100,7 @@ def _identified(rotations: Array) -> PointGroup:
     """The group that orthogonal matrices [N, 3, 3] are, each off by no more than two degrees."""
     group = identify(rotations)
     worst = float(group.distance_rad(rotations).max())
-    if worst > _TILT_RAD:
+    if worst > TILT_RAD:
         raise InputError(
             f"the {len(rotations)} operations are no group: those of the likeliest one, {group.name}, are up to "
             f"{np.degrees(worst):.2g} degrees off"
@@ -131,7 +129,7 @@ def _of_bop(entry: Mapping[str, Any]) -> Symmetry:
     diameter = _length(entry.get("diameter", 0.0))
     if not axes:
         return _listed(discrete, diameter)
-    alike = all(abs(axis.direction @ axes[0].direction) > np.cos(_TILT_RAD) for axis in axes)
+    alike = all(abs(axis.direction @ axes[0].direction) > np.cos(TILT_RAD) for axis in axes)
     group, center = _of_revolution(axes[0], discrete) if alike else _of_sphere(axes)
     away = max(float(np.linalg.norm(np.cross(center - axis.point, axis.direction))) for axis in axes)
     if away > max(_MEET_REL * diameter, _ROUNDING):
@@ -187,7 +185,7 @@ def _of_revolution(axis: Axis, discrete: Array) -> tuple[PointGroup, Array]:
     """All turns about an axis, and what else is listed: turns about the same, and half turns across it."""
     cosines = discrete[:, :3, :3] @ axis.direction @ axis.direction
     tilts = np.arccos(np.clip(np.abs(cosines), 0.0, 1.0))
-    if tilts.max(initial=0.0) > _TILT_RAD:
+    if tilts.max(initial=0.0) > TILT_RAD:
         raise InputError(
             f"{_BOP[0]}[{int(tilts.argmax())}] tilts the axis of revolution by {np.degrees(tilts.max()):.2g} degrees"
         )

@@ -23,7 +23,7 @@ FACES, AROUND = 3, 192
 # Samples that tell which operations are hopeless, and of how many operations the worst they allow for: a few samples
 # miss by chance.
 GLANCE, CHANCES = 250, 1000
-_NO_NOISE = np.empty(0)
+_NO_NOISE = np.array([])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
