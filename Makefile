@@ -33,8 +33,8 @@ test: lint ## lint, then the test suite
 bench: $(READY) ## measure against the stored baseline, and how cost grows; BENCH_ARGS=--full: all of it
 	@$(PY) -m benchmarks.run $(BENCH_ARGS)
 
-fuzz: $(READY) ## damage 100,000 files of every format, configs and command lines, and read them
-	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m experiments.studies.fuzz
+fuzz: $(READY) ## damage 100,000 files of every format, configs and command lines, and read them; the table in docs
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m experiments.studies.fuzz --page docs/robustness.md
 
 reproduce: $(READY) ## the paper's experiments beside the baseline, in minutes; the report, the README's table
 	@$(PY) -m experiments.studies.reproduce

@@ -6,8 +6,11 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +111,36 @@ def test_addresses_are_listed_and_read(run: Run, lab: Path) -> None:
     assert err.startswith("symrefine: memory:///models/deep/cut.ply: the header")
     refused(run("batch", "memory://nothing"), "memory://nothing: there is no such file or folder")
     refused(run("batch", "nosuch://bucket/models"), "nosuch://bucket/models: cannot be read: Protocol not known")
+
+
+@pytest.fixture
+def served(lab: Path) -> Iterator[str]:
+    """The address at which this machine serves the files in `lab`."""
+    pytest.importorskip("aiohttp")
+    pytest.importorskip("fsspec")
+
+    class Silent(SimpleHTTPRequestHandler):
+        def log_message(self, *_: object) -> None:
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Silent, directory=str(lab))) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+def test_a_server_is_listed_and_what_changes_there_is_noticed(run: Run, lab: Path, served: str) -> None:
+    assert names(f"{served}/objects/")[:2] == ["box000.xyz", "box001.xyz"]
+    line = ("batch", f"{served}/objects/box000.xyz", "--out", "far.jsonl")
+    assert run(*line)[0] == 0
+    assert run("batch", "objects/box000.xyz", "--out", "near.jsonl")[0] == 0
+    far, near = rows("far.jsonl")[0], rows("near.jsonl")[0]
+    assert {key for key in far if far[key] != near.get(key)} <= {"file", "source", "state", "timings"}
+    assert "1 done before" in run(*line)[1]
+    (lab / "objects" / "box000.xyz").write_bytes((lab / "objects" / "box005.xyz").read_bytes())
+    os.utime(lab / "objects" / "box000.xyz", (0, 10**9))
+    assert "done before" not in run(*line)[1]
+    refused(run("batch", f"{served}/objects/none.xyz"), f"{served}/objects/none.xyz: there is no such file")
 
 
 def test_addresses_name_what_they_need(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,8 +15,10 @@ import numpy as np
 import pytest
 
 import symrefine
+from experiments.studies import pages
 from symrefine.cli.parser import parse
 from symrefine.detection.story import detect
+from symrefine.errors import InputError
 from symrefine.export.records import detection_record
 from symrefine.shape import Shape
 
@@ -197,3 +199,27 @@ def test_the_page_of_fleets_does_what_it_says(tmp_path: Path) -> None:
     (tmp_path / "mug.ply").write_text(f"ply\nformat ascii 1.0\nelement vertex 8\n{head}end_header\n{box}")
     (tmp_path / "page.py").write_text(python_blocks((DOCS / "fleets.md").read_text(encoding="utf-8")), encoding="utf-8")
     assert run("page.py", cwd=tmp_path).stdout == "mug D2h\n"
+
+
+@pytest.mark.parametrize(
+    ("page", "name"), [("robustness.md", "fuzz"), ("fleets.md", "kills"), ("fleets.md", "cluster")]
+)
+def test_tables_of_campaigns_are_put_there_by_commands(page: str, name: str, tmp_path: Path) -> None:
+    copy = tmp_path / page
+    copy.write_bytes((DOCS / page).read_bytes())
+    pages.put(copy, name, "| a |\n")
+    before, after = copy.read_text(encoding="utf-8").split("| a |")
+    assert before.endswith(f"<!-- {name}:begin -->\n")
+    assert after.startswith(f"\n<!-- {name}:end -->\n")
+    with pytest.raises(InputError, match="expected the markers"):
+        pages.check(copy, "nothing")
+
+
+def test_a_campaign_of_few_cases_writes_its_table(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("x\n<!-- fuzz:begin -->\n<!-- fuzz:end -->\ny\n", encoding="utf-8")
+    asked = ("--cases", "20", "--only", ".xyz", "--jobs", "1", "--page", str(page))
+    said = run("-m", "experiments.studies.fuzz", *asked)
+    shown = page.read_text(encoding="utf-8")
+    assert "| .xyz | 20 |" in shown
+    assert shown.split("<!-- fuzz:begin -->\n")[1].split("\n<!--")[0] in said.stdout

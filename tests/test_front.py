@@ -212,6 +212,34 @@ def test_what_was_found_is_of_an_object_in_space(found, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+OTHERS = {
+    "fewer": ((CORNERS[:-1], None), r"it has 8 points, this has 7"),
+    "moved": ((CORNERS + [0.0, 0.0, 0.1], TRIANGLES), r"a coordinate of its points differs by 0\.1"),
+    "no mesh": ((CORNERS, None), "its triangles are others"),
+    "other triangles": ((CORNERS, TRIANGLES[::-1]), "its triangles are others"),
+}
+
+
+@pytest.mark.parametrize(("other", "message"), OTHERS.values(), ids=OTHERS)
+def test_what_was_found_in_another_object_is_refused(other, message, tmp_path):
+    found = symrefine.detect((CORNERS, TRIANGLES))
+    points, faces = other
+    shape = symrefine.Shape(points) if faces is None else symrefine.Shape(points, faces)
+    for ask in (
+        lambda: symrefine.symmetrize(shape, found),
+        lambda: symrefine.export(shape, "npz", tmp_path / "x.npz", found=found),
+    ):
+        with pytest.raises(InputError, match=f"what was found is of another object, .*: {message}; detect in this"):
+            ask()
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_was_found_in_the_same_object_is_taken_as_it_is_written():
+    found = symrefine.detect((CORNERS, TRIANGLES))
+    again = symrefine.symmetrize((CORNERS.astype(np.float32), TRIANGLES), found)
+    np.testing.assert_allclose(again.shape.points, CORNERS, atol=1e-6)
+
+
 EXPORTS = {
     "mirrors for BOP": (("bop", "m.json", {"improper": True}), "improper does not apply to 'bop'"),
     "another suffix": (("npz", "x.dat", {}), "expected a name that ends in .npz"),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments.objects.models import Package
-from experiments.studies import reproduce
+from experiments.studies import pages, reproduce
 from experiments.studies.methods import METHODS, generated
 from experiments.studies.planes import SHAPES, Case, check, make, run, score, trace
 from symrefine.cli import invoke
@@ -20,6 +20,8 @@ from symrefine.study.typed import read_config
 from symrefine.surface.misses import miss_distances
 
 CONFIGS = Path(__file__).parents[1] / "configs"
+
+BEGIN, END = "<!-- reproduce:begin -->", "<!-- reproduce:end -->"
 
 
 MIRRORS = {"C1": 0, "Cs": 1, "Cinfv": 0, "D2h": 3, "Oh": 9}
@@ -163,7 +165,7 @@ def test_reproduce_sets_side_by_side_and_names_misses(
 ) -> None:
     home = tmp_path / "home"
     (home / "configs").mkdir(parents=True)
-    (home / "README.md").write_text(f"before\n{reproduce.BEGIN}\nold\n{reproduce.END}\nafter\n")
+    (home / "README.md").write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")
     monkeypatch.syspath_prepend(str(home))
     monkeypatch.setattr("experiments.objects.models.download_package", no_network)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "empty"))
@@ -202,8 +204,8 @@ def test_reproduce_sets_side_by_side_and_names_misses(
     assert "- **real** left out: no real meshes: no network" in report
     assert "![Half](halves/half.png)" in report
     readme = (home / "README.md").read_text()
-    assert readme.startswith(f"before\n{reproduce.BEGIN}\n|")
-    assert readme.endswith(f"![Half](docs/reproduce.png)\n{reproduce.END}\nafter\n")
+    assert readme.startswith(f"before\n{BEGIN}\n|")
+    assert readme.endswith(f"![Half](docs/reproduce.png)\n{END}\nafter\n")
     assert "| halves | 0.5 m | **0.5 m** | two 1 m |" in (home / "docs" / "reproduce_table.md").read_text()
     assert reproduce.main(arguments) == 1
     assert (home / "README.md").read_text() == readme
@@ -211,12 +213,10 @@ def test_reproduce_sets_side_by_side_and_names_misses(
     assert reproduce.main(arguments) == 0  # without a network nothing is wrong
 
 
-@pytest.mark.parametrize(
-    "text", ["", reproduce.BEGIN, f"{reproduce.END} {reproduce.BEGIN}", reproduce.BEGIN * 2 + reproduce.END]
-)
+@pytest.mark.parametrize("text", ["", BEGIN, f"{END} {BEGIN}", BEGIN * 2 + END])
 def test_markers_must_stand_once_and_in_order(text: str) -> None:
     with pytest.raises(InputError, match=r"README.md: expected the markers"):
-        reproduce.between_markers(text, "x", "README.md")
+        pages.between_markers(text, "reproduce", "x", "README.md")
 
 
 def test_every_study_of_the_report_is_there() -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import symrefine
 from experiments.objects.shapes import join, revolve
 from symrefine.cli import invoke
 from symrefine.decide.subgroups import subgroup_chain
@@ -299,6 +300,20 @@ def test_the_command_tells_both_groups(kind: str, tmp_path: Path, capsys: pytest
     alone = json.loads((tmp_path / "y.json").read_text())
     assert (alone["point_group"], alone["planes"]) == ("C2v", record["textured"]["planes"])
     assert alone["textured"] is None
+
+
+def test_exports_are_of_the_shape_with_its_texture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write_obj(tmp_path, (1.0, 1.0, 2.0), quarters)
+    found = symrefine.detect(load(path, texture=True))
+    assert found.textured.point_group != found.point_group
+    out = tmp_path / "t.npz"
+    for words, group in (([], found.point_group), (["--texture"], found.textured.point_group)):
+        assert invoke(["export", str(path), "--to", "npz", "--improper", "--out", str(out), *words]) == 0
+        assert capsys.readouterr().out.startswith(f"{path}: {group}\n")
+        with np.load(out) as written:
+            assert str(written["point_group"]) == group
+    symrefine.export(found.shape, "npz", tmp_path / "p.npz", found=found.textured, improper=True)
+    assert (tmp_path / "p.npz").read_bytes() == out.read_bytes()
 
 
 def damaged(folder: Path, case: str) -> str:

@@ -26,7 +26,8 @@ from types import FrameType
 
 from experiments.studies.fuzz_cases import TARGETS, TYPED, Case, attempt, case
 from experiments.studies.fuzz_seeds import SUFFIXES, seeds
-from symrefine.errors import SymrefineError
+from experiments.studies.pages import check, put
+from symrefine.errors import InputError, SymrefineError
 from symrefine.load import scans, step
 
 # Too long for a file of a few kilobytes, in seconds of the processor, and too much.
@@ -277,7 +278,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=0, help="other seeds, other cases (default: %(default)s)")
     parser.add_argument("--jobs", type=int, default=2, help="processes (default: %(default)s)")
     parser.add_argument("--only", nargs="+", choices=TARGETS, metavar="WHAT", help="some of the formats, such as .ply")
+    parser.add_argument("--page", type=Path, help="put the table into this page, between the markers `fuzz`")
     args = parser.parse_args(argv)
+    if args.page is not None:
+        check(args.page, "fuzz")
     begun = time.perf_counter()
     counts = plan(args.cases, args.only or TARGETS)
     tallies = {target: Tally() for target in counts}
@@ -286,10 +290,13 @@ def main(argv: Sequence[str] | None = None) -> int:
             tallies[target].add(tally)
             if sys.stderr.isatty():
                 print(f"\r{sum(t.cases for t in tallies.values()):,} cases", end="", file=sys.stderr, flush=True)
-    print(table(tallies))
     seconds = time.perf_counter() - begun
     rate = sum(tally.cases for tally in tallies.values()) / seconds
-    print(f"\nSeed {args.seed}, {args.jobs} processes, {seconds:.0f} s, {rate:.0f} cases a second.")
+    how = f"Seed {args.seed}, {args.jobs} processes, {seconds:.0f} s, {rate:.0f} cases a second."
+    told = f"{table(tallies)}\n\n{how}"
+    print(told)
+    if args.page is not None and all(tallies[target].cases == count for target, count in counts.items()):
+        put(args.page, "fuzz", told)
     for target, tally in tallies.items():
         for told, count in Counter(tally.findings).most_common():
             print(f"finding: {target}: {count} x {told}")
@@ -297,4 +304,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except InputError as error:
+        sys.exit(f"fuzz: {error}")

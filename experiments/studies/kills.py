@@ -24,6 +24,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Self
 
+from experiments.studies.pages import check, put
+from symrefine.errors import InputError
 from symrefine.study.tables import grid
 
 EXECUTORS: Mapping[str, Sequence[str]] = {
@@ -244,7 +246,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--tasks", type=int, default=24, help="objects, and runs of the study (default: 24)")
     parser.add_argument("--cluster", action="store_true", help="kill processes of a cluster instead")
     parser.add_argument("--seed", type=int, default=0, help="of the moments (default: 0)")
+    parser.add_argument(
+        "--page", type=Path, help="put the table into this page, between the markers `kills`, or `cluster`"
+    )
     options = parser.parse_args(argv)
+    study = "cluster" if options.cluster else "kills"
+    if options.page is not None:
+        check(options.page, study)
     tolls = []
     with tempfile.TemporaryDirectory(prefix="symrefine-kills-") as name:
         lay_out(Path(name), options.tasks)
@@ -255,9 +263,15 @@ def main(argv: Sequence[str] | None = None) -> int:
                 tolls.append(campaign(Path(name), command, executor, options.times, options.seed))
                 print(tolls[-1], file=sys.stderr, flush=True)
     columns = [column.replace("_", " ") for column in asdict(tolls[0])]
-    print(grid(columns, [[str(value) for value in asdict(toll).values()] for toll in tolls]), end="")
+    table = grid(columns, [[str(value) for value in asdict(toll).values()] for toll in tolls])
+    print(table, end="")
+    if options.page is not None:
+        put(options.page, study, table)
     return int(not all(toll.is_clean for toll in tolls))
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    try:
+        sys.exit(main())
+    except InputError as error:
+        sys.exit(f"kills: {error}")

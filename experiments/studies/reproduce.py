@@ -14,6 +14,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
+from experiments.studies.pages import put, write
 from symrefine.errors import InputError, SymrefineError
 
 if TYPE_CHECKING:
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
 
 HOME = Path(__file__).parents[2]
 CONFIG = HOME / "configs" / "reproduce.yaml"
-BEGIN, END = "<!-- reproduce:begin -->", "<!-- reproduce:end -->"
+# Of the table in the README.
+MARK = "reproduce"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -217,32 +219,10 @@ def write_docs(parts: Sequence[Part], picture: Picture, home: Path) -> None:
             shutil.copyfile(part.outcome.figures[picture.figure], folder / "reproduce.png")
             shown = f"\n![{picture.figure}](docs/reproduce.png)\n"
     readme = home / "README.md"
-    text = readme.read_text(encoding="utf-8") if readme.is_file() else ""
-    if BEGIN not in text:
-        print(f"{readme}: has no marker {BEGIN}; the table is in {folder / 'reproduce_table.md'} only", file=sys.stderr)
+    if not readme.is_file() or f"{MARK}:begin" not in readme.read_text(encoding="utf-8"):
+        print(f"{readme}: has no marker {MARK}; the table is in {folder / 'reproduce_table.md'} only", file=sys.stderr)
         return
-    write(readme, between_markers(text, table + shown, str(readme)))
-
-
-def between_markers(text: str, content: str, source: str) -> str:
-    """The text with what stands between the two markers replaced.
-
-    Raises:
-        InputError: a marker is missing, there twice, or they are the wrong way round.
-    """
-    if (text.count(BEGIN), text.count(END)) != (1, 1) or text.index(BEGIN) > text.index(END):
-        raise InputError(f"{source}: expected the markers {BEGIN} and {END} once each, in this order")
-    head, rest = text.split(BEGIN)
-    return f"{head}{BEGIN}\n{content.rstrip()}\n{END}{rest.split(END)[1]}"
-
-
-def write(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all."""
-    from symrefine.files import replacing
-
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(path) as draft:
-        draft.write_text(text, encoding="utf-8", newline="")
+    put(readme, MARK, table + shown)
 
 
 if __name__ == "__main__":

@@ -51,6 +51,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="canonical: where the 4 x 4 transform goes, .json or .npz (default: OUT_transform.json)",
     )
+    parser.add_argument(
+        "--texture",
+        action="store_true",
+        default=None,
+        help="the symmetries of the shape with its texture, of which the images are read as `detect --texture` does",
+    )
     add_frame_option(parser)
     add_detection_options(parser)
 
@@ -76,16 +82,22 @@ def run(args: argparse.Namespace) -> int:
 
 
 def detected(args: argparse.Namespace) -> tuple["Shape", "Detection"]:
-    """The shape in a file and its symmetries.
+    """The shape in a file and its symmetries, those with its texture where that is asked for.
 
     Raises:
         InputError: a picture, or points with two coordinates.
     """
+    from symrefine.front.space import Detection
     from symrefine.front.verbs import detect_in_space
     from symrefine.load import load
 
-    shape = loaded(args.path, args.format, partial(load, measure=args.measure, frame=args.frame))
-    return shape, detect_in_space(shape, tolerance=args.tolerance, units=args.units, seed=args.seed)
+    texture = bool(getattr(args, "texture", None))
+    shape = loaded(args.path, args.format, partial(load, measure=args.measure, frame=args.frame, texture=texture))
+    found = detect_in_space(shape, tolerance=args.tolerance, units=args.units, seed=args.seed)
+    if texture:
+        assert isinstance(found.textured, Detection)
+        found = found.textured
+    return shape, found
 
 
 def _check(args: argparse.Namespace) -> None:

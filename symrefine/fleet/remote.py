@@ -4,11 +4,14 @@ import re
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 from symrefine.errors import InputError
 
+# What file systems call the things that change with a file.
+_CHANGING = ("size", "mtime", "ETag", "etag", "Last-Modified", "LastModified", "last_modified")
 _URL = re.compile(r"[a-z][a-z0-9+.-]*://")
 
 
@@ -65,7 +68,10 @@ def state(url: str) -> str:
     """
     system, path = _reached(url)
     with _told(url):
-        return str(system.ukey(path))
+        about = system.info(path)
+        # That of HTTP takes files to be static, and is the address alone.
+        told = [system.ukey(path), *(about[name] for name in _CHANGING if name in about)]
+        return sha256(" ".join(map(str, told)).encode()).hexdigest()
 
 
 def _reached(url: str) -> tuple[Any, str]:

@@ -3,10 +3,16 @@
 from operator import index
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from symrefine.errors import InputError
 
 if TYPE_CHECKING:
     from symrefine.front.space import Detection
+    from symrefine.shape import Shape
+
+# Of the diagonal: what coordinates may differ by that were written in single precision.
+_SINGLE = 1e-6
 
 
 def told(tolerance: float | str, units: str | None) -> dict[str, Any]:
@@ -41,3 +47,27 @@ def in_space(found: Any) -> "Detection":
     if not isinstance(found, Detection):
         raise InputError(f"found is of type {type(found).__name__}; expected what symrefine.detect found in space")
     return found
+
+
+def found_in(found: Any, shape: "Shape") -> "Detection":
+    """What was found before, if it is of this object in space.
+
+    Raises:
+        InputError: something else, or found in other points or triangles.
+    """
+    known = in_space(found).shape
+    if found.sample is not None and found.sample.of == len(shape.points) != len(known.points):
+        return in_space(found)  # only a part of the points is known
+    if known.points.shape != shape.points.shape:
+        raise InputError(_other(known, shape, f"it has {len(known.points):,} points, this has {len(shape.points):,}"))
+    away = float(np.abs(known.points - shape.points).max())
+    if not away <= _SINGLE * found.diagonal:
+        raise InputError(_other(known, shape, f"a coordinate of its points differs by {away:.3g}"))
+    triangles, those = (() if given.faces is None else given.faces for given in (known, shape))
+    if not np.array_equal(triangles, those):
+        raise InputError(_other(known, shape, "its triangles are others"))
+    return in_space(found)
+
+
+def _other(known: "Shape", shape: "Shape", why: str) -> str:
+    return f"{shape.source}: what was found is of another object, {known.source}: {why}; detect in this one"

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
 from symrefine.errors import InputError
-from symrefine.front.asked import in_space, seed_of, told
+from symrefine.front.asked import found_in, in_space, seed_of, told
 from symrefine.front.verbs import detect_in_space
 from symrefine.lengths import relative_tolerance
 from symrefine.load.objects import shape_of
@@ -42,14 +42,16 @@ def symmetrize(
         seed: of the random samples of a surface.
 
     Raises:
-        InputError: nothing is decided, no symmetry, or no such subgroup.
+        InputError: nothing is decided, no symmetry, no such subgroup, or what was found in another object.
         DegenerateShapeError: a few points, of which some have no counterpart.
     """
     from symrefine.front.exact import Symmetrized
     from symrefine.symmetrize import placed_subgroup, symmetrize
 
     shape = shape_of(shape)
-    found = detect_in_space(shape, tolerance=tolerance, units=units, seed=seed) if found is None else in_space(found)
+    found = (
+        detect_in_space(shape, tolerance=tolerance, units=units, seed=seed) if found is None else found_in(found, shape)
+    )
     if found.undetermined:
         raise InputError(f"{shape.source}: no symmetry to make exact: {found.undetermined}")
     if found.point_group == "C1":
@@ -89,7 +91,8 @@ def complete(
         seed: as of `detect`.
 
     Raises:
-        InputError: a mesh or atoms, an object without a symmetry, or none that can be decided.
+        InputError: a mesh or atoms, an object without a symmetry, none that can be decided, or what was found in
+            another object.
     """
     from symrefine.complete import check_scan, complete
     from symrefine.front.completed import Completion
@@ -98,7 +101,7 @@ def complete(
     shape, clock = shape_of(shape, viewpoint=viewpoint), Clock()
     check_scan(shape)
     asked: dict[str, Any] = {"tolerance": tolerance, "units": units, "seed": seed, "outliers": outliers}
-    found = in_space(detect(shape, **asked) if found is None else found)
+    found = in_space(detect(shape, **asked)) if found is None else found_in(found, shape)
     with clock("complete"):
         made = complete(shape, found)
     options = told(tolerance, units) | {"seed": seed_of(seed), "outliers": outliers}
@@ -135,13 +138,13 @@ def export(
         What was written, and notes on what the format cannot express.
 
     Raises:
-        InputError: another format, nothing decided, or files that cannot be written.
+        InputError: another format, nothing decided, what was found in another object, or files that cannot be written.
     """
     from symrefine.export.operations import STEPS
     from symrefine.export.packages import package_of, write_package
 
     shape, out = shape_of(shape), Path(out)
-    found = detect_in_space(shape) if found is None else in_space(found)
+    found = detect_in_space(shape) if found is None else found_in(found, shape)
     place = None if transform is None else Path(transform)
     turns = STEPS if steps is None else steps
     package = package_of(

@@ -74,7 +74,7 @@ def pixel_weights(grey: Array, *, threshold: Threshold | None = None, invert: bo
         invert: exchange object and background; in a grey picture, weights become their largest value minus them.
     """
     if threshold is not None:
-        grey = (grey >= (otsu(grey) if threshold == "otsu" else threshold)).astype(np.float64)
+        grey = (grey >= (otsu(grey) if threshold == "otsu" else threshold)).astype(grey.dtype)
     inside = np.zeros(grey.shape, dtype=bool)
     inside[(slice(1, -1),) * grey.ndim] = True
     border = grey[~inside]
@@ -82,7 +82,7 @@ def pixel_weights(grey: Array, *, threshold: Threshold | None = None, invert: bo
     if ((grey == levels[0]) | (grey == levels[1])).all():
         # The level that most of the border has; of the whole picture if that is a tie; then the lightest.
         votes = [(int((border == level).sum()), int((grey == level).sum()), k) for k, level in enumerate(levels)]
-        return ((grey != levels[max(votes)[-1]]) != invert).astype(np.float64)
+        return ((grey != levels[max(votes)[-1]]) != invert).astype(grey.dtype)
     level = float(np.median(border))
     scatter = 1.4826 * float(np.median(np.abs(border - level)))
     contrast = np.abs(grey - level)

@@ -65,14 +65,13 @@ def volume_content(volume: Volume, wanted: Wanted) -> Content:
     """
     if not (np.isfinite(volume.axes).all() and np.isfinite(volume.origin).all() and np.linalg.det(volume.axes) != 0.0):
         raise InputError(f"the axes of the grid are {volume.axes.T.tolist()}; expected three that span space")
-    grey = _grey(volume.values)
     if wanted.measure == "solid":
-        return _solid(grey, volume, wanted)
+        return _solid(_grey(volume.values), volume, wanted)
     if wanted.invert:
         raise InputError(
             "invert leaves a surface as it is; take measure 'solid' to weigh the background, or leave it out"
         )
-    return _surface(grey, volume, wanted)
+    return _surface(_grey(volume.values), volume, wanted)
 
 
 def _grey(values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -85,7 +84,9 @@ def _grey(values: NDArray[np.float32]) -> NDArray[np.float32]:
         )
     if low == high:
         raise InputError(f"all {values.size} voxels have the same intensity {low:g}: there is no object")
-    return ((values - np.float32(low)) / np.float32(high - low)).astype(np.float32)
+    grey: NDArray[np.float32] = values - np.float32(low)
+    grey /= np.float32(high - low)  # in place: a second copy of a large volume would be a gigabyte
+    return grey
 
 
 def _surface(grey: NDArray[np.float32], volume: Volume, wanted: Wanted) -> Content:
@@ -93,6 +94,7 @@ def _surface(grey: NDArray[np.float32], volume: Volume, wanted: Wanted) -> Conte
     steps = np.ones(3, dtype=np.int64)
     while (crossings := sum(int(_crossed(grey, axis, level).sum()) for axis in range(3))) > ENOUGH:
         wider = _wider(volume.axes, steps, (crossings / ENOUGH) ** 0.5)
+        del grey  # or a large volume would be held once more
         grey, steps = _averaged(_grey(volume.values), wider), wider
     if not crossings:
         raise InputError(f"no grey value crosses the threshold {level:.3g}; choose another from 0 to 1")

@@ -170,7 +170,7 @@ def read_nrrd(data: bytes, wanted: Wanted) -> Frames[Content]:
     shape = tuple(int(size) for size in np.atleast_1d(header.get("sizes", [])))
     check_size(shape)
     dtype = _nrrd_type(header)
-    body = _unpacked(data[stream.tell() :], str(header.get("encoding")), math.prod(shape) * dtype.itemsize)
+    body = _unpacked(memoryview(data)[stream.tell() :], str(header.get("encoding")), math.prod(shape) * dtype.itemsize)
     _check_length(shape, dtype, len(body))
     values = np.frombuffer(body, dtype).reshape(shape, order="F").astype(np.float32)
     axes, origin = _nrrd_frame(header)
@@ -186,7 +186,7 @@ def _nrrd_type(header: Mapping[str, Any]) -> "np.dtype[Any]":
     return np.dtype(("<" if endian == "little" else ">") + code)
 
 
-def _unpacked(body: bytes, encoding: str, size: int) -> bytes:
+def _unpacked(body: memoryview, encoding: str, size: int) -> bytes | memoryview:
     """Data of a NRRD file; one byte more than expected at most."""
     if encoding == "raw":
         return body
