@@ -86,7 +86,7 @@ def _merit(candidates: Array, scene: Scene) -> Array:
     # The area of an ellipsoid's silhouette along v is sqrt(v' adj(C) v): the square root of the product of two axes.
     values, vectors = np.linalg.eigh(covariance)
     adjugate = np.array([values[1] * values[2], values[0] * values[2], values[0] * values[1]])
-    area = np.sqrt(((candidates @ vectors) ** 2) @ adjugate)
+    area = np.sqrt(np.maximum(((candidates @ vectors) ** 2) @ adjugate, 0.0))
     merit = 0.6 * area / max(float(area.max()), 1e-300) - 0.2 * np.abs(candidates @ scene.stage.frame[2] - 0.45)
     quads = scene.planes or scene.missed_planes[:1]
     if quads:

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from symrefine.errors import printable
 from symrefine.geometry import Array
-from symrefine.picture.camera import look_at
+from symrefine.picture.camera import look_at, seen_from
 from symrefine.picture.canvas import Canvas
 from symrefine.picture.painter import paint
 from symrefine.picture.pair import Pair, Side
@@ -27,22 +28,30 @@ def pair_png(pair: Pair, title: str, *, width: int, height: int) -> bytes:
     top = TITLE if title else 0
     half, high = width // 2, height - top - WORDS
     best, up = pair.ways[0], np.array([0.0, 0.0, 1.0])
-    # A panel is higher than wide: what comes side by side stands above one another there.
-    panels = [_panel(pair, *best.part(share, pair.beside(up)), half, high, judged=share > 0.0) for share in (0.0, 1.0)]
+    aspect = half / high
+    back = look_at(pair.stage(best.matrix, best.shift, np.eye(3)), aspect=aspect, fov_rad=FOV_RAD).frame[2]
+    panels = []
+    for share in (0.0, 1.0):
+        # A panel is higher than wide: what stands beside the other stands above it there.
+        matrix, shift = best.part(share, pair.beside(up))
+        scene = pair.stage(matrix, shift, np.eye(3))
+        camera = seen_from(back, scene.stage.points, up, aspect=aspect, fov_rad=FOV_RAD, fill=0.9)
+        surface = _laid(pair, matrix, shift, judged=share > 0.0)
+        panels.append(paint(scene, surface, camera, half, high))
     canvas = Canvas(width, height, title)
     picture = np.ones((height, width, 3))
     for k, panel in enumerate(panels):
         picture[top : top + high, k * half : (k + 1) * half] = panel
     canvas.figure.figimage(picture, origin="upper", zorder=-1)
     for k, words in enumerate((_before(pair), _after(pair))):
+        size = min(LETTER, 0.96 * half / (WIDE * max(len(text) for text, _ in words)))
         for row, (text, colour) in enumerate(words):
-            size = min(LETTER, 0.96 * half / (WIDE * max(1, len(text))))
             canvas.name(text, (k + 0.5) * half, top + high + (row + 0.7) * LINE, colour, size)
     return canvas.png()
 
 
 def _before(pair: Pair) -> list[tuple[str, Colour]]:
-    return [("before", AXIS), *((side.name[-NAME:], side.colour) for side in pair.sides)]
+    return [("before", AXIS), *((printable(side.name)[-NAME:], side.colour) for side in pair.sides)]
 
 
 def _after(pair: Pair) -> list[tuple[str, Colour]]:
@@ -54,13 +63,11 @@ def _after(pair: Pair) -> list[tuple[str, Colour]]:
     return [(met, AXIS), *rest]
 
 
-def _panel(pair: Pair, matrix: Array, shift: Array, width: int, height: int, *, judged: bool) -> Array:
-    """Picture [height, width, 3] of both, the source taken somewhere; with `judged` in the colours of what is said."""
+def _laid(pair: Pair, matrix: Array, shift: Array, *, judged: bool) -> Surface:
+    """Both, the source taken somewhere; with `judged` in the colours of what is said."""
     source, target = (_painted(pair, side, judged=judged) for side in pair.sides)
     moved = replace(source, points=source.points @ matrix.T + shift, normals=source.normals @ matrix.T)
-    scene = pair.stage(matrix, shift, np.eye(3))
-    camera = look_at(scene, aspect=width / height, fov_rad=FOV_RAD, fill=0.9)
-    return paint(scene, _joined([moved, target]), camera, width, height)
+    return _joined([moved, target])
 
 
 def _painted(pair: Pair, side: Side, *, judged: bool) -> Surface:
