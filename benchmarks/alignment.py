@@ -9,6 +9,7 @@ import argparse
 import time
 from collections.abc import Callable, Iterator, Sequence
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 
@@ -20,6 +21,10 @@ from symrefine.moments.moments import central_moments
 from symrefine.ntuples.contract import ntuples
 
 REPEATS = 3
+# Conditions of which the figures are compared with stored ones; objects that the others are asked of.
+COMPARED = ("overlap 65 %", "clutter 50 %")
+OTHERS = ("asymmetric", "grinder", "fan3")
+PICTURE = Path("out/bench/partial_alignment.png")
 METHODS = ("align", "moments", "tuples", "open3d")
 # Every vector of moments to order 8 that has an n-tuple: single odd orders, and an even one with an odd one.
 ALL_ORDERS = [(p,) for p in (3, 5, 7)] + list(product((2, 4, 6, 8), (3, 5, 7)))
@@ -92,23 +97,31 @@ def evaluation() -> Iterator[Metric]:
             yield Metric(key="n-tuples over their moments", value=second / first, unit="ratio", target=0.1)
 
 
-def in_part(seeds: int) -> Iterator[Metric]:
-    """Objects that share 65 % with one another, or half of a scene, beside the peers that are installed."""
-    rows = [
-        partial.run(case)
-        for case in partial.cases(partial.METHODS, ("overlap 65 %", "clutter 50 %"), partial.OWN, range(seeds))
-    ]
-    print("\n" + "\n".join(partial.table(rows, partial.METHODS)))
-    own = [r for r in rows if r.case.method == "align"]
+def in_part(seeds: int, *, full: bool) -> Iterator[Metric]:
+    """Objects that share a part with one another, strays and clutter, beside the peers that are installed.
+
+    The figures that are compared are of those that share 65 %, and of half a scene; with `full` the study as a whole.
+    """
+    names = partial.objects() if full else OTHERS
+    conditions = [c for c in (partial.CONDITIONS if full else partial.QUICK) if c not in COMPARED]
+    asked = [(COMPARED, partial.OWN), (conditions, names)]
+    methods = partial.METHODS
+    parts = [[partial.run(case) for case in partial.cases(methods, some, of, range(seeds))] for some, of in asked]
+    rows = [row for part in parts for row in part]
+    print("\n" + "\n".join([*partial.table(rows, methods), "", *partial.curves(rows, methods)]))
+    PICTURE.parent.mkdir(parents=True, exist_ok=True)
+    partial.picture(rows, methods, PICTURE)
+    print(f"    drawn in {PICTURE}")
+    own = [r for r in parts[0] if r.case.method == partial.OURS]
     wrong, spent = np.mean([not r.right for r in own]), 1e3 * np.mean([r.seconds for r in own])
     yield Metric(key="align in part, wrong of all", value=float(wrong), unit="share", target=0.02)
     yield Metric(key="align in part, processor time", value=float(spent), unit="ms", target=150.0)
 
 
-def metrics(seeds: int = 1) -> Iterator[Metric]:
+def metrics(seeds: int = 1, *, full: bool = False) -> Iterator[Metric]:
     """The figures that are compared with stored ones."""
     yield from evaluation()
-    yield from in_part(seeds)
+    yield from in_part(seeds, full=full)
     if present(CHIRAL):
         yield from beside_open3d(seeds)
 
@@ -117,7 +130,9 @@ def main() -> None:
     """Print every figure."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=2, help="pairs of each object and determinant")
-    list(metrics(parser.parse_args().seeds))
+    parser.add_argument("--full", action="store_true", help="all objects and conditions of the study of parts")
+    options = parser.parse_args()
+    list(metrics(options.seeds, full=options.full))
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ def main() -> int:
     options = parser.parse_args()
     full = options.full
     found = [
-        *detection.metrics(), *everyday.metrics(full=full), *growth.metrics(full=full), *alignment.metrics()
+        *detection.metrics(), *everyday.metrics(full=full), *growth.metrics(full=full), *alignment.metrics(full=full)
     ]  # fmt: skip
     report(found)
     if options.store:

@@ -133,6 +133,14 @@ def test_the_page_on_poses_does_what_it_says() -> None:
     exec(program, {})
 
 
+def test_the_page_on_alignment_does_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    exec(python_blocks((DOCS / "alignment.md").read_text(encoding="utf-8")), {})
+    assert (tmp_path / "map.html").is_file()
+
+
 def names(record: object) -> Iterator[str]:
     """Names of all fields of a report, those inside others too, but of `options` and `timings`, which vary."""
     if isinstance(record, dict):

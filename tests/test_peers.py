@@ -12,9 +12,33 @@ from experiments.objects.shapes import asymmetric, sample
 from experiments.peers.pymatgen_groups import point_group_pymatgen, schoenflies
 from experiments.peers.registration import PEERS, fast_global, installed, register
 from experiments.peers.trimesh_inertia import trimesh_symmetry
+from experiments.studies import partial_alignment as study
 from symrefine.errors import InputError
 from symrefine.geometry import line_angle_rad, random_orthogonal
 from symrefine.shape import Shape
+
+
+def test_a_study_tells_success_and_who_is_not_there(monkeypatch, tmp_path):
+    methods = ("align", "kiss", "open3d fgr")
+    monkeypatch.setattr(study, "installed", lambda name: name != "kiss")
+    right = {("full", "align"): True, ("overlap 50 %", "align"): False, ("full", "open3d fgr"): False}
+    rows = [
+        study.Row(
+            case=study.Case(name="camera", condition=condition, det=1, seed=0, method=method),
+            det_right=True, error_deg=0.0 if is_right else 90.0, error_rel=0.0, status="ok", confidence=1.0,
+            seconds=0.1,
+        )
+        for (condition, method), is_right in right.items()
+    ]  # fmt: skip
+    head, ours, absent, theirs, *_ = study.curves(rows, methods)
+    assert head.split()[3:5] == ["100", "%"]
+    assert ours.split() == ["align", "1.00", "0.00"]
+    assert absent.split() == ["kiss", "not", "installed"]
+    assert theirs.split() == ["open3d", "fgr", "0.00"]
+    assert study.success(rows, "overlap", "align") == {1.0: 1.0, 0.5: 0.0}
+    assert "not installed" in next(line for line in study.table(rows, methods) if line.startswith("full"))
+    study.picture(rows, methods, tmp_path / "a.png")
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(

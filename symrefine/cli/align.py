@@ -31,7 +31,7 @@ DESCRIPTION = (
     "that cannot be used is told on its line, the others go on, and the exit status is 2."
 )
 # Options whose files are of one pair, and the suffixes of these.
-_OF_ONE: dict[str, str] = {}
+_OF_ONE = {"recording": ".rrd", "report": ".html", "picture": ".png"}
 # Status of an answer that can be relied upon.
 _OK = "ok"
 
@@ -45,6 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE|-",
         help="write the whole result as JSON, of several B an array; - is stdout, with no table",
     )
+    parser.add_argument("--picture", metavar="FILE.png", help="write a picture of both before and after")
+    parser.add_argument("--recording", metavar="FILE.rrd", help="write before, after and the equivalents, for `view`")
+    parser.add_argument("--report", metavar="FILE.html", help="write a page with a model that turns")
     parser.add_argument("--scale", action="store_true", help="let the size differ too: b = s M a + t")
     others = {"source": "there has to be one", "target": "each of them"}
     for name, letter in (("source", "A"), ("target", "B")):

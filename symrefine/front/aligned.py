@@ -1,16 +1,23 @@
 """The map that was found between two objects."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
 
 from symrefine.align.alignment import Alignment as BareAlignment
-from symrefine.front.answers import Answer, Options
+from symrefine.files import Writer
+from symrefine.front import lines
+from symrefine.front.answers import Answer, Options, Pictured
 from symrefine.shape import Shape
+
+if TYPE_CHECKING:
+    from symrefine.picture.pair import Pair
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Alignment(Answer, BareAlignment):
-    """What `align` found, with a voice.
+class Alignment(Pictured, BareAlignment):
+    """What `align` found, with a voice. Of points of two or three coordinates there are pictures and pages too.
 
     It has all that `symrefine.align.alignment.Alignment` has.
 
@@ -28,3 +35,54 @@ class Alignment(Answer, BareAlignment):
         from symrefine.export.records import alignment_record
 
         return alignment_record(self, self.source, self.target, options=options, load_s=load_s)
+
+    @property
+    def _tolerance(self) -> float:
+        """As a fraction of the diagonal."""
+        return float(self.options.get("relative_tolerance", self.options["tolerance"]))
+
+    @cached_property
+    def _pair(self) -> "Pair":
+        """What there is to show."""
+        from symrefine.picture.pair import make_pair
+
+        return make_pair(self, self.source, self.target, self._tolerance)
+
+    def _picture(self, width: int, height: int) -> bytes:
+        from symrefine.picture.pair_png import pair_png
+        from symrefine.picture.pair_words import headline
+
+        return pair_png(self._pair, headline(self, self._pair), width=width, height=height)
+
+    def _repr_html_(self) -> str:
+        return super()._repr_html_() if self._is_shown else lines.card(self.to_dict(), "")
+
+    def show(self) -> Any:
+        """Open the recording in the viewer of rerun, or inline in a notebook.
+
+        Raises:
+            InputError: points of more than three coordinates, or of one.
+            SymrefineError: there is no display; `save("x.rrd")` and `symrefine view x.rrd --web` do without one.
+        """
+        from symrefine.viewer import show_pair
+
+        return show_pair(self, self._pair)
+
+    @property
+    def _is_shown(self) -> bool:
+        return self.target.dim in (2, 3)
+
+    def kinds(self) -> dict[str, Callable[[], Writer]]:
+        if not self._is_shown:
+            return Answer.kinds(self)
+        return Pictured.kinds(self) | {".html": self._page, ".rrd": self._recording}
+
+    def _page(self) -> Writer:
+        from symrefine.report import write_pair_html
+
+        return partial(write_pair_html, self, self._pair, self.options)
+
+    def _recording(self) -> Writer:
+        from symrefine.viewer import record_pair
+
+        return partial(record_pair, self, self._pair)

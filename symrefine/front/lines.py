@@ -132,11 +132,11 @@ def _aligned(record: Record) -> Iterator[str]:
     yield f"{printable(record['source'])} onto {printable(record['target'])}: {record['status']}"
     yield from map_rows(record)
     met = " and ".join(percent(record["overlap"][side]) for side in ("source", "target"))
-    yield f"  {handedness(record)}, confidence {record['confidence']:.3f}, overlap {met}"
-    yield (
-        f"  rms {percent(record['rms'])} of the diagonal, scale {record['scale']:.6g}; "
-        f"{sum(record['timings'].values()):.2g} s"
-    )
+    hand = f"{handedness(record)}, confidence {record['confidence']:.3f}"
+    holds = f"overlap {met}, rms {percent(record['rms'])} of the diagonal, scale {record['scale']:.6g}"
+    yield from [f"  {hand}", f"  {holds}"] if len(record["matrix"]) < 3 else [f"  {hand}, {holds}"]
+    observable = "everything" if record["observable"] == "full" else record["observable"]
+    yield f"  determined: {observable}; {sum(record['timings'].values()):.2g} s"
 
 
 def map_rows(record: Record) -> Iterator[str]:
@@ -152,15 +152,27 @@ def handedness(record: Record) -> str:
 
 
 def card(record: Record, picture: str) -> str:
-    """HTML for a notebook: the picture (PNG in base64), of a detection a table of mirrors and turns, and the rest."""
-    said = escape(answer(record), quote=True)
-    detected = any(name in record for name in MIRRORS)
-    told = "<br>".join(escape(line) for line in summary(record)[3 if detected else 1 :])
-    return (
-        f"<div><p><b>{escape(record['source'])}: {said}</b></p>"
-        f'<img src="data:image/png;base64,{picture}" alt="{said}" style="max-width:600px">'
-        f"{_table(record) if detected else ''}<p>{told}</p></div>"
+    """HTML for a notebook: the picture (PNG in base64) if any, mirrors and turns or the matrix as a table, the rest."""
+    if "matrix" in record:
+        title, said = f"{record['source']} onto {record['target']}", escape(record["status"], quote=True)
+        rows, told = _map_table(record), list(_aligned(record))[1 + len(record["matrix"]) :]
+    else:
+        title, said = record["source"], escape(answer(record), quote=True)
+        detected = any(name in record for name in MIRRORS)
+        rows, told = _table(record) if detected else "", summary(record)[3 if detected else 1 :]
+    data = f'src="data:image/png;base64,{picture}" alt="{said}" style="max-width:600px"'
+    shown = f"<img {data}>" if picture else ""
+    lines = "<br>".join(escape(line) for line in told)
+    return f"<div><p><b>{escape(title)}: {said}</b></p>{shown}{rows}<p>{lines}</p></div>"
+
+
+def _map_table(record: Record) -> str:
+    """HTML of the matrix of an alignment, its translation behind it."""
+    body = "".join(
+        f"<tr>{''.join(f'<td>{x + 0.0:.6f}</td>' for x in row)}<td>{shift:.6g}</td></tr>"
+        for row, shift in zip(record["matrix"], record["translation"], strict=True)
     )
+    return f"<table><tbody>{body}</tbody></table>"
 
 
 def _table(record: Record) -> str:

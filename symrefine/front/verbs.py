@@ -246,17 +246,19 @@ def align(
     return [onto(given, f"target {k}") for k, given in enumerate(several)]
 
 
-def report(given: Any, path: str | Path) -> "Detected":
-    """Write the page (.html), picture (.png), recording (.rrd) or record (.json) of an object, and return the answer.
+def report(given: Any, path: str | Path) -> "Detected | Alignment":
+    """Write the page (.html), picture (.png), recording (.rrd) or record (.json) of an answer, and return it.
 
     Args:
-        given: an answer of `detect`, or whatever it takes.
+        given: an answer of `detect` or `align`, or whatever `detect` takes.
         path: the file to write.
 
     Raises:
         InputError: what `detect` and `Detection.save` refuse.
     """
+    from symrefine.front.aligned import Alignment
+
     check_kind(Path(path))
-    found: Any = given if isinstance(given, Found) else detect(given)
+    found: Any = given if isinstance(given, Found | Alignment) else detect(given)
     found.save(path)
     return found

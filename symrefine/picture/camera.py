@@ -54,9 +54,15 @@ def look_at(scene: Scene, *, aspect: float, fov_rad: float, fill: float = 0.92) 
     level = [(math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)) for e, a in angles]
     candidates = np.array(level) @ scene.stage.frame
     back = candidates[int(np.argmax(np.round(_merit(candidates, scene), 4)))]
-    frame = _frame(back, scene.stage.frame[2])
     sheets = [] if scene.crowded else [q.corners for q in scene.planes]
-    corners = np.concatenate([scene.stage.points, *sheets, *(a.ends for a in scene.axes)]) @ frame.T
+    points = np.concatenate([scene.stage.points, *sheets, *(a.ends for a in scene.axes)])
+    return seen_from(back, points, scene.stage.frame[2], aspect=aspect, fov_rad=fov_rad, fill=fill)
+
+
+def seen_from(back: Array, points: Array, up: Array, *, aspect: float, fov_rad: float, fill: float = 0.92) -> Camera:
+    """Camera in the direction `back` [3] from points [N, 3], all of which it has in view; the rest as of `look_at`."""
+    frame = _frame(back, up)
+    corners = points @ frame.T
     tangent = np.array([aspect, 1.0]) * fill * math.tan(0.5 * fov_rad)
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     for _ in range(4):  # what is near looks larger, so the middle moves with the distance
@@ -65,7 +71,7 @@ def look_at(scene: Scene, *, aspect: float, fov_rad: float, fill: float = 0.92) 
         seen = away[:, :2] / (distance - away[:, 2:])
         middle[:2] += 0.5 * distance * (seen.min(axis=0) + seen.max(axis=0))
     target = middle @ frame
-    return Camera(eye=target + distance * back, target=target, up=scene.stage.frame[2], fov_rad=fov_rad)
+    return Camera(eye=target + distance * frame[2], target=target, up=up, fov_rad=fov_rad)
 
 
 def _frame(back: Array, up: Array) -> Array:
@@ -80,7 +86,7 @@ def _merit(candidates: Array, scene: Scene) -> Array:
     # The area of an ellipsoid's silhouette along v is sqrt(v' adj(C) v): the square root of the product of two axes.
     values, vectors = np.linalg.eigh(covariance)
     adjugate = np.array([values[1] * values[2], values[0] * values[2], values[0] * values[1]])
-    area = np.sqrt(((candidates @ vectors) ** 2) @ adjugate)
+    area = np.sqrt(np.maximum(((candidates @ vectors) ** 2) @ adjugate, 0.0))
     merit = 0.6 * area / max(float(area.max()), 1e-300) - 0.2 * np.abs(candidates @ scene.stage.frame[2] - 0.45)
     quads = scene.planes or scene.missed_planes[:1]
     if quads:

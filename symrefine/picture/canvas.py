@@ -38,6 +38,7 @@ class Canvas:
             fontweight="bold",
             ha="center",
             va="center_baseline",
+            parse_math=False,
         )
         written.set_path_effects([withStroke(linewidth=4, foreground="white")])
 
@@ -58,7 +59,9 @@ class Canvas:
         """The group in large letters and its meaning beside it, smaller where it is long."""
         name, _, meaning = title.partition(": ")
         base = 1 - BASE / self.height
-        text = self.figure.text(LEFT / self.width, base, name, fontsize=27, fontweight="bold", color=INK)
+        text = self.figure.text(
+            LEFT / self.width, base, name, fontsize=27, fontweight="bold", color=INK, parse_math=False
+        )
         start = text.get_window_extent().x1 + 18
         size = min(17.0, (self.width - LEFT - start) / (0.62 * max(1, len(meaning))))
-        self.figure.text(start / self.width, base, meaning, fontsize=size, color=SOFT)
+        self.figure.text(start / self.width, base, meaning, fontsize=size, color=SOFT, parse_math=False)

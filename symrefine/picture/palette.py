@@ -7,6 +7,8 @@ PALETTE: tuple[Colour, ...] = (
     (0, 114, 178), (213, 94, 0), (0, 158, 115), (180, 80, 150), (224, 150, 0), (64, 160, 220),
 )  # fmt: skip
 OBJECT: Colour = (168, 178, 194)
+# Of two objects the one that moves.
+SOURCE: Colour = (72, 150, 214)
 AXIS: Colour = (38, 42, 52)
 MISS: Colour = (120, 120, 128)
 # What was seen and agrees is grey like any object; no plane has these.

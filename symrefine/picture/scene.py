@@ -220,12 +220,19 @@ def _scan(detection: Detection, shape: Shape) -> Scan:
 def make_stage(detection: Detection, shape: Shape, most: int = 20000) -> Stage:
     """Where the shape stands: up to `most` of its points, outliers left out, and a frame with the main axis upright."""
     own = np.delete(shape.points, detection.outliers, axis=0)
-    relative = own[:: max(1, len(own) // most)] - detection.center
-    if shape.faces is None and len(relative) >= 1000:
-        distance = np.linalg.norm(relative, axis=1)
-        relative = relative[distance <= 1.02 * np.quantile(distance, 0.999)]
+    relative: Array = own[:: max(1, len(own) // most)] - detection.center
+    if shape.faces is None:
+        relative = main_part(relative)
     diagonal = detection.diagonal or float(np.linalg.norm(np.ptp(relative, axis=0)))
     return Stage(center=detection.center, points=relative, frame=upright(detection, relative), diagonal=diagonal)
+
+
+def main_part(points: Array) -> Array:
+    """Points about the centre without the few that lie far out, where they are many."""
+    if len(points) < 1000:
+        return points
+    distance = np.linalg.norm(points, axis=1)
+    return np.asarray(points[distance <= 1.02 * np.quantile(distance, 0.999)])
 
 
 def _lines(detection: Detection, stage: Stage) -> tuple[Line, ...]:

@@ -61,7 +61,7 @@ _HINT = (
 
 def _head(d: PlanarDetection, shape: Shape) -> str:
     if d.undetermined:
-        return head(shape.source, "Undetermined", "", sentence(d.undetermined))
+        return head(f"Symmetry of {shape.source}", "Undetermined", "", sentence(d.undetermined))
     misses = [found.residual.p95 for found in d.lines] + ([] if d.rotation is None else [d.rotation.residual.p95])
     summary = f"Nothing holds at a tolerance of {percent(d.tolerance)} of the diagonal."
     if misses:
@@ -70,7 +70,7 @@ def _head(d: PlanarDetection, shape: Shape) -> str:
             f"Under {each}, 95 % of the outline meets itself within {percent(max(*misses, 1e-4))} of the diagonal, "
             f"where the tolerance of {percent(d.tolerance)} allows {percent(LIMITS[1] * d.tolerance)}."
         )
-    return head(shape.source, d.point_group, detected_lines(d), summary)
+    return head(f"Symmetry of {shape.source}", d.point_group, detected_lines(d), summary)
 
 
 def _drawing(d: PlanarDetection, scene: FlatScene) -> str:

@@ -12,6 +12,7 @@ from symrefine.surface.misses import Deviation
 OPEN = 5
 # What a bar holds, in limits.
 FULL = 1.25
+_SHOW_ALL = '<button type="button" id="clear">Show all</button>'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,10 +51,19 @@ class Group:
     missed: bool
 
 
-def stage(still: str, hint: str, listed: str) -> str:
+def stage(
+    still: str, hint: str, listed: str, *, way: str = "from the object to its image", actions: str = _SHOW_ALL
+) -> str:
     """The object, a card for what is chosen, and the list.
 
     The canvas and the card stay hidden until the script has something to show in them, the still picture until then.
+
+    Args:
+        still: the picture, as HTML.
+        hint: what can be done, as plain text.
+        listed: the list, as HTML.
+        way: what the slider goes through, as plain text.
+        actions: buttons beside the one that copies the matrix, as HTML.
     """
     return (
         '<div class="stage"><div class="show"><div class="viewer" id="viewer">'
@@ -64,11 +74,10 @@ def stage(still: str, hint: str, listed: str) -> str:
         '<div id="tools" hidden><button type="button" id="reset">Reset view</button></div></div>'
         f'<p class="hint needs-script" hidden>{prose(hint)}</p>'
         '<div class="card" id="card" hidden><h2 id="chosen" aria-live="polite"></h2><p id="told"></p>'
-        '<label for="morph">from the object to its image</label>'
+        f'<label for="morph">{plain(way)}</label>'
         '<input id="morph" type="range" min="0" max="1" step="0.01" value="1">'
         '<div class="legend"><i></i><span id="least"></span><span id="most"></span></div>'
-        '<p class="actions"><button type="button" id="copy">Copy matrix</button>'
-        '<button type="button" id="clear">Show all</button></p></div></div>'
+        f'<p class="actions"><button type="button" id="copy">Copy matrix</button>{actions}</p></div></div>'
         f'<div class="list">{listed}</div></div>'
     )
 
@@ -118,7 +127,7 @@ def _row(row: Row) -> str:
     place = " · ".join(plain(part) for part in (row.kind, row.place) if part)
     vector = f"{code(row.vector)}<br>" if row.vector else ""
     cells = (
-        _name(row),
+        chooser(row.index, row.name, row.colour),
         f"{vector}<small>{place}</small>",
         f"{100 * m.mean:.2f}",
         f"{100 * m.p95:.2f}<br>{_bar(row.share)}",
@@ -129,12 +138,12 @@ def _row(row: Row) -> str:
     return "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
 
 
-def _name(row: Row) -> str:
-    """A button that chooses the element; without the script nothing but its name."""
-    r, g, b = row.colour
+def chooser(index: int, name: str, colour: Colour) -> str:
+    """A button that chooses an element; without the script nothing but its name."""
+    r, g, b = colour
     return (
-        f'<button type="button" class="swatch" style="--tint:rgb({r} {g} {b})" data-choose="{row.index}" '
-        f'aria-pressed="false">{plain(row.name)}</button>'
+        f'<button type="button" class="swatch" style="--tint:rgb({r} {g} {b})" data-choose="{index}" '
+        f'aria-pressed="false">{plain(name)}</button>'
     )
 
 

@@ -91,10 +91,10 @@ def facts(pairs: Iterable[tuple[str, str]]) -> str:
     return f"<dl>{items}</dl>"
 
 
-def head(source: str, title: str, beside: str, summary: str) -> str:
+def head(about: str, title: str, beside: str, summary: str) -> str:
     """What the page is about, the answer in large letters, what it means, and one sentence."""
     return (
-        f'<header><p class="over">Symmetry of {plain(source)}</p>'
+        f'<header><p class="over">{plain(about)}</p>'
         f"<h1>{plain(title)} <span>{plain(beside)}</span></h1>"
         f'<p class="lead">{prose(summary)}</p></header>'
     )

@@ -48,13 +48,7 @@ def model(detection: Detection, shape: Shape, scene: Scene, elements: Sequence[E
     Positions are whole steps of 16 bits along the longest side, misses of 8 bits up to two tolerances.
     """
     surface = make_surface(shape, replace(scene, planes=()))
-    most = MOST_MISSES // max(1, len(elements))
-    if scene.balls is not None:
-        parts = _balls(surface, scene)
-    elif surface.faces is not None:
-        parts = _mesh(surface, scene, min(MOST_TRIANGLES, 2 * most))
-    else:
-        parts = _cloud(surface, scene, min(MOST_POINTS, most))
+    parts = packed(surface, scene, MOST_MISSES // max(1, len(elements)))
     told = _told(shape, surface, parts)
     places = parts.pop("places")
     misses = _misses(detection, places + detection.center, elements)
@@ -63,19 +57,34 @@ def model(detection: Detection, shape: Shape, scene: Scene, elements: Sequence[E
     data = {
         **parts,
         "frame": np.round(scene.stage.frame, 9).tolist(),
-        "outline": _outline(scene),
+        "outline": outline(scene.stage.points / scene.stage.diagonal),
         "view": np.round(scene.stage.frame @ back / np.linalg.norm(back), 6).tolist(),
-        "limit": DEEPEST * detection.tolerance,
-        "steps": MISSES,
-        "unseen": UNSEEN,
-        "misses": _encoded(_stepped(misses, DEEPEST * detection.tolerance)),
+        **heat(misses, detection.tolerance),
     }
     return Model(data=data, told=told)
 
 
-def _outline(scene: Scene) -> list[list[float]]:
-    """The outermost of its points, which the camera has to have in view; strays are none of them."""
-    points = scene.stage.points / scene.stage.diagonal
+def packed(surface: Surface, scene: Scene, most: int) -> dict[str, Any]:
+    """A surface as the page carries it: up to about `most` places, and these, [N, 3], as `places`."""
+    if scene.balls is not None:
+        return _balls(surface, scene)
+    if surface.faces is not None:
+        return _mesh(surface, scene, min(MOST_TRIANGLES, 2 * most))
+    return _cloud(surface, scene, min(MOST_POINTS, most))
+
+
+def heat(misses: Array, tolerance: float) -> dict[str, Any]:
+    """Misses [E, N] in steps of 8 bits up to two tolerances, and what the steps mean; NaN where nobody looked."""
+    return {
+        "limit": DEEPEST * tolerance,
+        "steps": MISSES,
+        "unseen": UNSEEN,
+        "misses": _encoded(_stepped(misses, DEEPEST * tolerance)),
+    }
+
+
+def outline(points: Array) -> list[list[float]]:
+    """The outermost of points in diagonals, which the camera has to have in view."""
     k = np.arange(OUTLINE) + 0.5
     # Directions spread evenly over the sphere (Fibonacci's spiral).
     height, turn = 1.0 - 2.0 * k / OUTLINE, np.pi * (1.0 + 5.0**0.5) * k

@@ -1,12 +1,16 @@
 """The page: one HTML file that needs nothing else, readable from a headline down to how to reproduce it."""
 
+from collections.abc import Mapping
 from importlib.resources import files
 from string import Template
+from typing import Any
 
+from symrefine.align.alignment import Alignment
 from symrefine.ndim.detection import SubspaceDetection
 from symrefine.picture.draw import Found
+from symrefine.picture.pair import Pair
 from symrefine.plane.detection import PlanarDetection
-from symrefine.report import flat, projected, space
+from symrefine.report import flat, maps, projected, space
 from symrefine.report.markup import Page, island
 from symrefine.shape import Shape
 
@@ -18,6 +22,11 @@ def html_page(found: Found, shape: Shape) -> str:
     if isinstance(found, SubspaceDetection):
         return filled(projected.page(found, shape))
     return filled(space.page(found, shape))
+
+
+def pair_html(found: Alignment, pair: Pair, options: Mapping[str, Any]) -> str:
+    """The whole page of an alignment, asked with these options; equal input gives equal pages."""
+    return filled(maps.page(found, pair, options))
 
 
 def filled(page: Page) -> str:

@@ -24,12 +24,12 @@ def page(detection: SubspaceDetection, shape: Shape) -> Page:
     d = detection
     name, _, means = subspace_headline(d).partition(": ")
     every = [*d.hyperplanes, *d.rejected]
-    told = "Turns are not looked for in so many dimensions."
+    told, about = "Turns are not looked for in so many dimensions.", f"Symmetry of {shape.source}"
     summary = f"There may be more: {d.incomplete}. {told}" if d.incomplete else told
     return Page(
         title=f"{plain(name)} · {plain(shape.source)}",
         sections=(
-            head(shape.source, name, "" if d.undetermined else means, sentence(d.undetermined or summary)),
+            head(about, name, "" if d.undetermined else means, sentence(d.undetermined or summary)),
             _views(projections(d, shape)),
             _facts(d, shape),
             _hyperplanes("Hyperplanes of symmetry", d.hyperplanes, 0, d.diameter),

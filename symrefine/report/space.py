@@ -72,7 +72,7 @@ def _head(d: Detection, shape: Shape) -> str:
         title = f"At least {title}"
     if d.textured is not None:
         summary += f" With its texture it is {symbol(d.textured.point_group)}."
-    return head(shape.source, title, below, summary)
+    return head(f"Symmetry of {shape.source}", title, below, summary)
 
 
 def _fallback(d: Detection, picture: bytes) -> str:
@@ -241,11 +241,25 @@ def reproduce(found: Any, shape: Shape) -> str:
     asked = {
         k: v for k, v in options.items() if v is not None and v is not False and (k not in _UNSAID or v != _UNSAID[k])
     }
-    python = ", ".join(["shape", *(f"{name}={asked[name]!r}" for name in _IN_PYTHON if name in asked)])
-    lines = [f"symrefine.detect({python})"]
-    if Path(shape.source).suffix:  # what came as an object has the name of its kind, and no suffix
-        words = ["symrefine", "detect", shape.source, *(word for name in asked for word in _option(name, asked[name]))]
-        lines = [shlex.join(words), f"# or in Python: {lines[0]}"]
+    python = {name: asked[name] for name in _IN_PYTHON if name in asked}
+    return again("detect", {"shape": shape.source}, asked, python)
+
+
+def again(verb: str, given: Mapping[str, str], asked: Mapping[str, Any], python: Mapping[str, Any]) -> str:
+    """How a result is had again.
+
+    Args:
+        verb: the command, and the function.
+        given: files, or what came as an object, by the names of variables.
+        asked: options of the command, by their names in Python.
+        python: those of the function.
+    """
+    words = ", ".join([*given, *(f"{name}={value!r}" for name, value in python.items())])
+    lines = [f"symrefine.{verb}({words})"]
+    files = list(given.values())
+    if all(Path(name).suffix for name in files):  # what came as an object has the name of its kind, and no suffix
+        options = [word for name, value in asked.items() for word in _option(name, value)]
+        lines = [shlex.join(["symrefine", verb, *files, *options]), f"# or in Python: {lines[0]}"]
     told = f"symrefine {version('symrefine')}. The result is a function of the input and these options alone."
     return section("Reproduce", told, "<pre>" + "\n".join(plain(line) for line in lines) + "</pre>")
 

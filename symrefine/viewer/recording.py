@@ -8,7 +8,7 @@ import hashlib
 import math
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -42,15 +42,12 @@ def record(detection: Detection, shape: Shape, path: Path | str) -> None:
         InputError: the file cannot be written.
     """
     scene = make_scene(detection, shape)
-    with whole(Path(path)) as draft, _errors_of_the_system():
-        stream = _stream(detection, shape)
-        stream.save(draft, default_blueprint=blueprint(detection, scene, display_scale(scene)))
-        try:
-            _log(stream, detection, shape, scene)
-        finally:
-            stream.disconnect()
-        if not draft.exists():
-            raise InputError(f"{path}: rerun wrote nothing; is the environment variable RERUN set to off?")
+    write(
+        Path(path),
+        new_stream(shape.source, _identity(detection, shape)),
+        blueprint(detection, scene, display_scale(scene.stage.diagonal)),
+        lambda stream: _log(stream, detection, shape, scene),
+    )
 
 
 def show_inline(detection: Detection, shape: Shape) -> None:
@@ -59,22 +56,51 @@ def show_inline(detection: Detection, shape: Shape) -> None:
     Raises:
         SymrefineError: the notebook's half of rerun is not installed.
     """
+    scene = make_scene(detection, shape)
+    embed(
+        new_stream(shape.source, _identity(detection, shape)),
+        blueprint(detection, scene, display_scale(scene.stage.diagonal)),
+        lambda stream: _log(stream, detection, shape, scene),
+    )
+
+
+def write(path: Path, stream: Any, layout: Any, log: Callable[[Any], None]) -> None:
+    """Write what `log` logs to a stream, and how it looks when it opens: whole or not at all.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    with whole(path) as draft, _errors_of_the_system():
+        stream.save(draft, default_blueprint=layout)
+        try:
+            log(stream)
+            stream.flush()
+        finally:
+            stream.disconnect()
+        if not draft.exists():
+            raise InputError(f"{path}: rerun wrote nothing; is the environment variable RERUN set to off?")
+
+
+def embed(stream: Any, layout: Any, log: Callable[[Any], None]) -> None:
+    """Show what `log` logs to a stream in the notebook that runs this.
+
+    Raises:
+        SymrefineError: the notebook's half of rerun is not installed.
+    """
     if find_spec("rerun_notebook") is None:
         raise SymrefineError('a notebook shows recordings by another package: pip install "symrefine[notebook]"')
-    scene, stream = make_scene(detection, shape), _stream(detection, shape)
-    _log(stream, detection, shape, scene)
-    stream.notebook_show(blueprint=blueprint(detection, scene, display_scale(scene)))
+    log(stream)
+    stream.flush()
+    stream.notebook_show(blueprint=layout)
 
 
-def _stream(detection: Detection, shape: Shape) -> Any:
-    """A recording that is named by its content, with no times of its own."""
+def new_stream(name: str, identity: str) -> Any:
+    """A recording of an object of some name, named itself by its content, with no times of its own."""
     # The viewer keeps one layout for each application, so each object is one; rerun allows few characters there.
-    application = "symrefine-" + re.sub(r"[^A-Za-z0-9]+", "-", Path(shape.source).stem)[:60].strip("-")
+    application = "symrefine-" + re.sub(r"[^A-Za-z0-9]+", "-", Path(name).stem)[:60].strip("-")
     # Left to itself rerun parts the content where some time has passed, elsewhere in each run.
     at_the_end = rr.ChunkBatcherConfig.NEVER()
-    stream = rr.RecordingStream(
-        application, recording_id=_identity(detection, shape), send_properties=False, batcher_config=at_the_end
-    )
+    stream = rr.RecordingStream(application, recording_id=identity, send_properties=False, batcher_config=at_the_end)
     stream.set_log_time_enabled(False)
     stream.set_log_tick_enabled(False)
     return stream
@@ -97,12 +123,11 @@ def _log(stream: Any, detection: Detection, shape: Shape, scene: Scene) -> None:
     report = rr.TextDocument(markdown(detection, shape), media_type=rr.MediaType.MARKDOWN)
     stream.log("report", report, static=True)
     log_story(stream, detection, shape, scene)
-    stream.flush()
 
 
-def display_scale(scene: Scene) -> float:
-    """The power of ten that makes the diagonal a number from 1 to 10."""
-    return float(10.0 ** -math.floor(math.log10(scene.stage.diagonal)))
+def display_scale(diagonal: float) -> float:
+    """The power of ten that makes a diagonal a number from 1 to 10."""
+    return float(10.0 ** -math.floor(math.log10(diagonal)))
 
 
 def _identity(detection: Detection, shape: Shape) -> str:
@@ -113,7 +138,7 @@ def _identity(detection: Detection, shape: Shape) -> str:
 
 
 def _log_shape(stream: Any, detection: Detection, shape: Shape, scene: Scene) -> None:
-    stream.log("object", rr.Transform3D(scale=display_scale(scene)), static=True)
+    stream.log("object", rr.Transform3D(scale=display_scale(scene.stage.diagonal)), static=True)
     points = (shape.points - scene.stage.center).astype(np.float32)
     if shape.faces is None:
         _log_cloud(stream, points, detection.outliers, scene)

@@ -37,10 +37,12 @@
 
   // Choosing an element: in the list, in the scene, or nothing
 
-  let view = null, chosen = -1, started = 0;
+  // Of two objects there is always a map that is chosen; `way` is the part of it that is gone through.
+  const pair = data.moving !== undefined;
+  let view = null, chosen = -1, started = 0, way = [0, 1], at = 1;
 
   function choose(index, animated = true) {
-    chosen = index === chosen ? -1 : index;
+    chosen = pair ? Math.max(0, index) : index === chosen ? -1 : index;
     for (const button of document.querySelectorAll("[data-choose]")) {
       const own = Number(button.dataset.choose) === chosen;
       button.setAttribute("aria-pressed", String(own));
@@ -53,18 +55,27 @@
     byId("chosen").textContent = element.title;
     byId("told").textContent = element.told.replaceAll(" %", "\u00a0%");
     byId("copy").hidden = element.matrix === null;
+    go(0, 1, animated);
+  }
+
+  function go(from, to, animated = true) {
+    way = [from, to];
     started = animated && !still.matches ? performance.now() : -DURATION_MS;
     requestAnimationFrame(advance);
   }
 
   function advance(now) {
     const share = Math.min(1, Math.max(0, (now - started) / DURATION_MS));
-    morph(share * share * (3 - 2 * share));
+    morph(way[0] + (way[1] - way[0]) * share * share * (3 - 2 * share));
     if (share < 1 && chosen >= 0) requestAnimationFrame(advance);
   }
 
   function morph(share) {
+    at = share;
     byId("morph").value = share;
+    for (const button of document.querySelectorAll("[data-share]")) {
+      button.setAttribute("aria-pressed", String(Number(button.dataset.share) === share));
+    }
     view.morph(share);
   }
 
@@ -79,13 +90,17 @@
       }
     });
     document.addEventListener("keydown", (event) => {
-      if (event.key === "Escape" && chosen >= 0) choose(-1);
+      if (event.key === "Escape" && chosen >= 0 && !pair) choose(-1);
     });
     byId("morph").addEventListener("input", () => {
       started = -DURATION_MS;
-      view.morph(Number(byId("morph").value));
+      way = [0, Number(byId("morph").value)];
+      morph(way[1]);
     });
-    byId("clear").addEventListener("click", () => choose(-1));
+    for (const button of document.querySelectorAll("[data-share]")) {
+      button.addEventListener("click", () => go(at, Number(button.dataset.share)));
+    }
+    byId("clear")?.addEventListener("click", () => choose(-1));
     byId("copy").addEventListener("click", () => copy(chosen));
     dark.addEventListener("change", () => view.recolour());
   }
@@ -152,13 +167,13 @@
   const NOT_SEEN = [116, 190, 96];
   const tone = (own) => (own || (dark.matches ? [143, 154, 173] : [168, 178, 194]));
 
-  function heat(step) {
-    if (step === data.object.unseen) return NOT_SEEN;
-    const share = step / data.object.steps;
+  function heat(step, own, { unseen, steps }) {
+    if (step === unseen) return NOT_SEEN;
+    const share = step / steps;
     const k = Math.max(1, RAMP.findIndex(([at]) => share <= at));
-    const [[low, from], [high, to]] = [RAMP[k - 1], RAMP[k]];
+    const [[low, from], [high, to]] = [RAMP[k - 1], RAMP[k]].map(([at, colour]) => [at, tone(colour ?? own)]);
     const part = (share - low) / (high - low);
-    return tone(from).map((v, i) => v + part * (tone(to)[i] - v));
+    return from.map((v, i) => v + part * (to[i] - v));
   }
 
   /** A geometry with creases for a mesh, or points with normals; `corner` says which position each vertex shows. */
@@ -216,8 +231,11 @@
     });
   }
 
-  /** The map of an element a share of the way from doing nothing: flattening onto a mirror, turning about an axis. */
-  function partial({ kind, axis, point, angle }, share) {
+  /**
+   * The map of an element a share of the way from doing nothing: flattening onto a mirror, turning about an axis; and
+   * for what travels, as much of the way from one place to the other.
+   */
+  function partial({ kind, axis, point, angle, travel }, share) {
     const place = new THREE.Vector3(...point), u = new THREE.Vector3(...axis);
     // From 1 to -1. Half-way nothing would be left that light falls on: it stays a little thick.
     const left = (t) => (Math.abs(1 - 2 * t) < 0.02 ? 0.02 : 1 - 2 * t);
@@ -237,7 +255,10 @@
       inversion: () => new THREE.Matrix4().makeScale(left(share), left(share), left(share)),
     };
     const back = new THREE.Matrix4().makeTranslation(place.clone().negate());
-    return new THREE.Matrix4().makeTranslation(place).multiply(maps[kind]()).multiply(back);
+    const made = new THREE.Matrix4().makeTranslation(place).multiply(maps[kind]()).multiply(back);
+    if (!travel) return made;
+    const gone = new THREE.Vector3(...travel[0]).lerp(new THREE.Vector3(...travel[1]), share);
+    return new THREE.Matrix4().makeTranslation(gone).multiply(made);
   }
 
   /** The curve in which a plane cuts a mesh. */
@@ -275,35 +296,48 @@
       camera.add(lamp, lamp.target);
     }
 
-    const parts = unpacked(data.object), { geometry, corner, length, part } = geometryOf(parts);
-    const seen = data.object.seen ?? Infinity;
-    const places = parts.owners ? Math.max(...parts.owners) + 1 : parts.positions.length / 3;
-    const attribute = parts.mesh ? "color" : "tint";
-    const own = (k) => data.object.palette[parts.colours[part(k)]];
-    geometry.setAttribute(attribute, coloured(length, own, parts.mesh));
-    const imageGeometry = geometry.clone();
+    const thing = bodyOf(data.object, false), image = bodyOf(data.moving ?? data.object, true, !pair && thing);
+    const parts = thing.parts, seen = data.object.seen ?? Infinity;
     const traced = parts.mesh && !parts.owners;
-    const lit = (shift) => new THREE.MeshLambertMaterial({
-      vertexColors: true, side: THREE.DoubleSide,
-      polygonOffset: true, polygonOffsetFactor: shift, polygonOffsetUnits: shift,
-    });
-    const thing = parts.mesh
-      ? new THREE.Mesh(geometry, lit(1))
-      : new THREE.Points(geometry, pointMaterial(data.object.radius, 0));
-    const image = parts.mesh
-      ? new THREE.Mesh(imageGeometry, lit(0))
-      : new THREE.Points(imageGeometry, pointMaterial(data.object.radius, 0.01));
-    image.matrixAutoUpdate = false;
-    image.visible = false;
-    image.frustumCulled = false;
-    root.add(thing, image);
+    image.drawn.matrixAutoUpdate = false;
+    image.drawn.visible = false;
+    image.drawn.frustumCulled = false;
+    root.add(thing.drawn, image.drawn);
+
+    /** An object to draw, in its own colours or in those of what it misses; `ahead` of another that it agrees with. */
+    function bodyOf(object, ahead, same) {
+      const made = same ? same.made : { parts: unpacked(object) };
+      if (!same) Object.assign(made, geometryOf(made.parts));
+      const { parts, corner, length, part } = made, geometry = same ? made.geometry.clone() : made.geometry;
+      const places = parts.owners ? Math.max(...parts.owners) + 1 : parts.positions.length / 3;
+      const lit = (shift) => new THREE.MeshLambertMaterial({
+        vertexColors: true, side: THREE.DoubleSide,
+        polygonOffset: true, polygonOffsetFactor: shift, polygonOffsetUnits: shift,
+      });
+      const drawn = parts.mesh
+        ? new THREE.Mesh(geometry, lit(ahead ? 0 : 1))
+        : new THREE.Points(geometry, pointMaterial(object.radius, ahead && !pair ? 0.01 : 0));
+      const paint = (colourOf) => {
+        geometry.setAttribute(parts.mesh ? "color" : "tint", coloured(length, colourOf, parts.mesh));
+      };
+      const plain = () => paint((k) => object.palette[parts.colours[part(k)]]);
+      function judged(index) {
+        const row = parts.misses.subarray(index * places, (index + 1) * places), known = [];
+        paint((k) => {
+          const at = corner(k), step = row[parts.owners ? parts.owners[at] : at], own = parts.colours[part(k)];
+          return (known[256 * own + step] ??= heat(step, pair && object.palette[own], object));
+        });
+      }
+      plain();
+      return { made, parts, drawn, plain, judged };
+    }
 
     const shown = data.elements.map((element) => elementOf(element));
     for (const { group } of shown) root.add(group);
     const controls = new THREE.OrbitControls(camera, canvas);
     controls.enablePan = false;
     controls.enableZoom = false;
-    let wanted = false, touched = false;
+    let wanted = false, touched = false, told = false, fitted = 1;
 
     function request() {
       if (wanted) return;
@@ -385,8 +419,14 @@
         }
         label.style.color = `rgb(${rgb.map(Math.round).join(" ")})`;
       }
-      if (chosen >= 0) paintImage(chosen);
+      if (chosen >= 0) tell(at > 0.5 || !pair);
       request();
+    }
+
+    /** What is missed is told by colour, of two objects once one is laid on the other. */
+    function tell(judged) {
+      for (const body of pair ? [thing, image] : [image]) judged ? body.judged(chosen) : body.plain();
+      told = judged;
     }
 
     /** Names beside what they name; those that would cover another are left out. */
@@ -420,10 +460,16 @@
     /** The camera so far away that everything is in view, and nothing is far from its edge. */
     function fit() {
       const outline = data.object.outline.map((p) => new THREE.Vector3(...p));
+      if (pair) {
+        const map = partial(data.elements[Math.max(0, chosen)], at);
+        outline.push(...data.moving.outline.map((p) => new THREE.Vector3(...p).applyMatrix4(map)));
+      }
       for (const { element, anchors } of shown) {
         if (element.shown || element.missed) outline.push(...anchors.map((p) => p.clone()));
       }
-      const back = new THREE.Vector3(...data.object.view).normalize();
+      // Who has turned the camera keeps its direction, and how much nearer it was brought.
+      const from = camera.position.clone().sub(controls.target), nearer = touched ? from.length() / fitted : 1;
+      const back = touched ? from.normalize() : new THREE.Vector3(...data.object.view).normalize();
       const right = new THREE.Vector3().crossVectors(camera.up, back).normalize();
       const above = new THREE.Vector3().crossVectors(back, right);
       for (const p of outline) p.applyMatrix4(root.matrix);
@@ -439,7 +485,8 @@
       }
       controls.target.set(0, 0, 0);
       [right, above, back].forEach((direction, i) => controls.target.addScaledVector(direction, middle[i]));
-      camera.position.copy(controls.target).addScaledVector(back, distance);
+      camera.position.copy(controls.target).addScaledVector(back, nearer * distance);
+      fitted = distance;
       camera.near = 0.02 * distance;
       camera.far = 10 * distance;
       camera.updateProjectionMatrix();
@@ -458,18 +505,9 @@
       camera.aspect = width / height;
       camera.updateProjectionMatrix();
       const size = renderer.getPixelRatio() * height / (2 * Math.tan(0.5 * camera.fov * Math.PI / 180));
-      for (const { material } of [thing, image]) if (material.uniforms) material.uniforms.size.value = size;
+      for (const { drawn: { material } } of [thing, image]) if (material.uniforms) material.uniforms.size.value = size;
       if (!touched) fit();
       draw();
-    }
-
-    function paintImage(index) {
-      const row = parts.misses.subarray(index * places, (index + 1) * places), steps = [];
-      const colourOf = (k) => {
-        const at = corner(k), step = row[parts.owners ? parts.owners[at] : at];
-        return (steps[step] ??= heat(step));
-      };
-      imageGeometry.setAttribute(attribute, coloured(length, colourOf, parts.mesh));
     }
 
     /** One element, or all that fit into one view; of planes that would hide it their curves on the surface. */
@@ -482,12 +520,14 @@
 
     function display(index) {
       reveal(index);
-      image.visible = index >= 0;
-      if (!parts.mesh) for (const { geometry: g } of [thing, image]) g.setDrawRange(0, index < 0 ? Infinity : seen);
+      image.drawn.visible = index >= 0;
+      for (const [body, limit] of [[thing, seen], [image, (data.moving ?? data.object).seen ?? Infinity]]) {
+        if (!body.parts.mesh) body.drawn.geometry.setDrawRange(0, index < 0 ? Infinity : limit);
+      }
       // Behind its image the object is paler.
-      const pale = index < 0 ? 1 : parts.mesh ? (dark.matches ? 0.5 : 1.3) : dark.matches ? 0.8 : 1.15;
-      if (parts.mesh) thing.material.color.setScalar(pale);
-      else thing.material.uniforms.pale.value = pale;
+      const pale = index < 0 || pair ? 1 : parts.mesh ? (dark.matches ? 0.5 : 1.3) : dark.matches ? 0.8 : 1.15;
+      if (parts.mesh) thing.drawn.material.color.setScalar(pale);
+      else thing.drawn.material.uniforms.pale.value = pale;
       recolour();
     }
 
@@ -522,6 +562,7 @@
 
     /** A click on what is chosen, or beside everything, shows all again. */
     function pick(index) {
+      if (pair) return;
       if (index >= 0 && index !== chosen) choose(index);
       else if (chosen >= 0) choose(-1);
     }
@@ -562,8 +603,8 @@
     canvas.hidden = false;
     byId("tools").hidden = false;
     viewer.classList.add("live");
-    byId("least").textContent = "the image meets the object";
-    byId("most").textContent = `misses by ${Number((100 * data.object.limit).toPrecision(2))} % and more`;
+    const misses = `misses by ${Number((100 * data.object.limit).toPrecision(2))} % and more`;
+    [byId("least").textContent, byId("most").textContent] = data.legend ?? ["the image meets the object", misses];
     reveal(-1);
     recolour();
     resize();
@@ -574,8 +615,10 @@
       recolour,
       morph(share) {
         if (chosen < 0) return;
-        image.matrix.copy(partial(data.elements[chosen], share));
-        image.matrixWorldNeedsUpdate = true;
+        image.drawn.matrix.copy(partial(data.elements[chosen], share));
+        image.drawn.matrixWorldNeedsUpdate = true;
+        if (pair && told !== share > 0.5) tell(!told);
+        if (pair) fit();
         request();
       },
     };
@@ -592,6 +635,6 @@
     return;
   }
   listen();
-  // Where nothing was found, the nearest miss says the most.
-  if (data.elements.length && data.elements[0].missed) choose(0, false);
+  // Where nothing was found, the nearest miss says the most; of two objects the map does.
+  if (pair || (data.elements.length && data.elements[0].missed)) choose(0, false);
 })();

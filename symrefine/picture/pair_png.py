@@ -1,0 +1,103 @@
+"""The picture of an alignment: the two side by side as they came, and laid on one another as what each place says."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from symrefine.errors import printable
+from symrefine.geometry import Array
+from symrefine.picture.camera import look_at, seen_from
+from symrefine.picture.canvas import Canvas
+from symrefine.picture.painter import paint
+from symrefine.picture.pair import Pair, Side
+from symrefine.picture.palette import AXIS, CONTRADICTED, INFERRED, Colour
+from symrefine.picture.surface import Surface
+
+FOV_RAD = np.radians(26.0)
+# Height of the title and of the words below, in pixels of the finished picture; size of a letter.
+TITLE, WORDS, LETTER, LINE = 76, 104, 17, 24
+# Of a name so many letters are told, the last.
+NAME = 48
+# Width of a letter over its size, of bold ones.
+WIDE = 0.64
+
+
+def pair_png(pair: Pair, title: str, *, width: int, height: int) -> bytes:
+    """PNG of `width` x `height` pixels: before on the left, after on the right, told above unless `title` is empty."""
+    top = TITLE if title else 0
+    half, high = width // 2, height - top - WORDS
+    best, up = pair.ways[0], np.array([0.0, 0.0, 1.0])
+    aspect = half / high
+    back = look_at(pair.stage(best.matrix, best.shift, np.eye(3)), aspect=aspect, fov_rad=FOV_RAD).frame[2]
+    panels = []
+    for share in (0.0, 1.0):
+        # A panel is higher than wide: what stands beside the other stands above it there.
+        matrix, shift = best.part(share, pair.beside(up))
+        scene = pair.stage(matrix, shift, np.eye(3))
+        camera = seen_from(back, scene.stage.points, up, aspect=aspect, fov_rad=FOV_RAD, fill=0.9)
+        surface = _laid(pair, matrix, shift, judged=share > 0.0)
+        panels.append(paint(scene, surface, camera, half, high))
+    canvas = Canvas(width, height, title)
+    picture = np.ones((height, width, 3))
+    for k, panel in enumerate(panels):
+        picture[top : top + high, k * half : (k + 1) * half] = panel
+    canvas.figure.figimage(picture, origin="upper", zorder=-1)
+    for k, words in enumerate((_before(pair), _after(pair))):
+        size = min(LETTER, 0.96 * half / (WIDE * max(len(text) for text, _ in words)))
+        for row, (text, colour) in enumerate(words):
+            canvas.name(text, (k + 0.5) * half, top + high + (row + 0.7) * LINE, colour, size)
+    return canvas.png()
+
+
+def _before(pair: Pair) -> list[tuple[str, Colour]]:
+    return [("before", AXIS), *((printable(side.name)[-NAME:], side.colour) for side in pair.sides)]
+
+
+def _after(pair: Pair) -> list[tuple[str, Colour]]:
+    one, other = pair.shares(0)
+    shown = [("contradicted", one.contradicted, other.contradicted, CONTRADICTED)]
+    shown += [("where nobody looked", one.unseen, other.unseen, INFERRED)]
+    met = f"after: {100 * one.met:.0f} % of the source meet {100 * other.met:.0f} % of the target"
+    rest = [(f"{name} {100 * a:.0f} % and {100 * b:.0f} %", colour) for name, a, b, colour in shown]
+    return [(met, AXIS), *rest]
+
+
+def _laid(pair: Pair, matrix: Array, shift: Array, *, judged: bool) -> Surface:
+    """Both, the source taken somewhere; with `judged` in the colours of what is said."""
+    source, target = (_painted(pair, side, judged=judged) for side in pair.sides)
+    moved = replace(source, points=source.points @ matrix.T + shift, normals=source.normals @ matrix.T)
+    return _joined([moved, target])
+
+
+def _painted(pair: Pair, side: Side, *, judged: bool) -> Surface:
+    """A side as it is painted: balls, or points, without strays where these are judged."""
+    surface = side.surface(dense=True)
+    if not judged:
+        return surface
+    places = surface.points if surface.faces is None else surface.points[surface.faces].mean(axis=1)
+    misses = pair.misses(side.index, places)[0]
+    colours = pair.coloured(surface.colours, misses)
+    if surface.faces is not None:
+        return replace(surface, colours=colours)
+    own = ~(misses < 0.0)
+    return replace(surface, points=surface.points[own], normals=surface.normals[own], colours=colours[own])
+
+
+def _joined(surfaces: Sequence[Surface]) -> Surface:
+    """Surfaces of one kind as one."""
+    first = surfaces[0]
+    offsets = np.cumsum([0, *(len(s.points) for s in surfaces)])
+    faces = [s.faces + o for s, o in zip(surfaces, offsets, strict=False) if s.faces is not None]
+    points, normals, colours = (
+        np.concatenate([getattr(s, name) for s in surfaces]) for name in ("points", "normals", "colours")
+    )
+    return replace(
+        first,
+        points=points,
+        normals=normals,
+        colours=colours,
+        faces=np.concatenate(faces) if faces else None,
+        radius=max(s.radius for s in surfaces),
+        texture=None,
+    )
