@@ -23,12 +23,14 @@ from symrefine.align.rivals import Choice, choose, information, polished
 from symrefine.align.span import span_fit
 from symrefine.clock import Clock
 from symrefine.decide.doubts import FLAT
+from symrefine.decide.maps import SURE
+from symrefine.decide.posterior import Link, meant
 from symrefine.detection.measure import PARTS, SAMPLES
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, check_tolerance, cross_matrix
 from symrefine.groups import PointGroup
-from symrefine.moments.moments import Moments, central_moments, shape_moments
+from symrefine.moments.moments import Moments, central_moments, deviations, shape_moments, tensor_index
 from symrefine.moments.quadrature import mesh_nodes
 from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
 from symrefine.plane import detect_planar
@@ -121,14 +123,7 @@ def _some(shape: Shape, seed: int) -> Shape:
     """Of a large cloud without weights as many points as a surface is known by; meshes as they are."""
     if shape.faces is not None or shape.weights is not None or len(shape.points) <= SAMPLES:
         return shape
-    pick = drawn(len(shape.points), SAMPLES, np.random.default_rng(seed))
-    return replace(
-        shape,
-        points=shape.points[pick],
-        normals=None if shape.normals is None else shape.normals[pick],
-        labels=None if shape.labels is None else shape.labels[pick],
-        viewpoint=None if shape.viewpoint is None else shape.viewpoint[pick],
-    )
+    return shape.chosen(drawn(len(shape.points), SAMPLES, np.random.default_rng(seed)))
 
 
 def _check(source: Shape, target: Shape, tolerance: float) -> None:
@@ -165,15 +160,29 @@ def _unlike(source: Side, target: Side) -> bool:
     return not 1.0 / RADII < target.moments.scale / source.moments.scale < RADII
 
 
+def _scale_sigma(*sides: Side) -> float:
+    """Standard deviation of the ratio of two sizes, relative to it, from the jackknife of their mean squares."""
+    variance = 0.0
+    for m in (s.moments for s in sides):
+        squares = m.replicates[:, tensor_index(m.dim, 2, m.order).diagonal()].sum(axis=1)
+        variance += 0.25 * float((deviations(squares) ** 2).sum())
+    return float(np.sqrt(variance))
+
+
 def _same_size(source: Side, target: Side) -> bool:
     """Whether the sizes agree to rounding."""
     return abs(target.moments.scale / source.moments.scale - 1.0) < ROUNDING
 
 
-def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: bool, clock: Clock) -> Alignment:
-    """The story in 3-space. Objects of unlike size are compared at one size, even where the scale is not asked for."""
-    surfaces = evidence.has_points and not few(evidence.source.shape, evidence.target.shape)
-    partly = polish and not scale and surfaces
+def _align_solid(
+    evidence: Evidence, scale: bool, polish: bool, reflections: bool, clock: Clock, *, cleaned: bool = False
+) -> Alignment:
+    """The story in 3-space. Objects of unlike size are compared at one size, even where the scale is not asked for.
+
+    Where the surfaces do not agree at once, points that belong to none are set apart (`cleaned`), and all begins anew.
+    """
+    surfaces = polish and evidence.has_points and not few(evidence.source.shape, evidence.target.shape)
+    partly = surfaces and not scale
     tried = partly and least_misfit(evidence.harmonics) > MISFIT
     if tried and (part := _in_part(evidence, reflections, clock)) is not None:
         return part
@@ -182,16 +191,25 @@ def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: boo
     whole, motion = choice.evidence, choice.motion
     covariance = np.zeros((6, 6)) if choice.exact else np.linalg.inv(information(whole, choice.covariance))
     # Where the sizes differ though nobody said so, it may be that one shows more than the other.
-    agree = choice.exact or (choice.excess <= 1.0 and whole.scale == scale)
+    agree, at_once = choice.excess <= 1.0 and whole.scale == scale, choice.exact
+    scale_sigma = 0.0 if choice.exact else _scale_sigma(whole.source, whole.target)
     if polish and (agree or not partly) and not choice.exact and whole.has_points:
         with clock("planes"):
             _ = whole.moving, whole.met
         with clock("polish"):
             done = polished(whole, whole.met, motion, choice.covariance)
             motion, covariance = done.motion, done.covariance
-        agree &= not partly or whole.agree(motion)
-    if partly and not (agree or tried) and (part := _in_part(evidence, reflections, clock)) is not None:
-        return part
+            # Noise may move all planes of a side outwards or inwards at once, by half of their thickness.
+            scale_sigma = float(np.hypot(done.scale_sigma, 0.5 * np.median(whole.moving.thickness)))
+        at_once = surfaces and whole.agree_at_once(motion)
+    if surfaces and not (at_once or cleaned) and (clean := evidence.cleaned()) is not None:
+        return _align_solid(clean, scale, polish, reflections, clock, cleaned=True)
+    if partly and not (at_once or tried):
+        excess = whole.excess(motion) if agree else np.inf
+        likely = meant(Link(need=excess), 1.0) if excess <= 1.0 else 0.0
+        part = _in_part(evidence, reflections, clock) if likely < SURE else None
+        if part is not None and part.confidence >= likely:
+            return part
     evidence = whole
     matrix, translation, factor = _in_input_units(evidence, motion, scale)
 
@@ -203,6 +221,7 @@ def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: boo
         matrix=matrix,
         translation=translation,
         scale=factor,
+        scale_sigma=factor * scale_sigma if scale else 0.0,
         sigma_rad=float(np.sqrt(np.trace(covariance[:3, :3]))),
         covariance=_of_transform(covariance, evidence, matrix, factor),
         exact=choice.exact and (scale or _same_size(evidence.source, evidence.target)),
@@ -237,7 +256,8 @@ def _met_in_part(meeting: Meeting, evidence: Evidence, clock: Clock) -> Alignmen
         matrix=matrix,
         translation=translation,
         scale=1.0,
-        sigma_rad=np.inf if best.is_loose else float(np.sqrt(np.trace(best.covariance[:3, :3]))),
+        scale_sigma=0.0,
+        sigma_rad=np.inf if meeting.slides else float(np.sqrt(np.trace(best.covariance[:3, :3]))),
         covariance=_of_transform(best.covariance, evidence, matrix, 1.0),
         exact=False,
         timings=clock.seconds,
@@ -372,6 +392,7 @@ def _align_moments(
         matrix=matrix,
         translation=translation,
         scale=factor,
+        scale_sigma=factor * _scale_sigma(a, b) if scale and not found.exact else 0.0,
         sigma_rad=0.0 if found.exact else found.sigma_rad,
         covariance=np.zeros((0, 0)),
         exact=found.exact and (scale or _same_size(a, b)),
