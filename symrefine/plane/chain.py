@@ -8,8 +8,9 @@ from functools import reduce
 import numpy as np
 
 from symrefine.decide.chain import ALIKE, HOPELESS
-from symrefine.decide.hypotheses import DIRECTION_ERROR, EXACT, LOOK, START_ERROR, exact_need
+from symrefine.decide.hypotheses import DIRECTION_ERROR, LOOK, START_ERROR, exact_need
 from symrefine.decide.posterior import NEAR
+from symrefine.fit.vertices import ROUNDED as EXACT
 from symrefine.geometry import Array
 from symrefine.plane.outline import NOISES, Outlines
 from symrefine.plane.placed import Placed, fitted
