@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from symrefine.decide.posterior import LEAST, Link, certain, decide, meant
+from symrefine.decide.posterior import LEAST, Link, certain, decide, known_links, meant
 
 NEED = st.floats(0.0, 0.5)
 TOLERANCE = st.floats(1e-3, 0.2)
@@ -66,6 +66,23 @@ def test_more_need_is_less_meant_and_more_tolerance_more(a, b, lone, s, t):
 @given(NEED, TOLERANCE)
 def test_a_lone_mirror_is_forgiven_no_less(need, tolerance):
     assert meant(Link(need=need, lone_mirror=True), tolerance) >= meant(Link(need=need), tolerance)
+
+
+@given(st.lists(NEED, min_size=1, max_size=6).map(sorted), st.sampled_from(["Cs", "C2"]))
+def test_a_mirror_is_lone_where_it_comes_first_and_nothing_like_it_follows(needs, first):
+    names = [first, *(f"C{i + 2}v" for i in range(len(needs) - 1))]
+    links = known_links(names, needs)
+    assert [link.need for link in links] == needs
+    assert not any(link.lone_mirror for link in links[1:])
+    assert not links[0].lone_mirror or first == "Cs"
+    assert known_links([first], needs[:1])[0].lone_mirror == (first == "Cs")
+
+
+@given(st.floats(1e-3, 0.1), TOLERANCE)
+def test_one_of_several_mirrors_is_forgiven_no_more_than_the_rest(need, tolerance):
+    lone, other = (decide(known_links(["Cs", "C4v"], [need, k * need]), tolerance) for k in (10.0, 1.5))
+    assert other.inside[1] <= lone.inside[1]
+    assert other.inside[1] == meant(Link(need=need), tolerance)
 
 
 @pytest.mark.parametrize("lone", [False, True])

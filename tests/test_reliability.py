@@ -309,13 +309,14 @@ def drawn(count, constants, rng):
             group=group,
             need=need,
             noise=noise,
+            lone=group == "Cs",
             true=bool(true),
         )
 
 
 def test_the_misfit_is_that_of_the_posterior():
     links = list(drawn(50, reliability.SHIPPED, np.random.default_rng(0)))
-    chances = [meant(Link(need=k.need, lone_mirror=k.group == "Cs"), TOLERANCE, k.noise) for k in links]
+    chances = [meant(Link(need=k.need, lone_mirror=k.lone), TOLERANCE, k.noise) for k in links]
     expected = -np.mean([math.log(p if k.true else 1.0 - p) for k, p in zip(links, chances, strict=True)])
     assert reliability.misfit(reliability.SHIPPED, links) == pytest.approx(expected)
 

@@ -39,7 +39,7 @@ KIND_OF = {
         "decide.doubts": "STRAY",
         "decide.hypotheses": "DIRECTION_ERROR SAME_RAD",
         "decide.maps": "WELL LESS_WELL NOTHING LEAD SHARE UNLIKE NO_RIVAL ITSELF",
-        "decide.posterior": "EVEN STEEPNESS EVEN_MIRROR UNKNOWN BLURRED "
+        "decide.posterior": "EVEN STEEPNESS EVEN_MIRROR ALONE UNKNOWN BLURRED "
         "EVEN_PICTURE EVEN_PICTURE_MIRROR STEEPNESS_PICTURE",
         "detection.measure": "SAME_MASS HIDDEN",
         "detection.sketch": "BEYOND",

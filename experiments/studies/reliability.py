@@ -69,6 +69,7 @@ class Known(NamedTuple):
     group: str
     need: float
     noise: float
+    lone: bool
     true: bool
 
 
@@ -166,10 +167,10 @@ def answered(case: Case) -> Answer:
     found = told(evidence, clock=Clock())
     truths = [t.posed(pose) for t in made.accepted(TOLERANCE)]
     chain = []
-    for link in evidence.links[1:]:
+    for link, seen in zip(evidence.links[1:], evidence.known, strict=True):
         true = any(within(link.group, t.group, NEAR_RAD) for t in truths)
         place = (case.half, case.family, case.name, case.view)
-        chain.append(Known(*place, link.group.name, link.need, evidence.surface.floor, true))
+        chain.append(Known(*place, link.group.name, link.need, evidence.surface.floor, seen.lone_mirror, true))
         if not true:
             break
     return Answer(
@@ -245,7 +246,7 @@ def sure_and_wrong(rows: Sequence[Answer]) -> Iterator[str]:
 def misfit(constants: Sequence[float], links: Sequence[Known]) -> float:
     """Negative log likelihood of what is true of each link, a link, under constants in the order of `SHIPPED`."""
     even, even_mirror, steepness, unknown, blurred = constants
-    evens = np.array([even_mirror if k.group == "Cs" else even for k in links])
+    evens = np.array([even_mirror if k.lone else even for k in links])
     noise, needs = (np.array([getattr(k, name) for k in links]) / TOLERANCE for name in ("noise", "need"))
     squares = np.maximum(strain(needs, noise, evens, unknown, blurred), np.finfo(float).tiny)
     wrong_odds = sharpness(noise, steepness) / 2.0 * np.log(squares)

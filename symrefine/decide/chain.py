@@ -23,7 +23,7 @@ from symrefine.decide.hypotheses import (
     single,
 )
 from symrefine.decide.pool import ALIKE, Pool, is_at
-from symrefine.decide.posterior import certain
+from symrefine.decide.posterior import ALONE, certain
 from symrefine.fit.placed import Placed
 from symrefine.propose.candidates import Evidence, about, beside, prime_axes, proposals, voted_mirrors, voted_turns
 from symrefine.propose.votes import AGREE_RAD
@@ -198,7 +198,7 @@ def _join(
 
     Nor is one told that seems to need more than `most`.
     """
-    placed = [h.placed for h in parts if h.elements]
+    placed = [h.placed for h in parts if h is not NOTHING]
     return _generated(surface, placed, (*parts, *known), max(h.iterations for h in parts), most)
 
 
@@ -226,19 +226,20 @@ def _worst(found: Hypothesis) -> tuple[float, float]:
 def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     """Groups from C1 upwards, each inside the next, by what they need; the last one may be beyond the limit."""
     elements = [single(e) for e in pool.largest.elements if e.need < pool.largest.need / ALIKE]
-    rest = sorted([*pool.small, *elements, pool.largest], key=_worst)
+    rest = sorted([*pool.small, *elements, pool.largest, *pool.turned_down()], key=_worst)
     known = [pool.largest, *pool.failed]
     links = [NOTHING]
     while rest := [h for h in rest if not links[-1].holds(h.placed)]:
         here = links[-1]
-        if rest[0].need > limit:
+        # A mirror is a lone one by what the next group needs.
+        if rest[0].need > (max(limit, ALONE * here.need) if here.group.name == "Cs" else limit):
             break
         level = max(ALIKE * rest[0].need, here.need, exact_need(surface.floor), pool.nothing / ALIKE)
-        batch = [h for h in rest if h.need <= level]
-        found = _join(surface, [here, *batch], known)
+        batch, most = [h for h in rest if h.need <= level], max(limit, level)
+        found = _join(surface, [here, *batch], known, most)
         if found is None or found.need > ALIKE * level:
             tried = [] if found is None else [found]
-            singly = [_join(surface, [here, h], known) for h in batch[:SINGLY]]
+            singly = [_join(surface, [here, h], known, most) for h in batch[:SINGLY]]
             found = min((h for h in (*tried, *singly) if h is not None), key=_worst, default=None)
             known += [h for h in (*tried, *singly) if h is not None]
         if found is None:

@@ -40,6 +40,10 @@ class Pool:
         """Candidates where a fit put them, with what they need."""
         return [*((h.placed, h.need) for h in self.small), *self.looked]
 
+    def turned_down(self) -> list[Hypothesis]:
+        """Candidates turned down after a look, with nothing known of them but what they seem to need."""
+        return [Hypothesis(placed=placed, elements=(), need=need) for placed, need in self.looked]
+
     def has(self, placed: Placed, needs: float = 0.0) -> bool:
         """Whether a group is in one that was fitted and needs no more than it does, or as good as nothing."""
         most = max(ALIKE * needs, self.nothing)

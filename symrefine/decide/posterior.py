@@ -5,6 +5,7 @@ i-th group, is a logistic function of the logarithm of what that group needs ove
 it is the i-th itself is `inside[i] - inside[i + 1]`: the worst element kept and the best one turned down both count.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -17,11 +18,15 @@ T = TypeVar("T", bound=Any)
 EVEN, STEEPNESS = 0.8, 8.0
 # The same of a lone mirror: bodies and devices that are meant to have just one are made less exactly than others.
 EVEN_MIRROR = 1.2
+# A mirror is no lone one if a larger group needs less than so many times as much: the best of several mirrors that one
+# part out of place breaks misses by a third of what the worst does, or more, in most directions of the shift.
+ALONE = 3.0
 # All three of pictures, where parts moved by half a tolerance are told as well, so that the curve is less steep: close
 # to that of the first version, which was fitted to half of its drawings; see `experiments.studies.planar_reliability`.
 EVEN_PICTURE, EVEN_PICTURE_MIRROR, STEEPNESS_PICTURE = 0.6, 0.75, 3.6
-# How much of what noise alone needs is left to doubt, once it was taken away, and by how much it blurs a miss.
-UNKNOWN, BLURRED = 0.7, 2.0
+# How much of what noise alone needs is left to doubt, once it was taken away, and by how much it blurs a miss: with 1 %
+# noise parts that are out of place show half of their miss. With 3 more of them are told, but fewer intact thin ones.
+UNKNOWN, BLURRED = 0.7, 2.5
 # Alternatives that are told of, and the least probability that is worth telling.
 NEAR, LEAST = 8, 0.01
 # Groups that need up to so many tolerances are asked for.
@@ -47,6 +52,15 @@ class Link:
 
     need: float
     lone_mirror: bool = False
+
+
+def known_links(names: Sequence[str], needs: Sequence[float]) -> list[Link]:
+    """The groups of a chain in space beyond C1, from the names and needs of these."""
+    beyond = [*needs[1:], math.inf]
+    return [
+        Link(need=need, lone_mirror=name == "Cs" and larger >= ALONE * need)
+        for name, need, larger in zip(names, needs, beyond, strict=True)
+    ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

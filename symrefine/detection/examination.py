@@ -10,7 +10,7 @@ from symrefine.clock import Clock
 from symrefine.decide.chain import chain, explore
 from symrefine.decide.hypotheses import Hypothesis
 from symrefine.decide.pool import Pool
-from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide
+from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, known_links
 from symrefine.detection.measure import Measured, Outliers, doubt, gather, measure
 from symrefine.detection.sketch import Sample, Sketch, is_large, set_apart, sketched
 from symrefine.geometry import Array, check_tolerance
@@ -44,8 +44,12 @@ class Examined:
 
     def decided(self, tolerance: float) -> Decision:
         """The likeliest group of the chain at a tolerance."""
-        known = [Link(need=h.need, lone_mirror=h.group.name == "Cs") for h in self.links[1:]]
-        return decide(known, tolerance, self.surface.floor)
+        return decide(self.known, tolerance, self.surface.floor)
+
+    @property
+    def known(self) -> list[Link]:
+        """The groups beyond C1 as the decision sees them."""
+        return known_links([h.group.name for h in self.links[1:]], [h.need for h in self.links[1:]])
 
     def choices(self, tolerance: float) -> tuple[Alternative, ...]:
         """Every group of the chain, C1 first, as likely as at a tolerance."""

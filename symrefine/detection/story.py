@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
-from symrefine.decide.hypotheses import Element, Hypothesis
-from symrefine.decide.pool import Pool
+from symrefine.decide.chain import COARSE
+from symrefine.decide.hypotheses import Element, Hypothesis, judged
 from symrefine.decide.posterior import NEAR, Decision, alternatives
 from symrefine.detection.examination import Examined, examined
 from symrefine.detection.measure import Measured, Outliers
@@ -158,7 +158,7 @@ def _report(
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
     planes = [e for e in chosen.elements if e.operations.kind == "plane"]
     turns = [e for e in chosen.elements if e.operations.kind in ("axis", "improper")]
-    turned_down = [] if reason else _turned_down(found.pool, links, chosen)
+    turned_down = [] if reason else _turned_down(found, chosen, COARSE * tolerance)
     inversion = next((e for e in chosen.elements if e.operations.kind == "inversion"), None)
     return Detection(
         point_group="undetermined" if reason else chosen.group.name,
@@ -262,17 +262,22 @@ def _confidence(element: Element, links: Sequence[Hypothesis], decision: Decisio
     return decision.inside[decision.index]
 
 
-def _turned_down(pool: Pool, links: Sequence[Hypothesis], chosen: Hypothesis) -> list[Element]:
-    """Elements that were fitted and judged and are not in the group, best first."""
-    beyond = [e for h in (*links, *pool.small) for e in h.elements]
-    found: list[Element] = []
+def _turned_down(found: Examined, chosen: Hypothesis, most: float) -> list[Element]:
+    """Elements that were judged and are not in the group, and those that seem to need no more than some, best first."""
+    beyond = [e for h in (*found.links, *found.pool.small) for e in h.elements]
+    for start in sorted(found.pool.turned_down(), key=lambda h: h.need):
+        if len(beyond) >= NEAR or start.need > most:
+            break
+        if not chosen.holds(start.placed):
+            beyond += judged(found.surface, start.placed).elements
+    told: list[Element] = []
     for e in sorted(beyond, key=lambda e: e.need):
         matrix = e.operations.matrices[0][None]
         others = [chosen.group.distance_rad(matrix)[0]] if chosen.elements else []
-        others += [float(np.linalg.norm(matrix[0] - o.operations.matrices[0])) for o in found]
+        others += [float(np.linalg.norm(matrix[0] - o.operations.matrices[0])) for o in told]
         if min(others, default=math.inf) > math.radians(5.0):
-            found.append(e)
-    return found[:NEAR]
+            told.append(e)
+    return told[:NEAR]
 
 
 def _near_miss(element: Element, origin: Array, scale: float, tolerance: float) -> NearMiss:
