@@ -56,7 +56,7 @@ class Link:
 
 def known_links(names: Sequence[str], needs: Sequence[float]) -> list[Link]:
     """The groups of a chain in space beyond C1, from the names and needs of these."""
-    beyond = [*needs[1:], math.inf]
+    beyond = [*needs, math.inf][1:]
     return [
         Link(need=need, lone_mirror=name == "Cs" and larger >= ALONE * need)
         for name, need, larger in zip(names, needs, beyond, strict=True)
