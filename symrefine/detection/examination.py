@@ -41,10 +41,11 @@ class Examined:
     outlier_share: float
     sample: Sample | None
 
-    def decided(self, tolerance: float) -> Decision:
-        """The likeliest group of the chain at a tolerance."""
-        known = [Link(need=h.need, lone_mirror=h.group.name == "Cs") for h in self.links[1:]]
-        return decide(known, tolerance, self.surface.floor)
+    def decided(self, tolerance: float, *, shown: bool = False) -> Decision:
+        """The likeliest group of the chain at a tolerance; with `shown` as if what no camera saw kept to the rest."""
+        known = [Link(need=h.need, lone_mirror=h.group.name == "Cs", parts=h.parts) for h in self.links[1:]]
+        missing = 0.0 if shown or self.surface.openings is None else self.surface.openings.unclosed
+        return decide(known, tolerance, self.surface.floor, unclosed=missing)
 
     def choices(self, tolerance: float) -> tuple[Alternative, ...]:
         """Every group of the chain, C1 first, as likely as at a tolerance."""
@@ -64,7 +65,7 @@ class Examined:
 
     def _nothing_carries(self, tolerance: float) -> str:
         """The groups between which it stands, where even the likeliest is more likely wrong than right."""
-        probabilities = self.decided(tolerance).probabilities
+        probabilities = self.decided(tolerance, shown=True).probabilities
         if max(probabilities) >= 0.5:
             return ""
         by = sorted(zip(probabilities, self.links, strict=True), key=lambda k: -k[0])
