@@ -25,7 +25,7 @@ from symrefine.load import load
 from symrefine.picture.words import scanned
 from symrefine.propose.votes import mirror_votes, revolution, turn_votes
 from symrefine.shape import CAMERAS, Shape
-from symrefine.surface.cameras import cameras
+from symrefine.surface.cameras import cameras, unclosed
 from symrefine.surface.sampling import sampling
 
 BRICK = join([box((0, 0, 0), (1.0, 0.7, 0.5))])
@@ -283,6 +283,27 @@ def test_two_views_from_opposite_sides_show_a_table(kind):
     found = detect(points, viewpoint=pose.of(made.viewpoint))
     assert found.point_group == "C4v"
     assert found.at_least
+
+
+@pytest.mark.parametrize(("count", "low", "high"), [(1, 0.4, 0.7), (2, 0.0, 0.05), (4, 0.0, 0.05)])
+def test_the_normals_of_what_was_seen_tell_what_was_not(count, low, high):
+    """Half a ball misses half of its area, and one view of it a little more; from all sides nothing is missing."""
+    ball = sample(specimen("shape", "hollow_ball")[0], 20000, 0.0, np.random.default_rng(45))
+    ball /= np.linalg.norm(ball, axis=1)[:, None]
+    eyes = 5.0 * np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])[:count]
+    seen = [ball[ball @ eye > 1.0] for eye in eyes]
+    points, places = np.concatenate(seen), np.repeat(eyes, [len(s) for s in seen], axis=0)
+    normals = points * np.random.default_rng(46).choice([-1.0, 1.0], (len(points), 1))
+    found = unclosed(cameras(points, places), points, normals, np.ones(len(points)))
+    assert low <= found < high
+
+
+def test_a_single_view_leaves_a_doubt_and_views_from_all_sides_none():
+    sure = {}
+    for count in (1.0, 2.0):
+        made = damage.views(table(), count, np.random.default_rng(19))
+        sure[count] = detect(made.points, viewpoint=made.viewpoint).planes[0].confidence
+    assert 0.5 < sure[1.0] < sure[2.0]
 
 
 def test_free_space_contradicts_what_borders_leave_open():

@@ -6,8 +6,8 @@ A camera looks at each object from a random side, about 10,000 rays, noisy, quan
 `--clean`; its place is given. The true elements are the mirrors of finite groups and the axes of revolutions. One that
 is told is right if it carries the points of the whole object to where a true one does: the mean distance of the two
 images is at most tan 15 degrees of the farthest that the true one carries a point. Over all that is told, the surest
-first, recall is read where precision falls below 95 % for the last time. Occlusion is the share of the object that the
-view shows nothing of.
+first, recall is read where precision falls below 95 % for the last time; the mirrors of a revolution, which are not
+asked for, count for nothing if they are right. Occlusion is the share of the object that the view shows nothing of.
 """
 
 import argparse
@@ -87,13 +87,14 @@ def run(case: Case) -> Row:
     found = detect(Shape(points=points, viewpoint=pose.of(np.asarray(made.viewpoint))))
     away = cKDTree(points).query(whole)[0]
     true = _elements(posed)
+    judged = [_judged(element, sure, posed, true, whole) for element, sure in _claims(found)]
     return Row(
         case=case,
         truth=truth.group.name,
         group=("at least " if found.at_least and not found.undetermined else "") + found.point_group,
         occlusion=float((away > SEEN_REL * tight_diagonal(whole)).mean()),
         asked=len(true),
-        told=tuple(_judged(element, sure, posed, true, whole) for element, sure in _claims(found)),
+        told=tuple(t for t in judged if t.is_true < len(true)),
     )
 
 

@@ -52,7 +52,8 @@ class Element:
 class Hypothesis:
     """A group where it fits best: its elements judged, and what the worst of them needs.
 
-    `history` holds the iterates of the fit; `before` counts those of the parts that it was put together from.
+    `history` holds the iterates of the fit; `before` counts those of the parts that it was put together from, and
+    `parts` is what these need; NaN where it was not.
     """
 
     placed: Placed
@@ -60,6 +61,7 @@ class Hypothesis:
     need: float
     history: tuple[Iterate, ...] = ()
     before: int = 0
+    parts: float = math.nan
 
     @property
     def supported(self) -> float:

@@ -1,7 +1,7 @@
 """What a decision is made from: a shape measured, its candidates fitted and judged, and joined to a chain of groups."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -42,14 +42,16 @@ class Examined:
     outlier_share: float
     sample: Sample | None
 
-    def decided(self, tolerance: float) -> Decision:
-        """The likeliest group of the chain at a tolerance."""
-        return decide(self.known, tolerance, self.surface.floor)
+    def decided(self, tolerance: float, *, shown: bool = False) -> Decision:
+        """The likeliest group of the chain at a tolerance; with `shown` as if what no camera saw kept to the rest."""
+        missing = 0.0 if shown or self.surface.openings is None else self.surface.openings.unclosed
+        return decide(self.known, tolerance, self.surface.floor, unclosed=missing)
 
     @property
     def known(self) -> list[Link]:
         """The groups beyond C1 as the decision sees them."""
-        return known_links([h.group.name for h in self.links[1:]], [h.need for h in self.links[1:]])
+        links = known_links([h.group.name for h in self.links[1:]], [h.need for h in self.links[1:]])
+        return [replace(link, parts=h.parts) for link, h in zip(links, self.links[1:], strict=True)]
 
     def choices(self, tolerance: float) -> tuple[Alternative, ...]:
         """Every group of the chain, C1 first, as likely as at a tolerance."""
@@ -69,7 +71,7 @@ class Examined:
 
     def _nothing_carries(self, tolerance: float) -> str:
         """The groups between which it stands, where even the likeliest is more likely wrong than right."""
-        probabilities = self.decided(tolerance).probabilities
+        probabilities = self.decided(tolerance, shown=True).probabilities
         if max(probabilities) >= 0.5:
             return ""
         by = sorted(zip(probabilities, self.links, strict=True), key=lambda k: -k[0])

@@ -4,6 +4,7 @@ A ray that ends on the surface crosses free space before, and one that passes be
 point in front of the surface, or beside its outline, would have been seen. A point behind it was hidden.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,6 +45,13 @@ class Camera:
         beside = angle[:, 0] * distance > np.maximum(margin, WITHIN * self.spacing * distance)
         return np.asarray(np.where(around.any(axis=1), distance < behind - margin, beside))
 
+    def off(self, points: Array) -> Array:
+        """How far points [N, 3] are from what the rays nearest to them ended on [N]."""
+        away = points - self.eye
+        distance = np.maximum(np.linalg.norm(away, axis=1), 1e-300)
+        angle, near = self.directions.nearest(away / distance[:, None])
+        return np.asarray(np.hypot(angle * distance, self.ranges[near] - distance))
+
     @property
     def hidden(self) -> Mask:
         """Which of the points [K] it cannot have seen: most rays around end before, by more than they are apart there.
@@ -66,6 +74,23 @@ def cameras(points: Array, viewpoints: Array) -> tuple[Camera, ...]:
     """The cameras that saw points [N, 3], each from its place [N, 3]."""
     places, owner = np.unique(viewpoints, axis=0, return_inverse=True)
     return tuple(_camera(place, points[owner.ravel() == k]) for k, place in enumerate(places))
+
+
+def unclosed(views: Sequence[Camera], points: Array, normals: Array, areas: Array) -> float:
+    """How much is missing at least of a surface, by the area that was seen: 0 of all of it, 1/2 of half a ball.
+
+    The normals of a closed surface, out of it and as long as its parts are large, add up to nothing.
+
+    Args:
+        views: the cameras that saw it.
+        points: [N, 3] of its parts.
+        normals: [N, 3] unit normals, any sign.
+        areas: [N], up to a factor.
+    """
+    seen_by = np.argmin([view.off(points) for view in views], axis=0)
+    towards = np.array([view.eye for view in views])[seen_by] - points
+    outwards = np.where(np.einsum("ni,ni->n", towards, normals) < 0.0, -areas, areas)
+    return float(np.linalg.norm(outwards @ normals) / areas.sum())
 
 
 def _camera(eye: Array, points: Array) -> Camera:

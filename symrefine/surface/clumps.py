@@ -55,21 +55,35 @@ def filled(points: Array, around: Surroundings, rng: np.random.Generator) -> lis
     to one so large that noise does not make the surface look so too. `around` tells of some of the points.
     """
     thick = blobness(around.planes[2], AROUND)
-    within = thick[around.near].mean(axis=1) > FILLED
-    if within.sum() <= SHARES[-1] * len(within):
+    within, least = _smooth(thick, around) > FILLED, SHARES[-1] * len(thick)
+    if within.sum() <= least:
         return []
     tree = Tree(points)
+    for size in SIZES:
+        within = _filled_at(size, within, thick, points, tree, around)
+    if within.sum() <= least:
+        return []
     noisy = 2 * choose_neighbours(points, tree, rng, thin=FLAT)
-    asked = np.union1d(np.flatnonzero(within), around.near[within])
-    for size in (*SIZES, noisy):
-        thick[asked] = _blobness(points, tree, around.points[asked], min(size, len(points)))
-        within &= thick[around.near].mean(axis=1) > FILLED
+    within = _filled_at(noisy, within, thick, points, tree, around)
     one, other = np.repeat(np.arange(len(within)), AROUND), around.near.ravel()
     inside = within[one] & within[other]
     part = np.where(within, connected_parts(one[inside], other[inside], len(within)), -1)
     enough = 2 * noisy * len(part) / len(points)  # fewer tell nothing of neighbourhoods so large
     part[np.bincount(part + 1)[part + 1] < enough] = -1
     return _members(points, around, [_grown(m, around) for m in _lone(part)])
+
+
+def _filled_at(size: int, within: Mask, thick: Array, points: Array, tree: Tree, around: Surroundings) -> Mask:
+    """Those `within` around which neighbourhoods of another size fill a volume too; `thick` is told anew for them."""
+    asked = np.union1d(np.flatnonzero(within), around.near[within])
+    if asked.size:
+        thick[asked] = _blobness(points, tree, around.points[asked], min(size, len(points)))
+    return np.asarray(within & (_smooth(thick, around) > FILLED))
+
+
+def _smooth(values: Array, around: Surroundings) -> Array:
+    """Means [N] over the neighbours of each point."""
+    return np.asarray(values[around.near].mean(axis=1))
 
 
 def _blobness(points: Array, tree: Tree, queries: Array, size: int) -> Array:

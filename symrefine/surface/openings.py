@@ -11,7 +11,7 @@ import numpy as np
 
 from symrefine.geometry import Array, Mask
 from symrefine.shape import Index
-from symrefine.surface.cameras import Camera
+from symrefine.surface.cameras import Camera, unclosed
 from symrefine.surface.neighbourhoods import FLAT, WIDEST, Neighbourhoods, connected_parts, fit_planes
 from symrefine.surface.skin import LocalPlanes
 from symrefine.surface.tree import Tree
@@ -42,6 +42,7 @@ class Openings:
         border: [M] which lie at one.
         evident: whether they are too long to be a whim of the sample.
         cameras: what saw it, in the frame of the surface; none if nothing is known of them.
+        unclosed: how much surface they did not see at least, by what they saw; see `cameras.unclosed`.
         links: by stride, pairs [2, E] of every so many-th local planes that are neighbours, both ways.
     """
 
@@ -49,6 +50,7 @@ class Openings:
     border: Mask
     evident: bool
     cameras: tuple[Camera, ...] = ()
+    unclosed: float = 0.0
     links: dict[int, Index] = field(default_factory=dict)
 
     def linked(self, cloud: LocalPlanes, stride: int) -> Index:
@@ -134,7 +136,8 @@ def openings(
     """
     if cameras:
         none = np.zeros(len(cloud.points), dtype=bool)
-        return Openings(line=none, border=none, evident=True, cameras=cameras)
+        missing = unclosed(cameras, cloud.points, cloud.normals, cloud.reach**2)
+        return Openings(line=none, border=none, evident=True, cameras=cameras, unclosed=missing)
     around = Neighbourhoods.of(points, tree, NEIGHBOURS).around(cloud.points, near)
     mean, normals, variances = fit_planes(around)
     aside = mean - cloud.points
