@@ -226,7 +226,7 @@ def table(rows: Sequence[Row], methods: Sequence[str]) -> Iterator[str]:
 
 def reliability(rows: Sequence[Row]) -> Iterator[str]:
     """What our own word is worth: sure ones that are right, right ones that are sure, by condition."""
-    own = [r for r in rows if r.case.method == OURS]
+    own = [r for r in rows if r.case.method == "align"]
     for condition in [*dict.fromkeys(r.case.condition for r in own), "all"]:
         here = [r for r in own if condition in (r.case.condition, "all")]
         sure, right = [r for r in here if r.confidence >= SURE], [r for r in here if r.right]
