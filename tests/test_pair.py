@@ -143,6 +143,27 @@ def test_what_stands_beside_does_not_overlap(parted: symrefine.Alignment) -> Non
         assert (moved @ direction).min() > (pair.target.outline @ direction).max()
 
 
+def test_sizes_that_differ_are_shown_as_one() -> None:
+    points = sample(WHOLE, 4000, 0.0, np.random.default_rng(6))
+    found = symrefine.align(1e-3 * points[::2], turned().apply(points[1::2]), scale=True)
+    pair = scene(found)
+    assert found.scale == pytest.approx(1e3, rel=0.02)
+    assert min(shares.met for shares in pair.shares(0)) > 0.9
+    reach = [float(np.ptp(side.outline, axis=0).max()) for side in pair.sides]
+    assert reach[0] == pytest.approx(reach[1], rel=0.5)
+    for side in pair.sides:
+        assert (pair.misses(side.index, side.shape.points)[0] < 0.0).mean() < 0.01, "no strays"
+
+
+def test_strays_are_out_of_the_picture() -> None:
+    rng = np.random.default_rng(7)
+    points, box = sample(WHOLE, 5000, 0.0, rng), 4.0 * WHOLE.diagonal * (rng.random((300, 3)) - 0.5)
+    pair = scene(symrefine.align(np.concatenate([points[::2], box]), points[1::2]))
+    body = np.linalg.norm(pair.target.outline, axis=1).max()
+    assert np.quantile(np.linalg.norm(pair.source.outline, axis=1), 0.99) < 1.5 * body
+    assert (pair.misses(0, pair.source.shape.points)[0] < 0.0)[-300:].mean() > 0.8
+
+
 def test_of_very_many_maps_some_are_shown() -> None:
     cube = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
     pair = scene(symrefine.align(cube, cube))

@@ -23,10 +23,9 @@ def test_a_study_tells_success_and_who_is_not_there(monkeypatch, tmp_path):
     monkeypatch.setattr(study, "installed", lambda name: name != "kiss")
     right = {("full", "align"): True, ("overlap 50 %", "align"): False, ("full", "open3d fgr"): False}
     rows = [
-        study.Row(
+        SimpleNamespace(
             case=study.Case(name="camera", condition=condition, det=1, seed=0, method=method),
-            det_right=True, error_deg=0.0 if is_right else 90.0, error_rel=0.0, status="ok", confidence=1.0,
-            seconds=0.1,
+            right=is_right, seconds=0.1,
         )
         for (condition, method), is_right in right.items()
     ]  # fmt: skip

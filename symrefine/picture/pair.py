@@ -188,7 +188,7 @@ class Pair:
         """
         away, owner = self._asked.nearest(side, self.sides[side].given(points))
         every = np.stack([misses[side][owner] for misses in self._misses])
-        every[:, away > STRAY * self.far * self.diagonal] = -1.0
+        every[:, self.sides[side].unit * away > STRAY * self.far * self.diagonal] = -1.0
         return every
 
     def coloured(self, own: Array, misses: Array) -> Array:
@@ -234,9 +234,10 @@ def make_pair(found: Alignment, source: Shape, target: Shape, tolerance: float) 
     maps = list(zip(coset.matrices, coset.translations, strict=True))
     shown = maps[:MOST_WAYS]
     asked = witnesses(source, target, scale=found.scale, tolerance=tolerance)
+    reach = STRAY * asked.far * target.diagonal
     return Pair(
-        source=sides[0],
-        target=sides[1],
+        source=_without_strays(sides[0], asked, reach),
+        target=_without_strays(sides[1], asked, reach),
         ways=tuple(_way(m, t, sides[0], sides[1]) for m, t in shown),
         equivalents=len(maps),
         far=asked.far,
@@ -272,6 +273,12 @@ def _side(index: int, shape: Shape, unit: float, colour: Colour, *, atoms: bool)
         atoms=atoms,
         outline=main_part(points[:: max(1, len(points) // STAGED)]),
     )
+
+
+def _without_strays(side: Side, asked: Witnesses, reach: float) -> Side:
+    """A side of whose outline nothing lies farther than so, in units of the target, from all places that were asked."""
+    near = side.unit * asked.nearest(side.index, side.given(side.outline))[0] <= reach
+    return replace(side, outline=side.outline[near]) if near.any() else side
 
 
 def _in_space(vectors: Array) -> Array:

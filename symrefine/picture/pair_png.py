@@ -27,20 +27,9 @@ def pair_png(pair: Pair, title: str, *, width: int, height: int) -> bytes:
     """PNG of `width` x `height` pixels: before on the left, after on the right, told above unless `title` is empty."""
     top = TITLE if title else 0
     half, high = width // 2, height - top - WORDS
-    best, up = pair.ways[0], np.array([0.0, 0.0, 1.0])
-    aspect = half / high
-    back = look_at(pair.stage(best.matrix, best.shift, np.eye(3)), aspect=aspect, fov_rad=FOV_RAD).frame[2]
-    panels = []
-    for share in (0.0, 1.0):
-        # A panel is higher than wide: what stands beside the other stands above it there.
-        matrix, shift = best.part(share, pair.beside(up))
-        scene = pair.stage(matrix, shift, np.eye(3))
-        camera = seen_from(back, scene.stage.points, up, aspect=aspect, fov_rad=FOV_RAD, fill=0.9)
-        surface = _laid(pair, matrix, shift, judged=share > 0.0)
-        panels.append(paint(scene, surface, camera, half, high))
     canvas = Canvas(width, height, title)
     picture = np.ones((height, width, 3))
-    for k, panel in enumerate(panels):
+    for k, panel in enumerate(_panels(pair, half, high)):
         picture[top : top + high, k * half : (k + 1) * half] = panel
     canvas.figure.figimage(picture, origin="upper", zorder=-1)
     for k, words in enumerate((_before(pair), _after(pair))):
@@ -48,6 +37,23 @@ def pair_png(pair: Pair, title: str, *, width: int, height: int) -> bytes:
         for row, (text, colour) in enumerate(words):
             canvas.name(text, (k + 0.5) * half, top + high + (row + 0.7) * LINE, colour, size)
     return canvas.png()
+
+
+def _panels(pair: Pair, width: int, height: int) -> list[Array]:
+    """Before and after, seen from one side: pictures [height, width, 3]."""
+    best, up = pair.ways[0], np.array([0.0, 0.0, 1.0])
+    aspect = width / height
+    back = look_at(pair.stage(best.matrix, best.shift, np.eye(3)), aspect=aspect, fov_rad=FOV_RAD).frame[2]
+    shown, panels = [_shown(pair, side) for side in pair.sides], []
+    for share in (0.0, 1.0):
+        # A panel is higher than wide: what stands beside the other stands above it there.
+        matrix, shift = best.part(share, pair.beside(up))
+        scene = pair.stage(matrix, shift, np.eye(3))
+        camera = seen_from(back, scene.stage.points, up, aspect=aspect, fov_rad=FOV_RAD, fill=0.9)
+        source, target = (judged if share else bare for bare, judged in shown)
+        moved = replace(source, points=source.points @ matrix.T + shift, normals=source.normals @ matrix.T)
+        panels.append(paint(scene, _joined([moved, target]), camera, width, height))
+    return panels
 
 
 def _before(pair: Pair) -> list[tuple[str, Colour]]:
@@ -63,25 +69,15 @@ def _after(pair: Pair) -> list[tuple[str, Colour]]:
     return [(met, AXIS), *rest]
 
 
-def _laid(pair: Pair, matrix: Array, shift: Array, *, judged: bool) -> Surface:
-    """Both, the source taken somewhere; with `judged` in the colours of what is said."""
-    source, target = (_painted(pair, side, judged=judged) for side in pair.sides)
-    moved = replace(source, points=source.points @ matrix.T + shift, normals=source.normals @ matrix.T)
-    return _joined([moved, target])
-
-
-def _painted(pair: Pair, side: Side, *, judged: bool) -> Surface:
-    """A side as it is painted: balls, or points, without strays where these are judged."""
+def _shown(pair: Pair, side: Side) -> tuple[Surface, Surface]:
+    """What is painted of a side, in its own colours and in those of what is said; without strays."""
     surface = side.surface(dense=True)
-    if not judged:
-        return surface
     places = surface.points if surface.faces is None else surface.points[surface.faces].mean(axis=1)
     misses = pair.misses(side.index, places)[0]
-    colours = pair.coloured(surface.colours, misses)
-    if surface.faces is not None:
-        return replace(surface, colours=colours)
-    own = ~(misses < 0.0)
-    return replace(surface, points=surface.points[own], normals=surface.normals[own], colours=colours[own])
+    if surface.faces is None and len(own := np.flatnonzero(~(misses < 0.0))):
+        points, normals, colours = (v[own] for v in (surface.points, surface.normals, surface.colours))
+        surface, misses = replace(surface, points=points, normals=normals, colours=colours), misses[own]
+    return surface, replace(surface, colours=pair.coloured(surface.colours, misses))
 
 
 def _joined(surfaces: Sequence[Surface]) -> Surface:
