@@ -16,6 +16,7 @@ from symrefine.cli.values import (
     add_viewpoint,
     reading_options,
 )
+from symrefine.clock import Clock, passed
 from symrefine.units import EVERYDAY_M, unit_of_size
 
 if TYPE_CHECKING:
@@ -51,7 +52,10 @@ def run(args: argparse.Namespace) -> int:
         from symrefine.survey import survey
 
         shape = loaded(args.path, args.format, lambda file: read_scan(file, reading_options(args)))
-        record = _record(args, shape, survey(shape))
+        with Clock()("survey"):
+            found = survey(shape)
+            passed(len(shape.points), len(shape.points))
+        record = _record(args, shape, found)
         write_all(writers := json_writer(args.json, record))
     tell(args.json, record, _lines(record), writers)
     return 0
