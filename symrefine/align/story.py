@@ -20,7 +20,7 @@ from symrefine.align.partial import Meeting, partial_meeting
 from symrefine.align.polish import Similarity
 from symrefine.align.rivals import Choice, choose, information, polished
 from symrefine.align.span import span_fit
-from symrefine.clock import Clock, passed
+from symrefine.clock import Clock
 from symrefine.detection.measure import FLAT, PARTS
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
@@ -72,7 +72,6 @@ def align(
     with clock("moments"):
         parts = 0 if few(a, b) else PARTS
         sides = _side(a, parts), _side(b, parts)
-        passed(both := len(a.points) + len(b.points), both)
     ranks = [_rank(s.moments) for s in sides]
     if max(ranks) - min(ranks) > 1:
         lean, full = (a, b) if ranks[0] < ranks[1] else (b, a)

@@ -16,7 +16,7 @@ from symrefine.cli.values import (
     add_viewpoint,
     reading_options,
 )
-from symrefine.clock import Clock, passed
+from symrefine.clock import Clock
 from symrefine.units import EVERYDAY_M, unit_of_size
 
 if TYPE_CHECKING:
@@ -52,9 +52,8 @@ def run(args: argparse.Namespace) -> int:
         from symrefine.survey import survey
 
         shape = loaded(args.path, args.format, lambda file: read_scan(file, reading_options(args)))
-        with Clock()("survey"):
+        with Clock()("survey", len(shape.points)):
             found = survey(shape)
-            passed(len(shape.points), len(shape.points))
         record = _record(args, shape, found)
         write_all(writers := json_writer(args.json, record))
     tell(args.json, record, _lines(record), writers)

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from symrefine.clock import Clock, passed
+from symrefine.clock import Clock
 from symrefine.decide.chain import Pool, chain, explore
 from symrefine.decide.hypotheses import Hypothesis
 from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide
@@ -118,11 +118,10 @@ def _examined(
 ) -> Examined:
     sketch = given if isinstance(given, Sketch) else None
     shape = given.sample if isinstance(given, Sketch) else given
-    with clock("moments"):
+    with clock("moments", len(shape.points)):
         whole = sketch.moments if sketch is not None and sketch.seen else None
         measured = measure(shape, outliers=outliers, apart=apart, blobs=blobs, whole=whole)
         out, share = set_apart(measured, sketch, outliers=outliers == "auto")
-        passed(len(shape.points), len(shape.points))
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed), tolerance)
     with clock("search"):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from symrefine.clock import Clock, passed
+from symrefine.clock import Clock
 from symrefine.decide.posterior import BEYOND, NEAR, PICTURE, Alternative, Decision, Link, alternatives, decide
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance, toward_positive
@@ -122,12 +122,11 @@ def detect_planar(
         raise InputError(f"{shape.source}: detect_planar takes 2-D shapes; these points have {shape.dim} coordinates")
     check_tolerance(tolerance)
     clock = Clock()
-    with clock("moments"):
+    with clock("moments", len(shape.points)):
         frame = shape_moments(shape, 2)
         outlines = make_outlines(shape.points, shape.weights, frame.center, frame.scale, np.random.default_rng(seed))
         moments = shape_moments(shape, ORDER, parts=PARTS if outlines.sampled else 0)
         doublets = classify_doublets(moments, tolerance, outlines.pixel_noise)
-        passed(len(shape.points), len(shape.points))
     with clock("search"):
         pool = explore(outlines, None if doublets.kind == "centre" else doublets.angle_rad, BEYOND * tolerance)
         links = chain(outlines, pool, BEYOND * tolerance)
