@@ -21,6 +21,7 @@ from symrefine.cli import invoke
 from symrefine.cli.fleet import memory, shard
 from symrefine.cli.sources import manifest, sources
 from symrefine.errors import InputError
+from symrefine.fleet.remote import state
 
 Run = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).resolve().parents[1]
@@ -111,6 +112,16 @@ def test_addresses_are_listed_and_read(run: Run, lab: Path) -> None:
     assert err.startswith("symrefine: memory:///models/deep/cut.ply: the header")
     refused(run("batch", "memory://nothing"), "memory://nothing: there is no such file or folder")
     refused(run("batch", "nosuch://bucket/models"), "nosuch://bucket/models: cannot be read: Protocol not known")
+
+
+def test_a_file_has_changed_where_its_file_system_takes_all_to_be_static(monkeypatch: pytest.MonkeyPatch) -> None:
+    store = pytest.importorskip("fsspec").filesystem("memory")
+    monkeypatch.setattr(type(store), "ukey", lambda _, path: f"always {path}")  # as that of HTTP does
+    store.pipe("/static/a.xyz", b"0 0 0\n")
+    before = state("memory://static/a.xyz")
+    assert state("memory://static/a.xyz") == before
+    store.pipe("/static/a.xyz", b"0 0 0\n1 0 0\n")
+    assert state("memory://static/a.xyz") != before
 
 
 @pytest.fixture

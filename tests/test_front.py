@@ -442,11 +442,21 @@ def test_what_is_made_tells_draws_and_writes_itself(found, tmp_path):
         card = made._repr_html_()
         assert "data:image/png;base64," in card
         assert "<table>" not in card
-        with pytest.raises(InputError, match=r"c\.html: a \w+ cannot be written as \.html; expected a name"):
-            made.save(tmp_path / "c.html")
+        made.save(tmp_path / "c.html")
+        assert f"<h1>{made.detection.point_group} <span>" in (tmp_path / "c.html").read_text().replace("At least ", "")
+        with pytest.raises(InputError, match=r"c\.rrd: a \w+ cannot be written as \.rrd; expected a name"):
+            made.save(tmp_path / "c.rrd")
     with pytest.raises(InputError, match=r"a\.csv: \.csv holds no faces; write a mesh as \.npz, "):
         exact.save(tmp_path / "a.csv")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.ply", "a.stl", "b.npz", "b.ply", "c.json", "c.png"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        "a.ply",
+        "a.stl",
+        "b.npz",
+        "b.ply",
+        "c.html",
+        "c.json",
+        "c.png",
+    ]
 
 
 def test_a_tolerance_may_be_a_length():

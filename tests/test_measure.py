@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from experiments.objects.shapes import bottle, sample, table
+from experiments.objects.shapes import bottle, mug, sample, table
 from symrefine import Shape, detect
 from symrefine.detection.measure import doubt, gather, is_few, measure, part
 from symrefine.geometry import random_orthogonal
@@ -120,6 +120,14 @@ def test_noise_hides_what_the_tolerance_tells_apart():
     assert "agree with itself" in reason(noise)
     found = detect(noise)
     assert (found.point_group, found.group.name, found.center.shape) == ("undetermined", "C1", (3,))
+
+
+def test_the_tolerance_that_is_said_to_do_does():
+    said = reason(mug(), 1e-4)
+    assert said.startswith("the mesh, by its samples, does not even agree with itself")
+    least = float(said.partition("ask for ")[2].partition(" %")[0]) / 100.0
+    assert not reason(mug(), least)
+    assert reason(mug(), 0.8 * least)
 
 
 def test_the_more_tolerance_the_less_doubt():

@@ -98,7 +98,8 @@ def run(args: argparse.Namespace) -> int:
     order = {job.name: place for place, job in enumerate(jobs)}
     rows = [row for _, row in sorted(done, key=lambda one: (order[one[0].whole], one[0].frame or 0))]
     failed = sum(row["error"] is not None for row in rows)
-    parts = [f"{len(jobs)} files", f"{len(rows)} objects" if len(rows) > len(jobs) else ""]
+    files = "1 file" if len(jobs) == 1 else f"{len(jobs)} files"
+    parts = [files, f"{len(rows)} objects" if len(rows) > len(jobs) else ""]
     parts += [f"{len(kept)} done before" if kept else "", f"{failed} failed" if failed else ""]
     print_lines([", ".join(part for part in parts if part)])
     write_rows(args.table, rows)

@@ -16,6 +16,7 @@ from symrefine.cli.values import (
     add_viewpoint,
     reading_options,
 )
+from symrefine.clock import Clock
 from symrefine.units import EVERYDAY_M, unit_of_size
 
 if TYPE_CHECKING:
@@ -51,7 +52,9 @@ def run(args: argparse.Namespace) -> int:
         from symrefine.survey import survey
 
         shape = loaded(args.path, args.format, lambda file: read_scan(file, reading_options(args)))
-        record = _record(args, shape, survey(shape))
+        with Clock()("survey", len(shape.points)):
+            found = survey(shape)
+        record = _record(args, shape, found)
         write_all(writers := json_writer(args.json, record))
     tell(args.json, record, _lines(record), writers)
     return 0

@@ -48,7 +48,7 @@ class Doing:
     def count(self, points: int, of: int) -> None:
         """Follow the points that a stage goes through, and how fast it does."""
         rate = points / max(perf_counter() - self.entered, 1e-9)
-        self.points = f"{points:,} of {of:,} points, {rate:,.0f} points/s"
+        self.points = f"{points:,} {'' if points == of else f'of {of:,} '}points, {rate:,.0f} points/s"
         self.changed()
 
 

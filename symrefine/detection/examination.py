@@ -128,7 +128,7 @@ def _examined(
 ) -> Examined:
     sketch = given if isinstance(given, Sketch) else None
     shape = given.sample if isinstance(given, Sketch) else given
-    with clock("moments"):
+    with clock("moments", len(shape.points)):
         whole = sketch.moments if sketch is not None and sketch.seen else None
         measured = measure(shape, outliers=outliers, apart=apart, blobs=blobs, whole=whole)
         out, share = set_apart(measured, sketch, outliers=outliers == "auto")

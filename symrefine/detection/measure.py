@@ -1,5 +1,6 @@
 """What is known of a shape before any symmetry is looked for: moments, n-tuples, and a surface to judge by."""
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, get_args
@@ -163,7 +164,7 @@ def part(shape: Shape, some: Index) -> Shape:
 
 def doubt(measured: Measured, surface: Surface, tolerance: float) -> str:
     """Why a shape supports no decision at this tolerance, or nothing if it does."""
-    return measured.flaw or _hidden(surface, tolerance)
+    return measured.flaw or _hidden(surface, tolerance, is_mesh=measured.shape.faces is not None)
 
 
 def _on_a_line(measured: Measured) -> str:
@@ -199,15 +200,23 @@ def _not_seen_from(views: tuple[Camera, ...]) -> str:
     )
 
 
-def _hidden(surface: Surface, tolerance: float) -> str:
+def _hidden(surface: Surface, tolerance: float, *, is_mesh: bool) -> str:
     """Noise that makes an exact symmetry more likely broken than not."""
-    if UNKNOWN * surface.floor <= tolerance:
+    least = UNKNOWN * surface.floor
+    if least <= tolerance:
         return ""
-    hidden = float(np.quantile(surface.noise, 0.95))
+    hidden, asked = (f"{100.0 * part:.2g} %" for part in (float(np.quantile(surface.noise, 0.95)), tolerance))
+    what, remedy = ("mesh, by its samples,", "") if is_mesh else ("cloud", ", or give more points, or less noise")
     return (
-        f"the cloud does not even agree with itself: 5 % of one half of it misses the other by {hidden:.1%} of the "
-        f"diagonal or more, and a tolerance of {tolerance:.1%} is asked; give more points, or less noise"
+        f"the {what} does not even agree with itself: 5 % of one half of it misses the other by {hidden} of the "
+        f"diagonal or more, and a tolerance of {asked} is asked; ask for {_above(100 * least)} % or more{remedy}"
     )
+
+
+def _above(value: float) -> str:
+    """A number to two significant digits, rounded up."""
+    digit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return f"{math.ceil(value / digit) * digit:.2g}"
 
 
 def _classes(shape: Shape) -> Index | None:

@@ -40,7 +40,15 @@ class Completion(Pictured, BareCompletion):
     def kinds(self) -> dict[str, Callable[[], Writer]]:
         from symrefine.export.models import MARKED
 
-        return Pictured.kinds(self) | {suffix: partial(self._marked, suffix) for suffix in MARKED}
+        return (
+            Pictured.kinds(self) | {".html": self._page} | {suffix: partial(self._marked, suffix) for suffix in MARKED}
+        )
+
+    def _page(self) -> Writer:
+        """The page of what was found in the scan; its model shows what is inferred."""
+        from symrefine.report import write_html
+
+        return partial(write_html, self.detection, self.source)
 
     def _marked(self, suffix: str) -> Writer:
         from symrefine.export.models import marked_bytes

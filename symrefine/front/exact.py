@@ -45,7 +45,15 @@ class Symmetrized(Pictured, BareSymmetrized):
     def kinds(self) -> dict[str, Callable[[], Writer]]:
         from symrefine.export.models import MODELS
 
-        return Pictured.kinds(self) | {suffix: partial(self._model, suffix) for suffix in MODELS}
+        return (
+            Pictured.kinds(self) | {".html": self._page} | {suffix: partial(self._model, suffix) for suffix in MODELS}
+        )
+
+    def _page(self) -> Writer:
+        """The page of what was found in the shape as it was, and is exact now."""
+        from symrefine.report import write_html
+
+        return partial(write_html, self.detection, self.source)
 
     def _model(self, suffix: str) -> Writer:
         from symrefine.export.models import model_bytes

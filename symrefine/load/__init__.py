@@ -20,6 +20,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
 
+from symrefine.clock import passed
 from symrefine.errors import InputError, about
 from symrefine.files import file_bytes
 from symrefine.load.cif import read_cif
@@ -272,6 +273,7 @@ def _shape(
         check_distinct(content)
         if wanted.texture and content.paint is None:
             raise InputError("has no faces, so no texture; leave it out for clouds")
+        passed(len(content.points), len(content.points))
         arrays = _arrays(content, None if "measure" in kind.takes else wanted.measure, labels, weights, source)
     # Labels that count unasked are elements, and lengths between them angstroms.
     elements = labels is None and content.labels is not None

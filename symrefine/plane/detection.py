@@ -123,7 +123,7 @@ def detect_planar(
         raise InputError(f"{shape.source}: detect_planar takes 2-D shapes; these points have {shape.dim} coordinates")
     check_tolerance(tolerance)
     clock = Clock()
-    with clock("moments"):
+    with clock("moments", len(shape.points)):
         frame = shape_moments(shape, 2)
         outlines = make_outlines(shape.points, shape.weights, frame.center, frame.scale, np.random.default_rng(seed))
         moments = shape_moments(shape, ORDER, parts=PARTS if outlines.sampled else 0)
