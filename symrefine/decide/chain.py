@@ -99,7 +99,7 @@ def _places(seen: Hypothesis, found: Hypothesis) -> float:
 
 
 def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float) -> Pool:
-    pool = Pool(nothing=nothing)
+    pool = Pool(nothing=nothing, limit=limit)
     for starts in proposals(evidence):
         pool = _with(surface, pool, starts, limit)
     for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
@@ -110,7 +110,7 @@ def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float
 
 
 def _of_part(surface: Surface, whole: Pool, limit: float) -> Pool:
-    pool = Pool(nothing=whole.nothing)
+    pool = Pool(nothing=whole.nothing, limit=limit)
     for known in (whole.largest, *whole.small):
         pool = _grown(surface, pool, fitted(surface, known.placed), limit) if known.elements else pool
     pool = _with(surface, pool, voted_mirrors(surface.cloud), limit)
@@ -169,7 +169,7 @@ def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
     if pool.largest.holds(start):
         return pool
     parts, before = [pool.largest.placed, start], pool.largest.iterations
-    both = _generated(surface, parts, pool.failed, before, pool.nothing)
+    both = _generated(surface, parts, pool.failed, before, ALIKE * pool.nothing)
     if both is not None and both.need <= pool.nothing:
         return replace(pool, largest=both)
     return pool.with_failed(both)
@@ -181,7 +181,7 @@ def _grown(surface: Surface, pool: Pool, found: Hypothesis, limit: float) -> Poo
         return pool
     if found.need > limit:
         return replace(pool, small=(*pool.small, found))
-    both = _join(surface, [pool.largest, found], pool.failed, limit)
+    both = _join(surface, [pool.largest, found], pool.failed, ALIKE * limit)
     if both is not None and both.need <= limit:
         largest = both
     else:
@@ -213,7 +213,7 @@ def _generated(
         return same
     if most < math.inf and surface.openings is None:
         placed, needs = looked_at(surface, placed, COARSE * most)
-        if needs > ALIKE * most:
+        if needs > most:
             return None
     return fitted(surface, placed, before=before)
 
@@ -238,16 +238,18 @@ def _parts_need(surface: Surface, found: Hypothesis, parts: Sequence[Hypothesis]
 def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     """Groups from C1 upwards, each inside the next, by what they need; the last one may be beyond the limit."""
     elements = [single(e) for e in pool.largest.elements if e.need < pool.largest.need / ALIKE]
-    rest = sorted([*pool.small, *elements, pool.largest, *pool.turned_down()], key=_worst)
+    near = [h for h in pool.turned_down() if h.need <= COARSE * pool.limit]
+    rest = sorted([*pool.small, *elements, pool.largest, *near], key=_worst)
     known = [pool.largest, *pool.failed]
     links = [NOTHING]
     while rest := [h for h in rest if not links[-1].holds(h.placed)]:
         here = links[-1]
         # A mirror is a lone one by what the next group needs.
-        if rest[0].need > (max(limit, ALONE * here.need) if here.group.name == "Cs" else limit):
+        most = max(limit, ALONE * here.need) if here.group.name == "Cs" else limit
+        if rest[0].need > most:
             break
         level = max(ALIKE * rest[0].need, here.need, exact_need(surface.floor), pool.nothing / ALIKE)
-        batch, most = [h for h in rest if h.need <= level], max(limit, level)
+        batch = [h for h in rest if h.need <= level]
         parts = [here, *batch]
         found = _join(surface, parts, known, most)
         if found is None or found.need > ALIKE * level:

@@ -109,7 +109,7 @@ def _some(parts: list[Operations]) -> list[Operations]:
 
 def looked_at(surface: Surface, start: Placed, most: float) -> tuple[Placed, float]:
     """A fit on a few points, and what it needs by them; one that needs more than `most` after `SHORT` steps ends."""
-    state = start.framed()
+    state = start.roughly_framed()
     stride = surface.stride(max(GLANCE, LOOK // len(state.standard)))
     for iterate in refine(surface.cloud, state, start_error_rad=start_error(surface), stride=stride):
         state = iterate.state

@@ -25,6 +25,7 @@ class Pool:
         hopeless: the same of those turned down at a glance.
         at_least: whether there may be more that was not seen.
         nothing: what is as good as no need: noise hides it, or no tolerance that is asked for makes a doubt of it.
+        limit: what the largest may need.
     """
 
     small: tuple[Hypothesis, ...] = ()
@@ -34,6 +35,7 @@ class Pool:
     hopeless: tuple[tuple[Placed, float], ...] = ()
     at_least: bool = False
     nothing: float = 0.0
+    limit: float = 0.0
 
     @property
     def seen(self) -> list[tuple[Placed, float]]:

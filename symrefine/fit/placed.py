@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -15,8 +15,9 @@ from symrefine.groups.standard import GOLDEN
 T = TypeVar("T")
 # Turns that no finite fold below 36 shares; a surface of revolution survives them all.
 FREE_TURNS = 2.0 * np.pi * np.array([0.0823, 0.1381966, 0.2360680, 0.4270510])
-# Operations of one kind that are fitted together: more add points, but no knowledge.
-FITTED = 8
+# Operations of one kind that are fitted together: more add points, but no knowledge. Of the mirrors through an axis all
+# are, each with its own angle, up to so many.
+FITTED, BUNDLE = 8, 60
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -29,10 +30,15 @@ class Placed(ReadOnly):
     def framed(self) -> Framed:
         """The operations that are fitted, in the frame of the group: together they leave no unknown of it free."""
         group = PointGroup(name=self.group.name)
-        if group.symbol.family == "Cv" and group.is_finite:
+        if group.symbol.family == "Cv" and group.symbol.fold <= BUNDLE:
             return mirror_bundle(int(group.symbol.fold), self.group.frame, self.center)
         matrices = fitted_matrices(group)
         return Framed(standard=np.stack(matrices), frame=self.group.frame, center=self.center)
+
+    def roughly_framed(self) -> Framed:
+        """The same for a look: some of the mirrors through an axis stand for all."""
+        whole = self.framed()
+        return replace(whole, standard=np.stack(evenly(list(whole.standard), 2 * FITTED)), bundle=False)
 
     def moved(self, state: Framed) -> "Placed":
         """The same group where a refinement put it."""
