@@ -23,7 +23,7 @@ from symrefine.cli import invoke
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Isometry, random_orthogonal
 from symrefine.picture.pair import MOST_WAYS, Pair, make_pair
-from symrefine.picture.palette import CONTRADICTED, INFERRED
+from symrefine.picture.palette import CONTRADICTED, INFERRED, OUTLIER
 from symrefine.shape import Shape
 from symrefine.viewer.pair import view
 from tests.chromium import BROWSER, PHONE, Tab
@@ -338,7 +338,7 @@ def test_both_objects_are_in_view_before_and_after(parted: symrefine.Alignment) 
     pair = scene(parted)
     camera, beside = view(pair)
     for matrix, shift in (pair.ways[0].part(share, beside) for share in (0.0, 1.0)):
-        xy, depth = camera.project(pair.stage(matrix, shift, np.eye(3)).stage.points, 1100, 1000)
+        xy, depth = camera.project(pair.stage(matrix, shift).stage.points, 1100, 1000)
         assert depth.min() > 0.0
         assert (xy > 0.0).all()
         assert (xy < [1100.0, 1000.0]).all()
@@ -364,6 +364,8 @@ def test_drawings_and_molecules_are_shown_too(tmp_path: Path) -> None:
             found.save(tmp_path / f"a{suffix}")
         one, two = scene(found).shares(0)
         assert one.met == two.met == 1.0
+        picture = np.asarray(imread(BytesIO((tmp_path / "a.png").read_bytes())), dtype=float)[76:-104, :, :3]
+        assert has(picture, CONTRADICTED) + has(picture, OUTLIER) < 1e-3
 
 
 def test_the_command_writes_all_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -204,10 +204,10 @@ class Pair:
         reach = float((self.target.outline @ direction).max() - (self.source.outline @ direction).min())
         return (reach + ROOM * self.diagonal) * direction
 
-    def stage(self, matrix: Array, shift: Array, frame: Array) -> Scene:
+    def stage(self, matrix: Array, shift: Array) -> Scene:
         """What a camera has to have in view, the source being taken somewhere."""
         points = np.concatenate([self.source.outline @ matrix.T + shift, self.target.outline])
-        return bare_scene(points, self.diagonal, frame)
+        return bare_scene(points, self.diagonal)
 
 
 def make_pair(found: Alignment, source: Shape, target: Shape, tolerance: float) -> Pair:
@@ -248,9 +248,9 @@ def make_pair(found: Alignment, source: Shape, target: Shape, tolerance: float) 
     )
 
 
-def bare_scene(points: Array, diagonal: float, frame: Array | None = None) -> Scene:
-    """A scene in which nothing was found, about the origin."""
-    stage = Stage(center=np.zeros(3), points=points, frame=np.eye(3) if frame is None else frame, diagonal=diagonal)
+def bare_scene(points: Array, diagonal: float) -> Scene:
+    """A scene in which nothing was found, about the origin, upright as it is."""
+    stage = Stage(center=np.zeros(3), points=points, frame=np.eye(3), diagonal=diagonal)
     return Scene(stage=stage, planes=(), axes=(), missed_planes=(), missed_axes=())
 
 

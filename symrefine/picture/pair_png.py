@@ -43,12 +43,12 @@ def _panels(pair: Pair, width: int, height: int) -> list[Array]:
     """Before and after, seen from one side: pictures [height, width, 3]."""
     best, up = pair.ways[0], np.array([0.0, 0.0, 1.0])
     aspect = width / height
-    back = look_at(pair.stage(best.matrix, best.shift, np.eye(3)), aspect=aspect, fov_rad=FOV_RAD).frame[2]
+    back = look_at(pair.stage(best.matrix, best.shift), aspect=aspect, fov_rad=FOV_RAD).frame[2]
     shown, panels = [_shown(pair, side) for side in pair.sides], []
     for share in (0.0, 1.0):
         # A panel is higher than wide: what stands beside the other stands above it there.
         matrix, shift = best.part(share, pair.beside(up))
-        scene = pair.stage(matrix, shift, np.eye(3))
+        scene = pair.stage(matrix, shift)
         camera = seen_from(back, scene.stage.points, up, aspect=aspect, fov_rad=FOV_RAD, fill=0.9)
         source, target = (judged if share else bare for bare, judged in shown)
         moved = replace(source, points=source.points @ matrix.T + shift, normals=source.normals @ matrix.T)
@@ -72,7 +72,9 @@ def _after(pair: Pair) -> list[tuple[str, Colour]]:
 def _shown(pair: Pair, side: Side) -> tuple[Surface, Surface]:
     """What is painted of a side, in its own colours and in those of what is said; without strays."""
     surface = side.surface(dense=True)
-    places = surface.points if surface.faces is None else surface.points[surface.faces].mean(axis=1)
+    balls, places = side.scene(pair.diagonal).balls, surface.points
+    if balls is not None and surface.faces is not None:
+        places = balls.centres[balls.atoms[surface.faces[:, 0]]]
     misses = pair.misses(side.index, places)[0]
     if surface.faces is None and len(own := np.flatnonzero(~(misses < 0.0))):
         points, normals, colours = (v[own] for v in (surface.points, surface.normals, surface.colours))

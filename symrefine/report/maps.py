@@ -149,7 +149,7 @@ def _reproduce(pair: Pair, options: Mapping[str, Any]) -> str:
 
 def _data(pair: Pair) -> dict[str, Any]:
     """What the script draws: the target, the source, and the maps; relative to the target's centre, in diagonals."""
-    scene = pair.stage(pair.ways[0].matrix, pair.ways[0].shift, np.eye(3))
+    scene = pair.stage(pair.ways[0].matrix, pair.ways[0].shift)
     camera = look_at(scene, aspect=1.4, fov_rad=float(FOV_RAD))
     beside = pair.beside(-camera.frame[0])
     target, source = (_body(pair, side) for side in reversed(pair.sides))

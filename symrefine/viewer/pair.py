@@ -99,7 +99,7 @@ def _layout(pair: Pair) -> Any:
 def view(pair: Pair) -> tuple[Camera, Array]:
     """A camera that has both objects in view, before and after, and where the source stands before [3]."""
     way = pair.ways[0]
-    after = pair.stage(way.matrix, way.shift, np.eye(3))
+    after = pair.stage(way.matrix, way.shift)
     best = look_at(after, aspect=ASPECT, fov_rad=FOV_RAD)
     beside = pair.beside(-best.frame[0])
     points = np.concatenate([after.stage.points, pair.source.outline + beside])
