@@ -631,7 +631,7 @@ def test_batch_without_out_writes_nothing(
     run: Run, shelf: Path, record: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(shelf)
-    monkeypatch.setattr("symrefine.cli.detect.examine", lambda *_, **__: (None, None, record))
+    monkeypatch.setattr("symrefine.cli.objects._found", lambda *_: record)
     before = sorted(shelf.rglob("*"))
     status, table, _ = run("batch", ".", "--recursive")
     assert status == 0
