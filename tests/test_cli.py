@@ -15,6 +15,7 @@ import pytest
 
 import symrefine
 from symrefine.cli import batch, invoke, objects, values
+from symrefine.cli.objects import Job
 from symrefine.cli.rows import MAP_HEAD, ROW_HEAD, row_line
 from symrefine.cli.tables import detection_lines, headline
 from symrefine.detection.story import detect
@@ -678,7 +679,7 @@ def test_batch_without_out_writes_nothing(
     run: Run, shelf: Path, record: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(shelf)
-    monkeypatch.setattr("symrefine.cli.detect.examine", lambda *_, **__: (None, None, record))
+    monkeypatch.setattr("symrefine.cli.objects._found", lambda *_: record)
     before = sorted(shelf.rglob("*"))
     status, table, _ = run("batch", ".", "--recursive")
     assert status == 0
@@ -690,12 +691,12 @@ def test_batch_without_out_writes_nothing(
 def test_a_bug_in_one_file_does_not_end_the_others(
     run: Run, shelf: Path, tmp_path: Path, record: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def examine(path: str, _: dict[str, Any]) -> tuple[None, None, dict[str, Any]]:
-        if path.endswith("b.ply"):
+    def found(job: Job, _: dict[str, Any]) -> dict[str, Any]:
+        if job.path.endswith("b.ply"):
             raise ZeroDivisionError("oh")
-        return None, None, record
+        return record
 
-    monkeypatch.setattr("symrefine.cli.detect.examine", examine)
+    monkeypatch.setattr("symrefine.cli.objects._found", found)
     assert run("batch", shelf, "--out", tmp_path / "r.jsonl")[0] == 1
     errors = {r["file"]: r["error"] for r in rows(tmp_path / "r.jsonl")}
     assert errors["A.PLY"] is errors["c.ply"] is None
