@@ -320,6 +320,14 @@ def test_a_single_view_leaves_a_doubt_and_views_from_all_sides_none():
     assert 0.5 < sure[1.0] < sure[2.0]
 
 
+def test_what_a_camera_sees_apart_from_the_rest_is_no_clump():
+    """The seat hides where the legs of a stool begin, and one leg hides another."""
+    case = damaged.Case(family="shape", name="stool3", kind="views", strength=1.0, seed=404)
+    made, truth = damaged.damaged(case)
+    found = detect(made.points, viewpoint=made.viewpoint)
+    assert (found.point_group, found.clumps) == (truth.group.name, 0)
+
+
 def test_free_space_contradicts_what_borders_leave_open():
     """Mirrored across the face that the camera looks at, a box would stand in front of itself."""
     made = damage.view(BRICK, np.array([1.0, 0.0, 0.0]), np.random.default_rng(21))

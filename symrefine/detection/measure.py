@@ -117,7 +117,9 @@ def measure(
     count, every = len(shape.points), shape
     if shape.faces is None and not is_few(shape):
         auto = outliers == "auto"
-        seen = sampling(shape.points, np.random.default_rng(0), outliers=auto, apart=apart, blobs=blobs)
+        # What stands in front parts what a camera sees, and hides its counterparts.
+        groups, rng = shape.viewpoint is None, np.random.default_rng(0)
+        seen = sampling(shape.points, rng, outliers=auto, groups=groups, apart=apart, blobs=blobs)
         more = bool(seen.blobs)
         strays, clumps = massive[seen.strays], tuple((massive[c], shape.points[c]) for c in seen.clumps)
         count = len(seen.kept)
