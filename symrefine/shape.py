@@ -1,6 +1,6 @@
 """Shape: what every source of data becomes before any mathematics sees it."""
 
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -95,6 +95,15 @@ class Shape:
         """A cloud from anything numpy can read as an array [N, n]."""
         given = {"weights": weights, "normals": normals, "labels": labels, "viewpoint": viewpoint}
         return cls(points=points, **{k: v for k, v in given.items() if v is not None})  # type: ignore[arg-type]
+
+    def chosen(self, rows: Index) -> "Shape":
+        """Some of the points of a cloud, with what is known of each."""
+        weights, normals, viewpoint = (
+            None if v is None else v[rows] for v in (self.weights, self.normals, self.viewpoint)
+        )
+        labels = None if self.labels is None else self.labels[rows]
+        points = self.points[rows]
+        return replace(self, points=points, weights=weights, normals=normals, labels=labels, viewpoint=viewpoint)
 
     @property
     def dim(self) -> int:

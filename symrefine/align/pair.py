@@ -1,6 +1,6 @@
 """The two objects of an alignment in 3-space, and what is known of them: each part worked out when first needed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from symrefine.propose.folds import azimuthal_spectrum
 from symrefine.shape import Shape
 from symrefine.surface.misses import disc_distances, needs
 from symrefine.surface.neighbourhoods import NEIGHBOURS
+from symrefine.surface.sampling import sampling
 from symrefine.surface.skin import FEW, LocalPlanes, Skin, isolated_points, make_skin
 from symrefine.surface.surface import Surface
 
@@ -26,6 +27,8 @@ SOURCE_PLANES, TARGET_PLANES = 800, 2000
 # Flatness of thin sheets and edges without noise (0.13 at most at the lower quartile); noise of 0.2 % makes it 0.17.
 THIN = 0.15
 
+# Points that tell whether a side has strays or is uneven: a few strays matter to no map.
+ASKED = 2000
 # Spacings that a plane reaches.
 REACH = 3.0
 
@@ -54,6 +57,19 @@ class Side:
         parts = len(self.moments.replicates)
         moments = central_moments(points, weights, self.moments.order, parts=parts)
         return Side(shape=self.shape, moments=moments, weights=weights / weights.sum())
+
+    def cleaned(self) -> "Side":
+        """The same cloud without the points that belong to no surface; the side itself where there are none."""
+        if self.is_mesh:
+            return self
+        seen = sampling(self.shape.points, np.random.default_rng(0), outliers=True, groups=False, asked=ASKED)
+        if not len(seen.strays):
+            return self
+        shape = self.shape.chosen(seen.kept)
+        weights = self.weights[seen.kept]
+        parts = len(self.moments.replicates)
+        moments = central_moments(shape.points, weights, self.moments.order, parts=parts)
+        return Side(shape=shape, moments=moments, weights=weights / weights.sum())
 
     def skin(self, unit: float, samples: int, rng: np.random.Generator) -> Skin:
         """The surface about the centre, in units of `unit`: of a mesh, as so many samples show it.
@@ -158,23 +174,24 @@ class Evidence:
         """The largest statistic of the miss over its limit; <= 1 if the surfaces agree. Of atoms every one counts."""
         return float(self.judge.needed(self.misses(motion)[None], [motion])[0]) / self.tolerance
 
-    def agree(self, motion: Similarity) -> bool:
-        """Whether the surfaces do under a map: at once where they would even if nothing they miss by were noise.
+    def agree_at_once(self, motion: Similarity) -> bool:
+        """Whether the surfaces agree under a map even if nothing that they miss by is noise.
 
         That is told from the planes of the target that are met, which the judge need not be made for.
         """
-        return self._at_most(motion) <= self.tolerance or self.excess(motion) <= 1.0
-
-    def _at_most(self, motion: Similarity) -> float:
-        """What tolerance suffices for a map if nothing is noise; infinite for points that stand for themselves."""
-        if self.met.isolated:
-            return np.inf
         moved = motion.apply(self.moving.points)
         away, met = self.met.met_by(moved)
         across = np.abs(np.einsum("ij,ij->i", moved - met.points, met.normals))
         # A plane reaches as far as the points that it was fitted to; beyond, the point that is nearest counts.
         misses = np.where(away < REACH * self.met.spacing, across, np.maximum(away, across))
-        return float(needs(misses / tight_diagonal(self.moving.points), np.empty(0)))
+        return float(needs(misses / tight_diagonal(self.moving.points), np.empty(0))) <= self.tolerance
+
+    def cleaned(self) -> "Evidence | None":
+        """The same without points that belong to no surface; None where there are none."""
+        sides = self.source.cleaned(), self.target.cleaned()
+        if sides == (self.source, self.target):
+            return None
+        return replace(self, source=sides[0], target=sides[1])
 
     def _rng(self) -> np.random.Generator:
         return np.random.default_rng(self.seed)

@@ -12,9 +12,9 @@ from functools import cached_property
 import numpy as np
 
 from symrefine.align.alignment import OK, OPEN
-from symrefine.align.pair import THIN, Evidence, Side
+from symrefine.align.pair import ASKED, THIN, Evidence, Side
 from symrefine.align.polish import Similarity, polish
-from symrefine.decide.maps import ITSELF, Merit, ahead, as_good, fits, is_rival, score
+from symrefine.decide.maps import Merit, ahead, as_good, fits, score
 from symrefine.detection.measure import SAMPLES
 from symrefine.fit.matching import AGREE
 from symrefine.geometry import Array, tight_diagonal
@@ -35,8 +35,6 @@ from symrefine.surface.surface import HOPELESS
 PLANES, AROUND, WITHIN, MATCHES = 1500, 0.1, 0.04, 500
 # A side with so many times the surface gets as many more local planes, up to a number.
 COARSER, MOST_PLANES = 1.5, 6000
-# Points that tell whether a side has strays or is uneven: a few strays matter to no map.
-ASKED = 2000
 # One in so many local planes is moved by the polish, and by the first look at the maps that are proposed.
 MOVED, LOOK = 2, 3
 # Maps of each determinant that are polished, if they meet at least such a share of what the best does.
@@ -46,6 +44,10 @@ POLISHED, WORTH = 4, 0.5
 MOST = 6
 # Maps nearer than this, radians and diagonals, are one.
 APART = (0.17, 0.04)
+# Maps that are looked at where many do as well: as many as the rotations of a cube, and their images, would be 48.
+MOST_MAPS = 16
+# A turn and a shift so small that what they do to points is linear in them.
+SMALL = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,8 +158,9 @@ class Meeting:
     Attributes:
         best: the map.
         equals: others that do about as well.
-        confidence: probability that it is right.
+        confidence: probability that it is right, or one of those.
         determinant_confidence: probability that its determinant is.
+        slides: whether it does as well where it slides or turns a little.
         status: "ok", or why it should not be relied upon.
     """
 
@@ -165,6 +168,7 @@ class Meeting:
     equals: tuple[Met, ...]
     confidence: float
     determinant_confidence: float
+    slides: bool
     status: str
 
 
@@ -187,17 +191,17 @@ def partial_meeting(evidence: Evidence, *, reflections: bool) -> Meeting | None:
     )
     found: list[Met] = []
     for proposal in judge.promising(proposals(source, target, judge.diagonal)):
-        met = judge.polished(proposal)
-        if not any(judge.same(met, m) for m in found):
+        met = judge.polished(Similarity(matrix=proposal.matrix, shift=proposal.shift))
+        if not any(judge.same(met.motion, m.motion) for m in found):
             found.append(met)
-    found.sort(key=lambda m: -m.score)
-    best = next((m for m in found if reflections or m.determinant > 0), None)
+    best = max((m for m in found if reflections or m.determinant > 0), key=lambda m: m.score, default=None)
     if best is None:
         return None
-    rivals = [m for m in found if m is not best]
-    alike = [m for m in rivals if is_rival(best.score, m.score) and judge.is_symmetry(best, m)]
+    found = judge.closed(found, best)
+    best = max((m for m in found if reflections or m.determinant > 0), key=lambda m: m.score)
+    rivals = sorted((m for m in found if m is not best), key=lambda m: -m.score)
     open_ = source.openings.evident or target.openings.evident
-    return _weighed(best, alike, [m for m in rivals if m not in alike], reflections=reflections, open_=open_)
+    return _weighed(best, rivals, judge.slid(best), reflections=reflections, open_=open_)
 
 
 def proposals(source: Shown, target: Shown, diagonal: float) -> list[Proposal]:
@@ -235,9 +239,9 @@ class _Judge:
         signs = [float(np.sign(np.linalg.det(every[i].matrix))) for i in order]
         return [every[i] for k, i in enumerate(order) if signs[:k].count(signs[k]) < POLISHED]
 
-    def polished(self, proposal: Proposal) -> Met:
-        """A proposal after the polish, judged from both sides."""
-        start, known = Similarity(matrix=proposal.matrix, shift=proposal.shift), np.zeros((6, 6))
+    def polished(self, start: Similarity) -> Met:
+        """A map after the polish, judged from both sides."""
+        known = np.zeros((6, 6))
         done = polish(self.source.moving, self.target.cloud, start, error=WITHIN * self.diagonal, known=known)
         there, back = (self.source, self.target, done.motion), (self.target, self.source, done.motion.inverse)
         (one, misses), (other, back_misses) = self._side(*there), self._side(*back)
@@ -259,49 +263,75 @@ class _Judge:
         noise = np.concatenate([here.noise, there.noise]) / self.diagonal
         return Merit.of(misses, unseen, noise, self.far), misses[~unseen & (misses <= self.far)]
 
-    def same(self, one: Met, other: Met) -> bool:
+    def slid(self, met: Met) -> float:
+        """The best score of a map that slides or turns to either side in the way that is known worst."""
+        worst = np.linalg.eigh(met.covariance)[1][:, -1]
+        points = self.source.moving.points
+        travel = np.linalg.norm(met.motion.moved(SMALL * worst).apply(points) - met.motion.apply(points), axis=1).mean()
+        step = SMALL * APART[1] * self.diagonal / travel * worst
+        return max(self._score(met.motion.moved(x)) for x in (step, -step))
+
+    def _score(self, motion: Similarity) -> float:
+        there, back = (self.source, self.target, motion), (self.target, self.source, motion.inverse)
+        return score([self._side(*way)[0] for way in (there, back)])
+
+    def same(self, one: Similarity, other: Similarity) -> bool:
         """Whether two maps are one."""
-        shifts = float(np.linalg.norm(one.motion.shift - other.motion.shift))
-        turned = float(chord_angles(one.motion.matrix, other.motion.matrix))
-        return turned < APART[0] and shifts < APART[1] * self.diagonal
+        turned = float(chord_angles(one.matrix, other.matrix))
+        return turned < APART[0] and float(np.linalg.norm(one.shift - other.shift)) < APART[1] * self.diagonal
 
-    def is_symmetry(self, one: Met, other: Met) -> bool:
-        """Whether what leads from one map to the other carries the source, or the target, onto itself as a whole."""
-        within = self._after(one.motion.inverse, other.motion), self._after(other.motion, one.motion.inverse)
-        sides = zip((self.source, self.target), within, strict=True)
-        return any(self._side(side, side, motion)[0].score > ITSELF for side, motion in sides)
+    def closed(self, found: Sequence[Met], best: Met) -> list[Met]:
+        """With the maps that what leads from the best to another as good makes of those as good, until none is new.
 
-    @staticmethod
-    def _after(last: Similarity, first: Similarity) -> Similarity:
-        return Similarity(matrix=last.matrix @ first.matrix, shift=last.matrix @ first.shift + last.shift)
+        They differ by what carries onto themselves the parts that are shared: each is as good but for what is not.
+        """
+        every, tried = list(found), [m.motion for m in found]
+        while len(every) < MOST_MAPS:
+            good = [m.motion for m in every if as_good(best.score, m.score)]
+            products = (_after(_after(a, best.motion.inverse), b) for a in good for b in good)
+            fresh = next((p for p in products if not any(self.same(p, t) for t in tried)), None)
+            if fresh is None:
+                break
+            met = self.polished(fresh)
+            tried += [fresh, met.motion]
+            if not any(self.same(met.motion, m.motion) for m in every):
+                every.append(met)
+        return every
 
 
-def _weighed(best: Met, alike: list[Met], rivals: list[Met], *, reflections: bool, open_: bool) -> Meeting:
-    """How sure the best map is, given those that a symmetry makes of it, and its rivals."""
+def _after(last: Similarity, first: Similarity) -> Similarity:
+    """One map after another."""
+    return Similarity(matrix=last.matrix @ first.matrix, shift=last.matrix @ first.shift + last.shift)
+
+
+def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool, open_: bool) -> Meeting:
+    """How sure the best map is, or those that do as well, given its rivals and how well it does where it is slid.
+
+    A map of a determinant that is not admitted tells against them only where it does better.
+    """
     fitting = fits(best.sides)
-    certain = 0.0 if best.is_loose else fitting * ahead(best.score, [r.score for r in rivals])
-    equals = [r for r in rivals if as_good(best.score, r.score) and (reflections or r.determinant > 0)]
-    every = [best, *(m for m in alike if reflections or m.determinant > 0), *equals]
-    other = [m.score for m in (*alike, *rivals) if m.determinant != best.determinant]
+    alike = [r for r in rivals if as_good(best.score, r.score) and as_good(r.score, best.score)]
+    others = [r.score for r in rivals if r not in alike]
+    slides = best.is_loose or ahead(best.score, [slid]) < 0.5
+    certain = 0.0 if slides else fitting * ahead(best.score, [*others, slid])
+    other_hand = [r.score for r in rivals if r.determinant != best.determinant]
     return Meeting(
         best=best,
-        equals=tuple(every[1:]),
+        equals=tuple(r for r in alike if reflections or r.determinant > 0),
         confidence=certain,
         # Where nothing fits, either is as likely; where one is not admitted, nobody asks.
-        determinant_confidence=0.5 + fitting * (max(ahead(best.score, other), 0.5) - 0.5) if reflections else 1.0,
-        status=OK if certain > 0.5 else _doubt(best, every, rivals, fitting, open_),
+        determinant_confidence=0.5 + fitting * (max(ahead(best.score, other_hand), 0.5) - 0.5) if reflections else 1.0,
+        slides=slides,
+        status=OK if certain > 0.5 else _doubt(best, rivals, fitting, slides, open_),
     )
 
 
-def _doubt(best: Met, every: Sequence[Met], rivals: Sequence[Met], fitting: float, open_: bool) -> str:
+def _doubt(best: Met, rivals: Sequence[Met], fitting: float, slides: bool, open_: bool) -> str:
     """Why the best map is not to be relied upon; nothing where the objects do not fit, and nothing may be missing."""
     if any(not as_good(r.score, best.score) for r in rivals) or (fitting < 0.5 and not open_):
         return ""
-    if best.is_loose:
+    if slides:
         return f"{OPEN}: what the objects share may slide or turn in itself"
-    if fitting >= 0.5 and len(every) > 1:
-        hands = ", and the determinant is open" if len({m.determinant for m in every}) > 1 else ""
-        return f"{OPEN}: {len(every)} maps lay what is seen on one another about as well{hands}"
     met = " and ".join(f"{100 * share:.0f} %" for share in best.overlap)
     well = 100 * max(side.well for side in best.sides)
     return f"{OPEN}: {met} of source and target meet, {well:.0f} % as well as one object does, which may be chance"

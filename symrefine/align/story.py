@@ -22,6 +22,8 @@ from symrefine.align.polish import Similarity
 from symrefine.align.rivals import Choice, choose, information, polished
 from symrefine.align.span import span_fit
 from symrefine.clock import Clock
+from symrefine.decide.maps import SURE
+from symrefine.decide.posterior import Link, meant
 from symrefine.detection.measure import FLAT, PARTS, SAMPLES
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
@@ -120,14 +122,7 @@ def _some(shape: Shape, seed: int) -> Shape:
     """Of a large cloud without weights as many points as a surface is known by; meshes as they are."""
     if shape.faces is not None or shape.weights is not None or len(shape.points) <= SAMPLES:
         return shape
-    pick = drawn(len(shape.points), SAMPLES, np.random.default_rng(seed))
-    return replace(
-        shape,
-        points=shape.points[pick],
-        normals=None if shape.normals is None else shape.normals[pick],
-        labels=None if shape.labels is None else shape.labels[pick],
-        viewpoint=None if shape.viewpoint is None else shape.viewpoint[pick],
-    )
+    return shape.chosen(drawn(len(shape.points), SAMPLES, np.random.default_rng(seed)))
 
 
 def _check(source: Shape, target: Shape, tolerance: float) -> None:
@@ -169,10 +164,15 @@ def _same_size(source: Side, target: Side) -> bool:
     return abs(target.moments.scale / source.moments.scale - 1.0) < ROUNDING
 
 
-def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: bool, clock: Clock) -> Alignment:
-    """The story in 3-space. Objects of unlike size are compared at one size, even where the scale is not asked for."""
-    surfaces = evidence.has_points and not few(evidence.source.shape, evidence.target.shape)
-    partly = polish and not scale and surfaces
+def _align_solid(
+    evidence: Evidence, scale: bool, polish: bool, reflections: bool, clock: Clock, *, cleaned: bool = False
+) -> Alignment:
+    """The story in 3-space. Objects of unlike size are compared at one size, even where the scale is not asked for.
+
+    Where the surfaces do not agree at once, points that belong to none are set apart (`cleaned`), and all begins anew.
+    """
+    surfaces = polish and evidence.has_points and not few(evidence.source.shape, evidence.target.shape)
+    partly = surfaces and not scale
     tried = partly and least_misfit(evidence.harmonics) > MISFIT
     if tried and (part := _in_part(evidence, reflections, clock)) is not None:
         return part
@@ -181,16 +181,22 @@ def _align_solid(evidence: Evidence, scale: bool, polish: bool, reflections: boo
     whole, motion = choice.evidence, choice.motion
     covariance = np.zeros((6, 6)) if choice.exact else np.linalg.inv(information(whole, choice.covariance))
     # Where the sizes differ though nobody said so, it may be that one shows more than the other.
-    agree = choice.exact or (choice.excess <= 1.0 and whole.scale == scale)
+    agree, at_once = choice.excess <= 1.0 and whole.scale == scale, choice.exact
     if polish and (agree or not partly) and not choice.exact and whole.has_points:
         with clock("planes"):
             _ = whole.moving, whole.met
         with clock("polish"):
             done = polished(whole, whole.met, motion, choice.covariance)
             motion, covariance = done.motion, done.covariance
-        agree &= not partly or whole.agree(motion)
-    if partly and not (agree or tried) and (part := _in_part(evidence, reflections, clock)) is not None:
-        return part
+        at_once = surfaces and whole.agree_at_once(motion)
+    if surfaces and not (at_once or cleaned) and (clean := evidence.cleaned()) is not None:
+        return _align_solid(clean, scale, polish, reflections, clock, cleaned=True)
+    if partly and not (at_once or tried):
+        excess = whole.excess(motion) if agree else np.inf
+        likely = meant(Link(need=excess), 1.0) if excess <= 1.0 else 0.0
+        part = _in_part(evidence, reflections, clock) if likely < SURE else None
+        if part is not None and part.confidence >= likely:
+            return part
     evidence = whole
     matrix, translation, factor = _in_input_units(evidence, motion, scale)
 
@@ -236,7 +242,7 @@ def _met_in_part(meeting: Meeting, evidence: Evidence, clock: Clock) -> Alignmen
         matrix=matrix,
         translation=translation,
         scale=1.0,
-        sigma_rad=np.inf if best.is_loose else float(np.sqrt(np.trace(best.covariance[:3, :3]))),
+        sigma_rad=np.inf if meeting.slides else float(np.sqrt(np.trace(best.covariance[:3, :3]))),
         covariance=_of_transform(best.covariance, evidence, matrix, 1.0),
         exact=False,
         timings=clock.seconds,

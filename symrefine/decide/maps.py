@@ -20,10 +20,8 @@ WELL, LESS_WELL, NOTHING = 0.9, 1.0, 3.0
 # over the best rival, by the share that is well met, and by what part of all that is met is met less well: of true maps
 # a tenth by definition of "well", of thin leaves a quarter. Chosen such that none of these pairs is wrong and sure.
 LEAD, SHARE, UNLIKE = (0.1, 4.0), (0.28, 14.0), (0.35, -12.0)
-# Rivals that lag by so many times that are none.
-NO_RIVAL = 3.0
-# Score from which on a map carries a surface onto itself; what noise alone leaves of it is 0.8.
-ITSELF = 0.6
+# Maps that lag by so little that the best would be less sure than this do as well as it.
+SURE = 0.95
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,18 +61,13 @@ def fits(sides: Sequence[Merit]) -> float:
 
 
 def ahead(best: float, rivals: Sequence[float]) -> float:
-    """Probability that the map of the best score is right, and none of its rivals instead."""
+    """Probability that a map of the best score is right, and none of its rivals instead."""
     return _rising(best - max(rivals, default=-np.inf), *LEAD)
 
 
 def as_good(best: float, rival: float) -> bool:
     """Whether a rival may as well be right."""
-    return best - rival < LEAD[0]
-
-
-def is_rival(best: float, other: float) -> bool:
-    """Whether another map does so well that it costs confidence."""
-    return best - other < NO_RIVAL * LEAD[0]
+    return ahead(best, [rival]) < SURE
 
 
 def _rising(value: float, middle: float, steepness: float) -> float:

@@ -66,7 +66,8 @@ def sampling(
     """How points [N, 3] were sampled; with `outliers` those that belong to no surface are set apart.
 
     With `apart` clumps apart from the body are as well, and with `blobs` those that touch it; without `groups` nobody
-    looks for either. `asked` points tell whether there is anything to be done. Of points that fill a volume none is set apart, and all are kept.
+    looks for either. `asked` of the points tell whether there is anything to be done. Of points that fill a volume none
+    is set apart, and all are kept.
     """
     kept: Index = np.arange(len(points))
     taken: list[Index] = []
@@ -110,13 +111,13 @@ def _without_strays(points: Array) -> Index:
     Sparse parts of a surface are flat, more so than dense ones; strays near a surface are not in its plane. Each round
     sees clearer, as strays among strays look less alone.
     """
-    kept = np.arange(len(points))
-    while len(kept) > AROUND:
-        alone = _alone(Surroundings.of(points[kept]))
+    kept, around = np.arange(len(points)), Surroundings.of(points)
+    while True:
+        alone = _alone(around)
         kept = kept[~alone]
-        if alone.sum() <= LAST * len(points):
-            break
-    return kept
+        if alone.sum() <= LAST * len(points) or len(kept) <= AROUND:
+            return kept
+        around = around.without(alone)
 
 
 def _alone(around: Surroundings) -> Mask:
@@ -126,9 +127,9 @@ def _alone(around: Surroundings) -> Mask:
     sparse = np.flatnonzero(reach > FAR * np.median(reach)) if np.median(reach) > 0.0 else np.empty(0, dtype=np.int64)
     found = np.zeros(len(points), dtype=bool)
     if sparse.size:
-        mean, normals, _ = (p[sparse] for p in around.planes)
+        mean, normals, variances = around.planes_at(sparse)
         across = np.abs(np.einsum("ni,ni->n", normals, points[sparse] - mean))
-        loose = (around.thickness[sparse] > FLAT) | (across > FLAT * around.away[sparse, -1])
+        loose = (thickness_of(variances) > FLAT) | (across > FLAT * around.away[sparse, -1])
         # As random points are among themselves, or far from what is dense around: thin parts, sampled sparsely, are not
         if not _scattered(points[sparse[loose]], np.ptp(points, axis=0)):
             loose &= reach[sparse] > FAR * reach[around.near[sparse]].min(axis=1)

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from symrefine.geometry import Array
+from symrefine.geometry import Array, Mask
 from symrefine.shape import Index
 from symrefine.surface.neighbourhoods import planes_of, thickness_of
 from symrefine.surface.tree import Tree
@@ -37,6 +37,15 @@ class Surroundings:
         away, near = tree.query(points, AROUND, skip=1)
         return cls(points=points, tree=tree, away=away, near=near)
 
+    def without(self, some: Mask) -> "Surroundings":
+        """The surroundings of all but some [N] of the points; asked anew only where one of them was around."""
+        kept = np.flatnonzero(~some)
+        points, place = self.points[kept], np.cumsum(~some) - 1
+        tree, away, near = Tree(points), self.away[kept], place[self.near[kept]]
+        changed = some[self.near[kept]].any(axis=1)
+        away[changed], near[changed] = tree.query(points[changed], AROUND, skip=1)
+        return Surroundings(points=points, tree=tree, away=away, near=near)
+
     @property
     def reach(self) -> Array:
         """Distance [N] of the neighbour in the middle."""
@@ -46,6 +55,10 @@ class Surroundings:
     def planes(self) -> tuple[Array, Array, Array]:
         """Means, normals and variances (across first), all [N, 3], of the neighbours."""
         return planes_of(self.points, self.near)
+
+    def planes_at(self, some: Index) -> tuple[Array, Array, Array]:
+        """The same of some of the points only."""
+        return planes_of(self.points, self.near[some])
 
     @property
     def thickness(self) -> Array:
