@@ -580,16 +580,19 @@ def test_objects_that_have_nothing_in_common_are_not_aligned() -> None:
     assert found.status != "ok"
 
 
-def test_a_flat_part_in_common_says_that_it_slides_or_is_chance() -> None:
-    # All that the two share is a piece of a plane.
-    rng = rng_of(55)
-    plate = np.column_stack([rng.uniform(-1, 1, (6000, 2)), np.zeros(6000)])
+@pytest.mark.parametrize("seed", [55, 56, 57])
+def test_a_flat_part_in_common_says_that_it_slides_or_is_chance(seed: int) -> None:
+    # All that a square plate and a round one share is a piece of a plane.
+    rng = rng_of(seed)
+    square, disc = (np.column_stack([rng.uniform(-1, 1, (9000, 2)), np.zeros(9000)]) for _ in range(2))
+    disc = 1.2 * disc[np.linalg.norm(disc, axis=1) < 1.0]
     first, second = (
         np.concatenate([plate, sample(join([box(at, (0.5, 0.3, size))]), 2500, 0.0, rng)])
-        for at, size in (((0.7, 0.6, 0.4), 0.8), ((-0.6, 0.3, -0.3), 0.6))
+        for plate, at, size in ((square, (0.7, 0.6, 0.4), 0.8), (disc, (-0.6, 0.3, -0.3), 0.6))
     )
     found = align(first, second @ random_orthogonal(rng).T)
     assert found.status != "ok"
+    assert found.confidence == 0.0
 
 
 @pytest.mark.parametrize("det", DETERMINANTS)
@@ -617,8 +620,8 @@ def test_handedness_is_told_by_two_lines(det: int) -> None:
     signs = rng.choice([-1.0, 1.0], (20, 1))
     here, there = pair_invariants(points, normals), pair_invariants(points @ matrix.T + 3.0, signs * normals @ matrix.T)
     for a, b in zip(here[:-1], there[:-1], strict=True):
-        np.testing.assert_allclose(a, b, atol=1e-12)
-    np.testing.assert_allclose(here[-1], det * there[-1], atol=1e-12)
+        np.testing.assert_allclose(a, b, atol=1e-4)  # single precision
+    np.testing.assert_allclose(here[-1], det * there[-1], atol=1e-4)
     assert np.abs(here[-1]).max() > 0.1
 
 

@@ -48,7 +48,9 @@ class Proposal:
 
 
 def consensus(matches: Matches, within: float) -> list[Proposal]:
-    """The maps of either determinant that most matches agree with to a distance, best first."""
+    """The maps of either determinant that most matches agree with to a distance, best first; three fix a map."""
+    if len(matches.source) < 3:
+        return []
     here = pair_invariants(matches.source, matches.source_normals)
     there = pair_invariants(matches.target, matches.target_normals)
     allowed = np.abs(here[0] - there[0]) < within
@@ -71,7 +73,8 @@ def pair_invariants(points: Array, normals: Array) -> tuple[Single, ...]:
     x, n = (v.astype(np.float32) for v in (points - points.mean(axis=0), normals))
     squares = (x**2).sum(axis=1)
     distance = np.sqrt(np.maximum(squares[:, None] + squares - 2.0 * (x @ x.T), 0.0))
-    shrink = 1.0 / np.maximum(distance, np.float32(1e-12))
+    np.fill_diagonal(distance, 0.0)
+    shrink = np.divide(1.0, distance, out=np.zeros_like(distance), where=distance > 0.0)
     high = n @ x.T
     first = (high - np.diag(high)[:, None]) * shrink  # (x_j - x_i).n_i, over the distance
     second = -first.T
