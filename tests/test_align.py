@@ -9,14 +9,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
+from experiments.objects import damage
 from experiments.objects.household import camera
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
-from symrefine.align.landscape import grid_rotations, harmonic_pair, hills, landscape
-from symrefine.align.moment_fit import as_good, covariance, exact, fit
+from symrefine.align.landscape import grid_rotations, harmonic_pair, hills, landscape, least_misfit
+from symrefine.align.moment_fit import as_good, best_fits, covariance, exact, fit, misfit
+from symrefine.align.partial import Judge, Shown
 from symrefine.align.polish import Similarity, polish
 from symrefine.align.procrustes import procrustes
 from symrefine.align.span import monomial_pair, span_fit
-from symrefine.align.story import Alignment, align
+from symrefine.align.story import Alignment, _side, align
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, householder, line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.groups.orthogonal import chord_angles
@@ -84,6 +86,23 @@ def test_scale_is_recovered_when_asked_for(det: int, factor: float) -> None:
     assert found.scale == pytest.approx(factor, rel=1e-12)
     explains(found, points, target, 1e-11 * (1.0 + factor))
     np.testing.assert_allclose(found.transform[:3, :3], factor * matrix, atol=1e-12 * factor)
+
+
+@pytest.mark.parametrize("polish", [True, False])
+@pytest.mark.parametrize("noise_rel", [0.0, 0.005])
+def test_the_scale_is_as_sure_as_it_says(polish: bool, noise_rel: float) -> None:
+    for seed in range(4):
+        rng = rng_of(70, seed)
+        source, target = (sample(asymmetric(), 4000, noise_rel, rng) for _ in range(2))
+        found = align(source, 3.0 * target @ random_orthogonal(rng, det=-1).T, scale=True, polish=polish)
+        assert abs(found.scale - 3.0) < 3.0 * found.scale_sigma < 0.15
+
+
+def test_without_a_scale_there_is_no_doubt_of_it() -> None:
+    rng = rng_of(71)
+    source, target = (sample(asymmetric(), 3000, 0.0, rng) for _ in range(2))
+    assert align(source, target).scale_sigma == 0.0
+    assert align(source, 2.0 * source, scale=True).scale_sigma == 0.0
 
 
 def test_unlike_sizes_are_named_when_scale_is_not_asked_for() -> None:
@@ -525,6 +544,54 @@ def test_noise_that_hides_every_direction_is_said():
     assert not found.is_misfit
 
 
+# --- large clouds, and points that belong to no surface ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_a_large_cloud_needs_some_of_its_points_only(det: int) -> None:
+    rng = rng_of(72)
+    matrix = random_orthogonal(rng, det=det)
+    source, target = sample(asymmetric(), 150000, 0.0, rng), sample(asymmetric(), 60000, 0.0, rng)
+    found = align(source, target @ matrix.T + 1.0)
+    assert angle_deg(found.matrix, matrix) < 0.05
+    assert found.status == "ok"
+    assert min(found.overlap) > 0.99
+
+
+def test_the_same_points_are_told_however_many() -> None:
+    points, matrix = sample(asymmetric(), 50000, 0.0, rng_of(73)), random_orthogonal(rng_of(74), det=-1)
+    found = align(points, rng_of(75).permutation(points @ matrix.T))
+    assert found.exact
+    np.testing.assert_allclose(found.matrix, matrix, atol=1e-12)
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_strays_on_both_sides_cost_no_confidence(det: int) -> None:
+    rng = rng_of(76)
+    matrix = random_orthogonal(rng, det=det)
+
+    def strewn() -> Array:
+        points = sample(asymmetric(), 8000, 0.0, rng)
+        low, high = points.min(axis=0), points.max(axis=0)
+        return np.concatenate([points, 0.5 * (low + high) + 1.5 * (rng.random((3000, 3)) - 0.5) * (high - low)])
+
+    found = align(strewn(), strewn() @ matrix.T)
+    assert angle_deg(found.matrix, matrix) < 0.3
+    assert found.confidence > 0.95
+    assert min(found.overlap) > 0.95
+
+
+def test_no_map_comes_below_what_lengths_allow() -> None:
+    # The bound of moments that no orthogonal map changes, against the best of the grid and its polish; 0 for one object.
+    rng = rng_of(77)
+    one, other = (central_moments(skewed(400, 3, s), np.ones(400), 6, parts=8) for s in (78, 79))
+    pair = harmonic_pair(one, other)
+    found = best_fits(pair, np.concatenate([grid_rotations()[::50], -grid_rotations()[::50]]))
+    assert 0.0 < least_misfit(pair) <= misfit(pair, found)
+    turned_one = central_moments(skewed(400, 3, 78) @ random_orthogonal(rng, det=-1).T, np.ones(400), 6, parts=8)
+    assert least_misfit(harmonic_pair(one, turned_one)) < 1e-12
+
+
 # --- objects that share a part only -----------------------------------------------------------------------------------
 
 
@@ -578,6 +645,40 @@ def test_objects_that_have_nothing_in_common_are_not_aligned() -> None:
     found = align(sample(asymmetric(), 5000, 0.0, rng), sample(table(), 5000, 0.0, rng))
     assert found.confidence == 0.0
     assert found.status != "ok"
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_what_is_seen_of_a_symmetric_object_leaves_its_equivalents(det: int) -> None:
+    # A box with a knob that is cut off: four operations carry what is left onto itself, and the true map is one of four.
+    rng, matrix = rng_of(80), random_orthogonal(rng_of(81), det=det)
+    mesh = join([box((0.0, 0.0, 0.0), (1.0, 1.6, 2.7)), box((0.2, 0.3, 1.5), (0.3, 0.4, 0.5))])
+    source, target = (sample(mesh, 12000, 0.0, rng) for _ in range(2))
+    source, target = source[source[:, 2] < 0.9], target[target[:, 2] < 0.6]
+    found = align(source, target @ matrix.T + 2.0)
+    assert found.status == "ok"
+    assert len(found.equivalents) == 4
+    assert min(angle_deg(m, matrix) for m in found.equivalents) < 0.3
+    assert "4 maps" in found.observable
+    assert "the determinant is free" in found.observable
+
+
+def test_a_camera_that_saw_free_space_denies_what_borders_leave_open() -> None:
+    # A long box laid on one view of a short one reaches beyond the outline that the view ends with: unseen, unless it
+    # is known where the camera stood.
+    rng = rng_of(82)
+    short, long = (join([box((0.0, 0.0, z), (1.0, 1.6, 1.5 + 2.0 * z))]) for z in (0.0, 0.6))
+    made = damage.view(short, np.array([0.7, 0.5, -0.3]), rng)
+    eye = np.broadcast_to(made.viewpoint, made.points.shape)
+    source = _side(Shape(points=sample(long, 10000, 0.0, rng)), 0)
+    denied = []
+    for view in (Shape(points=made.points), Shape(points=made.points, viewpoint=eye)):
+        target = _side(view, 0)
+        shown = [Shown.of(side, 1.0, 0) for side in (source, target)]
+        judge = Judge(source=shown[0], target=shown[1], diagonal=short.diagonal, tolerance=0.02)
+        motion = Similarity(matrix=np.eye(3), shift=source.moments.center - target.moments.center)
+        denied.append(judge.side(shown[0], shown[1], motion)[0].nothing)
+    assert denied[0] < 0.02
+    assert denied[1] > 0.1
 
 
 @pytest.mark.parametrize("seed", [55, 56, 57])

@@ -47,6 +47,8 @@ class Alignment(ReadOnly):
         matrix: [n, n] orthogonal, determinant +1 or -1; +1 wherever both explain the pair equally well.
         translation: [n], units of the target.
         scale: 1.0 unless it was asked for.
+        scale_sigma: standard deviation of the scale from sampling noise; 0 unless it was asked for, and where the
+            moments agree to rounding.
         sigma_rad: standard deviation of the rotation from sampling noise; 0 where the moments agree to rounding, large
             where some turn is not observable.
         covariance: [6, 6] of `y = exp([w]) matrix x + translation + d`: rotation vector w (target axes, radians), then
@@ -59,6 +61,7 @@ class Alignment(ReadOnly):
     matrix: Array
     translation: Array
     scale: float
+    scale_sigma: float
     sigma_rad: float
     covariance: Array
     exact: bool

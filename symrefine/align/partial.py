@@ -183,7 +183,7 @@ def partial_meeting(evidence: Evidence, *, reflections: bool) -> Meeting | None:
         return None
     finest = min(source.cloud.spacing, target.cloud.spacing)
     source, target = source.as_fine_as(finest), target.as_fine_as(finest)
-    judge = _Judge(
+    judge = Judge(
         source=source,
         target=target,
         diagonal=min(tight_diagonal(s.cloud.points) for s in (source, target)),
@@ -214,7 +214,7 @@ def proposals(source: Shown, target: Shown, diagonal: float) -> list[Proposal]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Judge:
+class Judge:
     """Two surfaces that judge maps between them, the smaller diagonal of both, and the tolerance."""
 
     source: Shown
@@ -244,7 +244,7 @@ class _Judge:
         known = np.zeros((6, 6))
         done = polish(self.source.moving, self.target.cloud, start, error=WITHIN * self.diagonal, known=known)
         there, back = (self.source, self.target, done.motion), (self.target, self.source, done.motion.inverse)
-        (one, misses), (other, back_misses) = self._side(*there), self._side(*back)
+        (one, misses), (other, back_misses) = self.side(*there), self.side(*back)
         met = np.concatenate([misses, back_misses])
         return Met(
             motion=done.motion,
@@ -254,7 +254,7 @@ class _Judge:
             rms=self.diagonal * float(np.sqrt(np.mean(met**2))) if len(met) else math.inf,
         )
 
-    def _side(self, here: Shown, there: Shown, motion: Similarity) -> tuple[Merit, Array]:
+    def side(self, here: Shown, there: Shown, motion: Similarity) -> tuple[Merit, Array]:
         """What one side says of a map, and by how much its local planes miss the other where they meet, diagonals."""
         moved = motion.apply(here.cloud.points)
         misses = disc_distances(there.cloud, moved, bound=HOPELESS * self.far * self.diagonal) / self.diagonal
@@ -273,7 +273,7 @@ class _Judge:
 
     def _score(self, motion: Similarity) -> float:
         there, back = (self.source, self.target, motion), (self.target, self.source, motion.inverse)
-        return score([self._side(*way)[0] for way in (there, back)])
+        return score([self.side(*way)[0] for way in (there, back)])
 
     def same(self, one: Similarity, other: Similarity) -> bool:
         """Whether two maps are one."""

@@ -53,12 +53,14 @@ class Polished:
     Attributes:
         motion: the map.
         covariance: [6, 6] of the rotation vector (target axes, radians) and the shift (RMS radii).
+        scale_sigma: standard deviation of the scale, relative; 0 where it was no unknown.
         steps: outer iterations.
         converged: whether the last step was negligible.
     """
 
     motion: Similarity
     covariance: Array
+    scale_sigma: float
     steps: int
     converged: bool
 
@@ -89,29 +91,40 @@ def polish(
     prior[:6, :6] = known
     prior = prior if scale else prior[:6, :6]
     x, reach = np.zeros(len(prior)), error
-    covariance: Array = np.linalg.pinv(known, rcond=1e-12, hermitian=True)
+    covariance: Array = np.linalg.pinv(prior, rcond=1e-12, hermitian=True)
     few = COARSE if len(source.points) > COARSE * ENOUGH else 1
     for index in range(1, MAX_OUTER + 1):
         met = _met(source, target, start.moved(x), reach, few)
         if len(met.worth) == 0:
-            return Polished(motion=start.moved(x), covariance=covariance, steps=index - 1, converged=False)
+            return _ended(start.moved(x), covariance, index - 1, converged=False)
         before, settled = x, False
         for _ in range(MAX_OUTER):
             motion = start.moved(x)
             squares = met.squares(motion)
             scale_now = robust_scale(np.sqrt(squares), target.spacing, reach)
             step, inverse, sigmas = _step(*_normal_equations(met, motion, squares, scale_now, prior, x))
-            x, covariance, length = x + step, inverse[:6, :6], float(np.linalg.norm(step))
+            x, covariance, length = x + step, inverse, float(np.linalg.norm(step))
             settled = scale_now > reach and (length < SETTLED or sigmas < WITHIN_NOISE)
             reach = min(reach, 4.0 * length)
             if settled:
                 break
         moved = float(np.linalg.norm(x - before))
         if settled and few == 1 and moved < SCALE_FLOOR * target.spacing:
-            return Polished(motion=start.moved(x), covariance=covariance, steps=index, converged=True)
+            return _ended(start.moved(x), covariance, index, converged=True)
         if settled and moved < target.spacing:
             few = 1
-    return Polished(motion=start.moved(x), covariance=covariance, steps=MAX_OUTER, converged=False)
+    return _ended(start.moved(x), covariance, MAX_OUTER, converged=False)
+
+
+def _ended(motion: Similarity, covariance: Array, steps: int, *, converged: bool) -> Polished:
+    """What is told of a map, given the covariance [6 or 7, ...] of all that was unknown."""
+    return Polished(
+        motion=motion,
+        covariance=covariance[:6, :6],
+        scale_sigma=float(np.sqrt(np.diag(covariance)[6:].sum())),
+        steps=steps,
+        converged=converged,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -29,7 +29,7 @@ from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, check_tolerance, cross_matrix
 from symrefine.groups import PointGroup
-from symrefine.moments.moments import Moments, central_moments, shape_moments
+from symrefine.moments.moments import Moments, central_moments, deviations, shape_moments, tensor_index
 from symrefine.moments.quadrature import mesh_nodes
 from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
 from symrefine.plane import detect_planar
@@ -159,6 +159,15 @@ def _unlike(source: Side, target: Side) -> bool:
     return not 1.0 / RADII < target.moments.scale / source.moments.scale < RADII
 
 
+def _scale_sigma(*sides: Side) -> float:
+    """Standard deviation of the ratio of two sizes, relative to it, from the jackknife of their mean squares."""
+    variance = 0.0
+    for m in (s.moments for s in sides):
+        squares = m.replicates[:, tensor_index(m.dim, 2, m.order).diagonal()].sum(axis=1)
+        variance += 0.25 * float((deviations(squares) ** 2).sum())
+    return float(np.sqrt(variance))
+
+
 def _same_size(source: Side, target: Side) -> bool:
     """Whether the sizes agree to rounding."""
     return abs(target.moments.scale / source.moments.scale - 1.0) < ROUNDING
@@ -182,12 +191,15 @@ def _align_solid(
     covariance = np.zeros((6, 6)) if choice.exact else np.linalg.inv(information(whole, choice.covariance))
     # Where the sizes differ though nobody said so, it may be that one shows more than the other.
     agree, at_once = choice.excess <= 1.0 and whole.scale == scale, choice.exact
+    scale_sigma = 0.0 if choice.exact else _scale_sigma(whole.source, whole.target)
     if polish and (agree or not partly) and not choice.exact and whole.has_points:
         with clock("planes"):
             _ = whole.moving, whole.met
         with clock("polish"):
             done = polished(whole, whole.met, motion, choice.covariance)
             motion, covariance = done.motion, done.covariance
+            # Noise may move all planes of a side outwards or inwards at once, by half of their thickness.
+            scale_sigma = float(np.hypot(done.scale_sigma, 0.5 * np.median(whole.moving.thickness)))
         at_once = surfaces and whole.agree_at_once(motion)
     if surfaces and not (at_once or cleaned) and (clean := evidence.cleaned()) is not None:
         return _align_solid(clean, scale, polish, reflections, clock, cleaned=True)
@@ -208,6 +220,7 @@ def _align_solid(
         matrix=matrix,
         translation=translation,
         scale=factor,
+        scale_sigma=factor * scale_sigma if scale else 0.0,
         sigma_rad=float(np.sqrt(np.trace(covariance[:3, :3]))),
         covariance=_of_transform(covariance, evidence, matrix, factor),
         exact=choice.exact and (scale or _same_size(evidence.source, evidence.target)),
@@ -242,6 +255,7 @@ def _met_in_part(meeting: Meeting, evidence: Evidence, clock: Clock) -> Alignmen
         matrix=matrix,
         translation=translation,
         scale=1.0,
+        scale_sigma=0.0,
         sigma_rad=np.inf if meeting.slides else float(np.sqrt(np.trace(best.covariance[:3, :3]))),
         covariance=_of_transform(best.covariance, evidence, matrix, 1.0),
         exact=False,
@@ -377,6 +391,7 @@ def _align_moments(
         matrix=matrix,
         translation=translation,
         scale=factor,
+        scale_sigma=factor * _scale_sigma(a, b) if scale and not found.exact else 0.0,
         sigma_rad=0.0 if found.exact else found.sigma_rad,
         covariance=np.zeros((0, 0)),
         exact=found.exact and (scale or _same_size(a, b)),

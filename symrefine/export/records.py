@@ -244,6 +244,7 @@ def alignment_record(
         "matrix": matrix(a.matrix),
         "translation": numbers(a.translation, size),
         "scale": number(a.scale),
+        "scale_sigma": number(a.scale_sigma, 1.0),
         "overlap": {"source": number(a.overlap[0], 1.0), "target": number(a.overlap[1], 1.0)},
         "rms": number(a.rms, 1.0),
         "sigma_rad": number(a.sigma_rad),
