@@ -17,11 +17,12 @@ from symrefine.align.polish import Similarity, polish
 from symrefine.decide.maps import Merit, ahead, as_good, fits, score
 from symrefine.detection.measure import SAMPLES
 from symrefine.fit.matching import AGREE
-from symrefine.geometry import Array, tight_diagonal
+from symrefine.geometry import Array, Isometry, Mask, householder, tight_diagonal
 from symrefine.groups.orthogonal import chord_angles
 from symrefine.moments.quadrature import sample_surface
 from symrefine.propose.consensus import Matches, Proposal, consensus
 from symrefine.propose.signatures import mutual_matches, signatures
+from symrefine.propose.votes import mirror_votes
 from symrefine.surface.cameras import cameras
 from symrefine.surface.misses import LIMITS, disc_distances
 from symrefine.surface.neighbourhoods import fills_volume
@@ -46,6 +47,9 @@ MOST = 6
 APART = (0.17, 0.04)
 # Maps that are looked at where many do as well: as many as the rotations of a cube, and their images, would be 48.
 MOST_MAPS = 16
+# Local planes that vote for the mirrors of what meets under a map, and how many of the densest spots are looked at: one
+# in three of the planes of a box, that of each mirror among the first.
+VOTERS, MIRRORS = 300, 12
 # A turn and a shift so small that what they do to points is linear in them.
 SMALL = 1e-3
 
@@ -189,15 +193,13 @@ def partial_meeting(evidence: Evidence, *, reflections: bool) -> Meeting | None:
         diagonal=min(tight_diagonal(s.cloud.points) for s in (source, target)),
         tolerance=evidence.tolerance,
     )
-    found: list[Met] = []
-    for proposal in judge.promising(proposals(source, target, judge.diagonal)):
-        met = judge.polished(Similarity(matrix=proposal.matrix, shift=proposal.shift))
-        if not any(judge.same(met.motion, m.motion) for m in found):
-            found.append(met)
-    best = max((m for m in found if reflections or m.determinant > 0), key=lambda m: m.score, default=None)
-    if best is None:
+    promising = judge.promising(proposals(source, target, judge.diagonal))
+    found = judge.polished_all([], [Similarity(matrix=p.matrix, shift=p.shift) for p in promising])
+    admitted = [m for m in found if reflections or m.determinant > 0]
+    if not admitted:
         return None
-    found = judge.closed(found, best)
+    best = max(admitted, key=lambda m: m.score)
+    found = judge.closed(judge.polished_all(found, judge.mirrored(best)), best)
     best = max((m for m in found if reflections or m.determinant > 0), key=lambda m: m.score)
     rivals = sorted((m for m in found if m is not best), key=lambda m: -m.score)
     open_ = source.openings.evident or target.openings.evident
@@ -229,15 +231,32 @@ class Judge:
 
     def promising(self, every: Sequence[Proposal]) -> list[Proposal]:
         """The proposals of each determinant under which most local planes meet others, as they stand."""
-        points, normals = (v[::LOOK] for v in (self.source.cloud.points, self.source.cloud.normals))
-        count = []
-        for p in every:
-            away, met = self.target.cloud.met_by(points @ p.matrix.T + p.shift)
-            facing = np.abs(np.einsum("ij,ij->i", normals @ p.matrix.T, met.normals)) > AGREE
-            count.append(int((facing & (away < WITHIN * self.diagonal)).sum()))
+        count = [int(self._meets(Similarity(matrix=p.matrix, shift=p.shift)).sum()) for p in every]
         order = [i for i in np.argsort(-np.array(count), kind="stable") if count[i] >= max(WORTH * max(count), 1.0)]
         signs = [float(np.sign(np.linalg.det(every[i].matrix))) for i in order]
         return [every[i] for k, i in enumerate(order) if signs[:k].count(signs[k]) < POLISHED]
+
+    def _meets(self, motion: Similarity) -> Mask:
+        """Which of every so many local planes of the source meet others of the target, as they stand."""
+        some = self.source.cloud.chosen(slice(None, None, LOOK))
+        away, met = self.target.cloud.met_by(motion.apply(some.points))
+        facing = np.abs(np.einsum("ij,ij->i", motion.turn(some.normals), met.normals)) > AGREE
+        return facing & (away < WITHIN * self.diagonal)
+
+    def mirrored(self, best: Met) -> list[Similarity]:
+        """What the best map is followed by where what meets under it may be its own mirror image, to be polished.
+
+        Of many equal matches few agree on any one map, so that others as good need not be among those proposed.
+        """
+        meets = self._meets(best.motion)
+        some = self.source.cloud.chosen(slice(None, None, LOOK)).chosen(meets)
+        if len(some.points) < VOTERS // 10:
+            return []
+        points, normals = best.motion.apply(some.points), best.motion.turn(some.normals)
+        votes = mirror_votes(points[:VOTERS], normals[:VOTERS], np.random.default_rng(0))[:MIRRORS]
+        planes = [Isometry.about(v.foot, householder(v.direction)) for v in votes]
+        starts = [_after(Similarity(matrix=p.matrix, shift=p.shift), best.motion) for p in planes]
+        return [s for s in starts if self._meets(s).sum() >= WORTH * meets.sum()]
 
     def polished(self, start: Similarity) -> Met:
         """A map after the polish, judged from both sides."""
@@ -275,6 +294,15 @@ class Judge:
         there, back = (self.source, self.target, motion), (self.target, self.source, motion.inverse)
         return score([self.side(*way)[0] for way in (there, back)])
 
+    def polished_all(self, known: Sequence[Met], starts: Sequence[Similarity]) -> list[Met]:
+        """The maps that are known, and those that starts lead to and are none of them."""
+        every = list(known)
+        for start in starts:
+            if not any(self.same(start, m.motion) for m in every):
+                met = self.polished(start)
+                every += [] if any(self.same(met.motion, m.motion) for m in every) else [met]
+        return every
+
     def same(self, one: Similarity, other: Similarity) -> bool:
         """Whether two maps are one."""
         turned = float(chord_angles(one.matrix, other.matrix))
@@ -292,10 +320,9 @@ class Judge:
             fresh = next((p for p in products if not any(self.same(p, t) for t in tried)), None)
             if fresh is None:
                 break
-            met = self.polished(fresh)
-            tried += [fresh, met.motion]
-            if not any(self.same(met.motion, m.motion) for m in every):
-                every.append(met)
+            tried.append(fresh)
+            every = self.polished_all(every, [fresh])
+            tried.append(every[-1].motion)
         return every
 
 
