@@ -582,7 +582,7 @@ def test_strays_on_both_sides_cost_no_confidence(det: int) -> None:
 
 
 def test_no_map_comes_below_what_lengths_allow() -> None:
-    # The bound of moments that no orthogonal map changes, against the best of the grid and its polish; 0 for one object.
+    # What no orthogonal map changes, against the best maps of many starts; nothing is left for one object in two poses.
     rng = rng_of(77)
     one, other = (central_moments(skewed(400, 3, s), np.ones(400), 6, parts=8) for s in (78, 79))
     pair = harmonic_pair(one, other)
@@ -649,7 +649,7 @@ def test_objects_that_have_nothing_in_common_are_not_aligned() -> None:
 
 @pytest.mark.parametrize("det", DETERMINANTS)
 def test_what_is_seen_of_a_symmetric_object_leaves_its_equivalents(det: int) -> None:
-    # A box with a knob that is cut off: four operations carry what is left onto itself, and the true map is one of four.
+    # A box with a knob that is cut off: four operations carry what is left onto itself, so that four maps are as good.
     rng, matrix = rng_of(80), random_orthogonal(rng_of(81), det=det)
     mesh = join([box((0.0, 0.0, 0.0), (1.0, 1.6, 2.7)), box((0.2, 0.3, 1.5), (0.3, 0.4, 0.5))])
     source, target = (sample(mesh, 12000, 0.0, rng) for _ in range(2))
