@@ -27,8 +27,6 @@ SOURCE_PLANES, TARGET_PLANES = 800, 2000
 # Flatness of thin sheets and edges without noise (0.13 at most at the lower quartile); noise of 0.2 % makes it 0.17.
 THIN = 0.15
 
-# Points that tell whether a side has strays or is uneven: a few strays matter to no map.
-ASKED = 2000
 # Spacings that a plane reaches.
 REACH = 3.0
 
@@ -62,7 +60,7 @@ class Side:
         """The same cloud without the points that belong to no surface; the side itself where there are none."""
         if self.is_mesh:
             return self
-        seen = sampling(self.shape.points, np.random.default_rng(0), outliers=True, groups=False, asked=ASKED)
+        seen = sampling(self.shape.points, np.random.default_rng(0), outliers=True, groups=False)
         if not len(seen.strays):
             return self
         shape = self.shape.chosen(seen.kept)

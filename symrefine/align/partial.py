@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from symrefine.align.alignment import OK, OPEN
-from symrefine.align.pair import ASKED, THIN, Evidence, Side
+from symrefine.align.pair import THIN, Evidence, Side
 from symrefine.align.polish import Similarity, polish
 from symrefine.decide.maps import Merit, ahead, as_good, fits, score
 from symrefine.detection.measure import SAMPLES
@@ -36,6 +36,8 @@ from symrefine.surface.surface import HOPELESS
 PLANES, AROUND, WITHIN, MATCHES = 1500, 0.1, 0.04, 500
 # A side with so many times the surface gets as many more local planes, up to a number.
 COARSER, MOST_PLANES = 1.5, 6000
+# Points that tell whether a side has strays or is uneven; of 2,000 a cloud of 40 % strays may look like a volume.
+ASKED = 3000
 # One in so many local planes is moved by the polish, and by the first look at the maps that are proposed.
 MOVED, LOOK = 2, 3
 # Maps of each determinant that are polished, if they meet at least such a share of what the best does.
@@ -50,6 +52,8 @@ MOST_MAPS = 16
 # Local planes that vote for the mirrors of what meets under a map, and how many of the densest spots are looked at: one
 # in three of the planes of a box, that of each mirror among the first.
 VOTERS, MIRRORS = 300, 12
+# Share of what meets that has to meet in a mirror, as it was voted for, lest the polish is wasted.
+ITS_OWN = 0.8
 # A turn and a shift so small that what they do to points is linear in them.
 SMALL = 1e-3
 
@@ -253,10 +257,10 @@ class Judge:
         if len(some.points) < VOTERS // 10:
             return []
         points, normals = best.motion.apply(some.points), best.motion.turn(some.normals)
-        votes = mirror_votes(points[:VOTERS], normals[:VOTERS], np.random.default_rng(0))[:MIRRORS]
+        votes = mirror_votes(points[:VOTERS], normals[:VOTERS], np.random.default_rng(0), told=MIRRORS)
         planes = [Isometry.about(v.foot, householder(v.direction)) for v in votes]
         starts = [_after(Similarity(matrix=p.matrix, shift=p.shift), best.motion) for p in planes]
-        return [s for s in starts if self._meets(s).sum() >= WORTH * meets.sum()]
+        return [s for s in starts if self._meets(s).sum() >= ITS_OWN * meets.sum()]
 
     def polished(self, start: Similarity) -> Met:
         """A map after the polish, judged from both sides."""

@@ -202,6 +202,7 @@ def _align_solid(
             scale_sigma = float(np.hypot(done.scale_sigma, 0.5 * np.median(whole.moving.thickness)))
         at_once = surfaces and whole.agree_at_once(motion)
     if surfaces and not (at_once or cleaned) and (clean := evidence.cleaned()) is not None:
+        clean = replace(clean, scale=scale or _unlike(clean.source, clean.target))
         return _align_solid(clean, scale, polish, reflections, clock, cleaned=True)
     if partly and not (at_once or tried):
         excess = whole.excess(motion) if agree else np.inf

@@ -35,7 +35,7 @@ class Vote:
     votes: Index
 
 
-def mirror_votes(points: Array, normals: Array, rng: np.random.Generator) -> list[Vote]:
+def mirror_votes(points: Array, normals: Array, rng: np.random.Generator, *, told: int = TOLD) -> list[Vote]:
     """Planes that many pairs of local planes [N, 3] are mirror images in, most votes first; normalised units.
 
     Pairs within one flat part agree under any mirror across it and say nothing: a pair counts by how much its normals
@@ -47,7 +47,7 @@ def mirror_votes(points: Array, normals: Array, rng: np.random.Generator) -> lis
     image = n[i] - 2.0 * along[:, None] * across
     agree = np.abs(np.einsum("ki,ki->k", image, n[j])) > np.cos(AGREE_RAD)
     i, j, m, worth = i[agree], j[agree], across[agree], np.abs(along[agree])
-    return _densest(m, 0.5 * np.einsum("ki,ki->k", m, x[i] + x[j])[:, None] * m, worth)
+    return _densest(m, 0.5 * np.einsum("ki,ki->k", m, x[i] + x[j])[:, None] * m, worth, told)
 
 
 def turn_votes(points: Array, normals: Array, rng: np.random.Generator) -> list[tuple[Vote, int]]:
@@ -95,7 +95,7 @@ def unit_rows(vectors: Array) -> Array:
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None])
 
 
-def _densest(directions: Array, feet: Array, worth: Array) -> list[Vote]:
+def _densest(directions: Array, feet: Array, worth: Array, told: int = TOLD) -> list[Vote]:
     """The densest spots of votes for planes or lines: unit vectors [K, 3] without a sign, with their feet [K, 3]."""
     from scipy.spatial import cKDTree
 
@@ -112,7 +112,7 @@ def _densest(directions: Array, feet: Array, worth: Array) -> list[Vote]:
     chord = 2.0 * np.sin(0.5 * AGREE_RAD)
     both = np.concatenate([directions, -directions]) / chord
     around = cKDTree(np.column_stack([both, np.tile(FEET * feet, (2, 1))]))
-    for cell in np.argsort(-density)[: 8 * TOLD]:
+    for cell in np.argsort(-density)[: 8 * told]:
         votes = order[ends[cell] : ends[cell + 1]]
         for _ in range(2):
             sign = np.where(directions[votes] @ directions[votes[0]] < 0.0, -1.0, 1.0)
@@ -129,7 +129,7 @@ def _densest(directions: Array, feet: Array, worth: Array) -> list[Vote]:
         known = (abs(v.direction @ u) > np.cos(AGREE_RAD) and np.linalg.norm(v.foot - foot) < 1.0 / FEET for v in found)
         if votes.size and not any(known):
             found.append(Vote(direction=u, foot=foot, votes=votes))
-        if len(found) == TOLD:
+        if len(found) == told:
             break
     return found
 
