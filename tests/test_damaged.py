@@ -27,6 +27,7 @@ from symrefine.propose.votes import mirror_votes, revolution, turn_votes
 from symrefine.shape import CAMERAS, Shape
 from symrefine.surface.cameras import cameras
 from symrefine.surface.sampling import sampling
+from symrefine.surface.surroundings import Surroundings
 
 BRICK = join([box((0, 0, 0), (1.0, 0.7, 0.5))])
 # One corner off, so that it has no symmetry.
@@ -234,6 +235,19 @@ def test_the_axis_of_a_revolution_meets_its_normals():
     measured = measure(Shape(points=points))
     axis_point = (np.array([1.0, 2.0, -0.5]) - measured.moments.center) / measured.moments.scale
     assert np.linalg.norm(np.cross(axis_point - through, direction)) < 0.02
+
+
+# Surroundings
+
+
+def test_what_is_around_the_rest_is_as_if_the_others_had_never_been():
+    rng = np.random.default_rng(45)
+    points = np.concatenate([sample(table(), 3000, 0.002, rng), rng.uniform(-2, 2, (400, 3))])
+    gone = rng.random(len(points)) < 0.1
+    left, fresh = Surroundings.of(points).without(gone), Surroundings.of(points[~gone])
+    np.testing.assert_array_equal(left.points, fresh.points)
+    np.testing.assert_array_equal(left.away, fresh.away)
+    np.testing.assert_array_equal(left.near, fresh.near)
 
 
 # Cameras

@@ -80,6 +80,17 @@ def test_anything_numpy_reads_as_a_matrix_is_taken(points):
     assert (shape.weights, shape.normals, shape.faces, shape.measure) == (None, None, None, "points")
 
 
+def test_some_of_the_points_keep_what_is_known_of_each():
+    rng = np.random.default_rng(4)
+    given = {"weights": rng.random(9), "normals": rng.normal(size=(9, 3)), "labels": np.arange(9)}
+    shape = Shape(points=rng.random((9, 3)), viewpoint=np.array([0.0, 0.0, 9.0]), unit="mm", **given)
+    some = shape.chosen(np.array([7, 2, 5]))
+    for name in ("points", *given, "viewpoint"):
+        np.testing.assert_allclose(getattr(some, name), getattr(shape, name)[[7, 2, 5]], atol=1e-15)
+    assert (some.unit, some.faces) == ("mm", None)
+    assert Shape(points=shape.points).chosen(np.arange(3)).weights is None
+
+
 def test_diagonal_is_that_of_the_axis_aligned_box():
     assert Shape.of(POINTS + 7.0).diagonal == pytest.approx(np.sqrt(1 + 4 + 9))
 
