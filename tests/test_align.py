@@ -578,7 +578,6 @@ def test_strays_on_both_sides_cost_no_confidence(det: int) -> None:
     found = align(strewn(), strewn() @ matrix.T)
     assert angle_deg(found.matrix, matrix) < 0.3
     assert found.confidence > 0.95
-    assert min(found.overlap) > 0.95
 
 
 def test_no_map_comes_below_what_lengths_allow() -> None:

@@ -179,7 +179,7 @@ def _align_solid(
 ) -> Alignment:
     """The story in 3-space. Objects of unlike size are compared at one size, even where the scale is not asked for.
 
-    Where the surfaces do not agree at once, points that belong to none are set apart (`cleaned`), and all begins anew.
+    Where it is not sure that they agree, points of no surface are set apart (`cleaned`), and all begins anew.
     """
     surfaces = polish and evidence.has_points and not few(evidence.source.shape, evidence.target.shape)
     partly = surfaces and not scale
@@ -202,13 +202,13 @@ def _align_solid(
             # Noise may move all planes of a side outwards or inwards at once, by half of their thickness.
             scale_sigma = float(np.hypot(done.scale_sigma, 0.5 * np.median(whole.moving.thickness)))
         at_once = surfaces and whole.agree_at_once(motion)
-    if surfaces and not (at_once or cleaned) and (clean := evidence.cleaned()) is not None:
+    excess = 0.0 if at_once or not surfaces else whole.excess(motion) if agree else np.inf
+    likely = meant(Link(need=excess), 1.0) if excess <= 1.0 else 0.0
+    if likely < SURE and not cleaned and (clean := evidence.cleaned()) is not None:
         clean = replace(clean, scale=scale or _unlike(clean.source, clean.target))
         return _align_solid(clean, scale, polish, reflections, clock, cleaned=True)
-    if partly and not (at_once or tried):
-        excess = whole.excess(motion) if agree else np.inf
-        likely = meant(Link(need=excess), 1.0) if excess <= 1.0 else 0.0
-        part = _in_part(evidence, reflections, clock) if likely < SURE else None
+    if partly and not tried and likely < SURE:
+        part = _in_part(evidence, reflections, clock)
         if part is not None and part.confidence >= likely:
             return part
     evidence = whole
