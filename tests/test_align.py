@@ -17,8 +17,9 @@ from symrefine.align.moment_fit import as_good, best_fits, covariance, exact, fi
 from symrefine.align.partial import Judge, Shown
 from symrefine.align.polish import Similarity, polish
 from symrefine.align.procrustes import procrustes
+from symrefine.align.sides import side_of
 from symrefine.align.span import monomial_pair, span_fit
-from symrefine.align.story import Alignment, _side, align
+from symrefine.align.story import Alignment, align
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, householder, line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.groups.orthogonal import chord_angles
@@ -668,10 +669,10 @@ def test_a_camera_that_saw_free_space_denies_what_borders_leave_open() -> None:
     short, long = (join([box((0.0, 0.0, z), (1.0, 1.6, 1.5 + 2.0 * z))]) for z in (0.0, 0.6))
     made = damage.view(short, np.array([0.7, 0.5, -0.3]), rng)
     eye = np.broadcast_to(made.viewpoint, made.points.shape)
-    source = _side(Shape(points=sample(long, 10000, 0.0, rng)), 0)
+    source = side_of(Shape(points=sample(long, 10000, 0.0, rng)), 0)
     denied = []
     for view in (Shape(points=made.points), Shape(points=made.points, viewpoint=eye)):
-        target = _side(view, 0)
+        target = side_of(view, 0)
         shown = [Shown.of(side, 1.0, 0) for side in (source, target)]
         judge = Judge(source=shown[0], target=shown[1], diagonal=short.diagonal, tolerance=0.02)
         motion = Similarity(matrix=np.eye(3), shift=source.moments.center - target.moments.center)

@@ -20,6 +20,16 @@ from symrefine.align.pair import Evidence, Side, few
 from symrefine.align.partial import Meeting, partial_meeting
 from symrefine.align.polish import Similarity
 from symrefine.align.rivals import Choice, choose, information, polished
+from symrefine.align.sides import (
+    ORDERS,
+    differ_in_size,
+    rank_of,
+    same_size,
+    side_of,
+    size_sigma,
+    told_sizes,
+    within,
+)
 from symrefine.align.span import span_fit
 from symrefine.clock import Clock
 from symrefine.decide.doubts import FLAT
@@ -30,8 +40,6 @@ from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, check_tolerance, cross_matrix
 from symrefine.groups import PointGroup
-from symrefine.moments.moments import Moments, central_moments, deviations, shape_moments, tensor_index
-from symrefine.moments.quadrature import mesh_nodes
 from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
 from symrefine.plane import detect_planar
 from symrefine.shape import Shape
@@ -39,11 +47,6 @@ from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.skin import drawn
 
 __all__ = ["Alignment", "align"]
-
-# Highest order of the moments in so many dimensions: some 100 to 500 moments, of n^order components.
-ORDERS = {1: 8, 2: 8, 3: 8, 4: 5, 5: 5, 6: 5, 7: 3, 8: 3, 9: 3, 10: 3}
-# Radii that differ by more than this factor are no matter of sampling.
-RADII = 1.2
 
 
 def align(
@@ -77,8 +80,8 @@ def align(
     with clock("moments"):
         a, b = _looked_at(a, b, seed) if polish else (a, b)
         parts = 0 if few(a, b) else PARTS
-        sides = _side(a, parts), _side(b, parts)
-    ranks = [_rank(s.moments) for s in sides]
+        sides = side_of(a, parts), side_of(b, parts)
+    ranks = [rank_of(s.moments) for s in sides]
     if max(ranks) - min(ranks) > 1:
         lean, full = (a, b) if ranks[0] < ranks[1] else (b, a)
         raise DegenerateShapeError(
@@ -87,7 +90,7 @@ def align(
     if a.dim != 3 or max(ranks) < 3:
         return _align_moments(sides, scale, allow_reflection, tolerance, clock)
     evidence = Evidence(
-        source=sides[0], target=sides[1], scale=scale or _unlike(*sides), tolerance=tolerance, seed=seed
+        source=sides[0], target=sides[1], scale=scale or differ_in_size(*sides), tolerance=tolerance, seed=seed
     )
     return _align_solid(evidence, scale, polish, allow_reflection, clock)
 
@@ -141,39 +144,6 @@ def _check(source: Shape, target: Shape, tolerance: float) -> None:
     check_tolerance(tolerance)
 
 
-def _side(shape: Shape, parts: int) -> Side:
-    weights = np.ones(len(shape.points)) if shape.weights is None else shape.weights
-    return Side(
-        shape=shape,
-        moments=shape_moments(shape, ORDERS[shape.dim], parts=parts),
-        weights=weights / weights.sum() if shape.faces is None else np.zeros(0),
-    )
-
-
-def _rank(moments: Moments) -> int:
-    """Dimension of the subspace that the points spread in."""
-    return int((np.linalg.eigvalsh(moments.covariance) > FLAT).sum())
-
-
-def _unlike(source: Side, target: Side) -> bool:
-    """Whether the sizes differ by more than sampling explains."""
-    return not 1.0 / RADII < target.moments.scale / source.moments.scale < RADII
-
-
-def _scale_sigma(*sides: Side) -> float:
-    """Standard deviation of the ratio of two sizes, relative to it, from the jackknife of their mean squares."""
-    variance = 0.0
-    for m in (s.moments for s in sides):
-        squares = m.replicates[:, tensor_index(m.dim, 2, m.order).diagonal()].sum(axis=1)
-        variance += 0.25 * float((deviations(squares) ** 2).sum())
-    return float(np.sqrt(variance))
-
-
-def _same_size(source: Side, target: Side) -> bool:
-    """Whether the sizes agree to rounding."""
-    return abs(target.moments.scale / source.moments.scale - 1.0) < ROUNDING
-
-
 def _align_solid(
     evidence: Evidence, scale: bool, polish: bool, reflections: bool, clock: Clock, *, cleaned: bool = False
 ) -> Alignment:
@@ -192,7 +162,7 @@ def _align_solid(
     covariance = np.zeros((6, 6)) if choice.exact else np.linalg.inv(information(whole, choice.covariance))
     # Where the sizes differ though nobody said so, it may be that one shows more than the other.
     agree, at_once = choice.excess <= 1.0 and whole.scale == scale, choice.exact
-    scale_sigma = 0.0 if choice.exact else _scale_sigma(whole.source, whole.target)
+    scale_sigma = 0.0 if choice.exact else size_sigma(whole.source, whole.target)
     if polish and (agree or not partly) and not choice.exact and whole.has_points:
         with clock("planes"):
             _ = whole.moving, whole.met
@@ -205,7 +175,7 @@ def _align_solid(
     excess = 0.0 if at_once or not surfaces else whole.excess(motion) if agree else np.inf
     likely = meant(Link(need=excess), 1.0) if excess <= 1.0 else 0.0
     if likely < SURE and not cleaned and (clean := evidence.cleaned()) is not None:
-        clean = replace(clean, scale=scale or _unlike(clean.source, clean.target))
+        clean = replace(clean, scale=scale or differ_in_size(clean.source, clean.target))
         return _align_solid(clean, scale, polish, reflections, clock, cleaned=True)
     if partly and not tried and likely < SURE:
         part = _in_part(evidence, reflections, clock)
@@ -225,7 +195,7 @@ def _align_solid(
         scale_sigma=factor * scale_sigma if scale else 0.0,
         sigma_rad=float(np.sqrt(np.trace(covariance[:3, :3]))),
         covariance=_of_transform(covariance, evidence, matrix, factor),
-        exact=choice.exact and (scale or _same_size(evidence.source, evidence.target)),
+        exact=choice.exact and (scale or same_size(evidence.source, evidence.target)),
         timings=clock.seconds,
         _coset=coset,
         _miss=lambda: _miss(choice, motion, scale, reflections),
@@ -299,7 +269,7 @@ def _miss(choice: Choice, motion: Similarity, scale: bool, reflections: bool) ->
     evidence = choice.evidence
     a, b = evidence.source, evidence.target
     # Of objects that do not agree at any size, the size is not to blame.
-    status = OK if scale or choice.excess > 1.0 else _sizes(a, b)
+    status = OK if scale or choice.excess > 1.0 else told_sizes(a, b)
     sure = choice.determinant_confidence if reflections else 1.0
     if status != OK or not evidence.has_points:
         rms, shares = _nearest(a.shape, b.shape, *_in_input_units(evidence, motion, scale), evidence.tolerance)
@@ -329,13 +299,6 @@ def _unlikely(misfit: float) -> float:
     return float(np.sqrt(misfit / MISFIT))
 
 
-def _sizes(source: Side, target: Side) -> str:
-    if not _unlike(source, target):
-        return OK
-    ratio = target.moments.scale / source.moments.scale
-    return f"the target is {ratio:.3g} times as large as the source: ask for the scale"
-
-
 def _nearest(
     source: Shape, target: Shape, matrix: Array, translation: Array, scale: float, tolerance: float
 ) -> tuple[float, tuple[float, float]]:
@@ -357,10 +320,10 @@ def _align_moments(
 ) -> Alignment:
     """The story elsewhere, and for sets that span fewer dimensions than they live in: moments within the span."""
     a, b = sides
-    dim, rank = a.shape.dim, max(_rank(a.moments), _rank(b.moments))
+    dim, rank = a.shape.dim, max(rank_of(a.moments), rank_of(b.moments))
     bases = [np.eye(dim) if rank == dim else np.linalg.eigh(s.moments.covariance)[1].T[::-1] for s in (a, b)]
     with clock("choose"):
-        source, target = _within(a, bases[0][:rank]), _within(b, bases[1][:rank])
+        source, target = within(a, bases[0][:rank]), within(b, bases[1][:rank])
         orders = [t for t in PAPER_ORDERS if max(t) <= source.order]
         tuples = ntuples(source, orders), ntuples(target, orders)
         found = span_fit(source, target, tuples, reflections=reflections or rank < dim)
@@ -374,7 +337,7 @@ def _align_moments(
     matrix, translation = coset.matrices[0], coset.translations[0]
 
     def miss() -> Miss:
-        status = OK if scale else _sizes(a, b)
+        status = OK if scale else told_sizes(a, b)
         if found.misfit > MISFIT and not found.exact:
             status = f"the moments differ by {found.misfit:.0f} times what sampling explains"
         if status == OK and not np.isfinite(found.sigma_rad) and not found.exact:
@@ -393,10 +356,10 @@ def _align_moments(
         matrix=matrix,
         translation=translation,
         scale=factor,
-        scale_sigma=factor * _scale_sigma(a, b) if scale and not found.exact else 0.0,
+        scale_sigma=factor * size_sigma(a, b) if scale and not found.exact else 0.0,
         sigma_rad=0.0 if found.exact else found.sigma_rad,
         covariance=np.zeros((0, 0)),
-        exact=found.exact and (scale or _same_size(a, b)),
+        exact=found.exact and (scale or same_size(a, b)),
         timings=clock.seconds,
         _coset=(lambda: _planar_coset(b.shape, coset, reflections)) if dim == rank == 2 else (lambda: coset),
         _miss=miss,
@@ -409,16 +372,3 @@ def _planar_coset(target: Shape, known: Coset, reflections: bool) -> Coset:
     if found.undetermined or np.isinf(found.group.order) or len(known.free):
         return known
     return coset_of_group(known.matrices[0], known.translations[0], found.group, found.center, reflections=reflections)
-
-
-def _within(side: Side, basis: Array) -> Moments:
-    """Moments of the projection on orthonormal rows [r, n]; those of the side itself if the rows are those of I."""
-    if len(basis) == side.shape.dim:
-        return side.moments
-    if side.shape.faces is None:
-        points, weights = side.shape.points - side.moments.center, side.weights
-    else:
-        nodes, weights = mesh_nodes(side.shape, side.moments.order)
-        points = nodes + (side.shape.points[0] - side.moments.center)
-    parts = len(side.moments.replicates)
-    return central_moments(points @ basis.T, weights, side.moments.order, parts=parts)
