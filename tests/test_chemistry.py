@@ -451,7 +451,11 @@ def test_frames_of_one_file_are_aligned(tmp_path: Path, capsys: pytest.CaptureFi
     path.write_text(WATER + turned)
     status, record = told(["align", path, path, "--source-frame", 0, "--target-frame", 1], capsys)
     assert (status, record["status"], record["options"]["target_frame"]) == (0, "ok", 1)
-    assert invoke(["align", str(path), str(path), "--source-frame", "0"]) == 2
+    # Each frame of the target is a target of its own; the source is one.
+    assert invoke(["align", str(path), str(path), "--source-frame", "0"]) == 0
+    out = capsys.readouterr().out
+    assert all(f"a.xyz#{k}" in out for k in (0, 1))
+    assert invoke(["align", str(path), str(path)]) == 2
     assert f"{path}: holds 2 frames; choose one with frame" in capsys.readouterr().err
 
 
