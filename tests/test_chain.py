@@ -81,7 +81,7 @@ def test_the_group_grows_with_the_tolerance(name, noise, seed):
     points, _ = molecule(name, noise, seed)
     links, _, _ = linked(points, TOLERANCE, 1.5 * max(TOLERANCES))
     check_chain(links, 1.5 * max(TOLERANCES))
-    chosen = [decide([Link(need=h.need, parts=h.parts) for h in links[1:]], t).index for t in TOLERANCES]
+    chosen = [decide([Link(need=h.need) for h in links[1:]], t).index for t in TOLERANCES]
     assert chosen == sorted(chosen)
     for below, above in pairwise(chosen):
         assert links[above].holds(links[below].placed)

@@ -40,7 +40,7 @@ KIND_OF = {
         "decide.hypotheses": "DIRECTION_ERROR SAME_RAD",
         "decide.maps": "WELL LESS_WELL NOTHING LEAD SHARE UNLIKE DENIED SURE",
         "decide.pool": "ALIKE",
-        "decide.posterior": "EVEN STEEPNESS EVEN_MIRROR ALONE PARTS UNKNOWN BLURRED BROKEN "
+        "decide.posterior": "EVEN STEEPNESS EVEN_MIRROR ALONE UNKNOWN BLURRED BROKEN "
         "EVEN_PICTURE EVEN_PICTURE_MIRROR STEEPNESS_PICTURE",
         "detection.measure": "SAME_MASS HIDDEN",
         "detection.sketch": "BEYOND",

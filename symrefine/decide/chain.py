@@ -223,18 +223,6 @@ def _worst(found: Hypothesis) -> tuple[float, float]:
     return found.need, max((e.deviation.mean for e in found.elements), default=0.0)
 
 
-def _parts_need(surface: Surface, found: Hypothesis, parts: Sequence[Hypothesis]) -> float:
-    """What the parts need that generate a group, or what it needs itself where they say nothing more.
-
-    Of a whole surface what two elements carry onto itself their product does too: an element that misses by more was
-    misled, by strays or by a density. Not so what only all elements together tell, nor where parts were not seen.
-    """
-    alone = max((e.need for e in found.elements), default=0.0)
-    if surface.openings is not None or found.need > ALIKE * alone:
-        return found.need
-    return max(min(h.need, h.parts) for h in parts)
-
-
 def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     """Groups from C1 upwards, each inside the next, by what they need; the last one may be beyond the limit."""
     elements = [single(e) for e in pool.largest.elements if e.need < pool.largest.need / ALIKE]
@@ -250,20 +238,18 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
             break
         level = max(ALIKE * rest[0].need, here.need, exact_need(surface.floor), pool.nothing / ALIKE)
         batch = [h for h in rest if h.need <= level]
-        parts = [here, *batch]
-        found = _join(surface, parts, known, most)
+        found = _join(surface, [here, *batch], known, most)
         if found is None or found.need > ALIKE * level:
-            tried = [] if found is None else [(found, parts)]
-            singly = [(_join(surface, [here, h], known, most), [here, h]) for h in batch[:SINGLY]]
-            tried += [(h, own) for h, own in singly if h is not None]
-            known += [h for h, _ in tried]
-            found, parts = min(tried, key=lambda t: _worst(t[0]), default=(None, parts))
+            singly = [_join(surface, [here, h], known, most) for h in batch[:SINGLY]]
+            tried = [h for h in (found, *singly) if h is not None]
+            known += tried
+            found = min(tried, key=_worst, default=None)
         if found is None:
             rest = [h for h in rest if h not in batch]
             continue
         # What holds together holds in every part of it, though a part alone may not tell what was not seen.
         need = min([found.need, *(h.need for h in known if h.holds(found.placed))])
-        links.append(replace(found, need=max(need, here.need), parts=_parts_need(surface, found, parts)))
+        links.append(replace(found, need=max(need, here.need)))
         if need > limit:
             break
     return tuple(links)

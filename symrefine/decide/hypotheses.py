@@ -52,8 +52,7 @@ class Element:
 class Hypothesis:
     """A group where it fits best: its elements judged, and what the worst of them needs.
 
-    `history` holds the iterates of the fit; `before` counts those of the parts that it was put together from, and
-    `parts` is what these need; NaN where it was not.
+    `history` holds the iterates of the fit; `before` counts those of the parts that it was put together from.
     """
 
     placed: Placed
@@ -61,7 +60,6 @@ class Hypothesis:
     need: float
     history: tuple[Iterate, ...] = ()
     before: int = 0
-    parts: float = math.nan
 
     @property
     def supported(self) -> float:

@@ -7,7 +7,7 @@ it is the i-th itself is `inside[i] - inside[i + 1]`: the worst element kept and
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, TypeVar
 
@@ -25,13 +25,10 @@ ALONE = 2.0
 # All three of pictures, where parts moved by half a tolerance are told as well, so that the curve is less steep: close
 # to that of the first version, which was fitted to half of its drawings; see `experiments.studies.planar_reliability`.
 EVEN_PICTURE, EVEN_PICTURE_MIRROR, STEEPNESS_PICTURE = 0.6, 0.75, 3.6
-# How much the parts count that generate a group, beside the group itself: just less than half, so that none is told
-# which misses by far. On 320 damaged clouds three groups seemed to miss whose parts hold, and all three were true.
-PARTS = 0.49
 # How much of what noise alone needs is left to doubt, once it was taken away, and by how much it blurs a miss: with 1 %
-# noise parts that are out of place show half of their miss. Of 152 siblings in fresh poses at 1 % noise 125 are told,
-# none sure and wrong, 123 with 2; with 2.5 129 and one, and a camera that is made inexactly loses its mirror.
-UNKNOWN, BLURRED = 0.7, 2.25
+# noise parts that are out of place show half of their miss. With 2.5 more of them are told, but intact bodies are lost
+# that are thin (a wheel with 7 spokes) or made inexactly (a camera), and a gear's sibling is sure and wrong.
+UNKNOWN, BLURRED = 0.7, 2.0
 # Probability that what no camera saw breaks what the rest shows, by how much is missing at least (`cameras.unclosed`,
 # in single views two thirds). Of 20 of the objects that constants are fitted to, seen once, one was told wrong, 2 of
 # 22 by the rule of succession; of the others 2 of 19 (`experiments.studies.single_views --seed 7`).
@@ -57,14 +54,10 @@ PICTURE = Curve(even=EVEN_PICTURE, even_mirror=EVEN_PICTURE_MIRROR, steepness=ST
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Link:
-    """A group of the chain as the decision sees it: the smallest tolerance at which it holds, and if it is a mirror.
-
-    `parts` is the same of the groups that generate it, if it was put together from some, else NaN.
-    """
+    """A group of the chain as the decision sees it: the smallest tolerance at which it holds, and if it is a mirror."""
 
     need: float
     lone_mirror: bool = False
-    parts: float = math.nan
 
 
 def known_links(names: Sequence[str], needs: Sequence[float]) -> list[Link]:
@@ -106,9 +99,6 @@ def decide(
     inside, whole = [1.0], 1.0 - BROKEN * unclosed
     for link in links:
         own = meant(link, tolerance, noise, curve)
-        if link.parts < link.need:
-            # All that generates a group is meant, or the group is.
-            own += PARTS * (meant(replace(link, need=link.parts), tolerance, noise, curve) - own)
         inside.append(min(inside[-1], whole * own))
     return Decision.of(inside)
 

@@ -1,7 +1,7 @@
 """What a decision is made from: a shape measured, its candidates fitted and judged, and joined to a chain of groups."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -50,8 +50,7 @@ class Examined:
     @property
     def known(self) -> list[Link]:
         """The groups beyond C1 as the decision sees them."""
-        links = known_links([h.group.name for h in self.links[1:]], [h.need for h in self.links[1:]])
-        return [replace(link, parts=h.parts) for link, h in zip(links, self.links[1:], strict=True)]
+        return known_links([h.group.name for h in self.links[1:]], [h.need for h in self.links[1:]])
 
     def choices(self, tolerance: float) -> tuple[Alternative, ...]:
         """Every group of the chain, C1 first, as likely as at a tolerance."""
