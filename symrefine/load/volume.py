@@ -63,7 +63,7 @@ def volume_content(volume: Volume, wanted: Wanted) -> Content:
         InputError: intensities that are not finite, or all the same; axes that span no space; a threshold at which
             nothing begins; `invert` for a surface, which would be the same.
     """
-    if not (np.isfinite(volume.axes).all() and np.isfinite(volume.origin).all() and np.linalg.det(volume.axes) != 0.0):
+    if not (np.isfinite(volume.origin).all() and _spans_space(volume.axes)):
         raise InputError(f"the axes of the grid are {volume.axes.T.tolist()}; expected three that span space")
     if wanted.measure == "solid":
         return _solid(_grey(volume.values), volume, wanted)
@@ -87,6 +87,12 @@ def _grey(values: NDArray[np.float32]) -> NDArray[np.float32]:
     grey: NDArray[np.float32] = values - np.float32(low)
     grey /= np.float32(high - low)  # in place: a second copy of a large volume would be a gigabyte
     return grey
+
+
+def _spans_space(axes: Array) -> bool:
+    """Whether the axes of a grid are three in space, in numbers whose products can be told."""
+    longest = float(np.abs(axes).max())
+    return 0.0 < longest < np.inf and float(np.linalg.det(axes / longest)) != 0.0
 
 
 def _surface(grey: NDArray[np.float32], volume: Volume, wanted: Wanted) -> Content:
