@@ -100,8 +100,11 @@ def _cell(block: Any, gemmi: Any) -> Any:
         raise InputError(
             f"block {shorten(block.name)}: cell {shorten(' '.join(words), 80)}; expected three lengths and three angles"
         )
-    cell = gemmi.UnitCell(*values)
-    if not 0.0 < cell.volume < np.inf:
+    try:
+        cell = gemmi.UnitCell(*values)
+    except RuntimeError:  # an angle that is 0 or 180 degrees to rounding
+        cell = None
+    if cell is None or not 0.0 < cell.volume < np.inf:
         raise InputError(f"block {shorten(block.name)}: cell {shorten(' '.join(words), 80)} has no volume")
     return cell
 

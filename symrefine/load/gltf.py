@@ -68,7 +68,7 @@ def _read(data: bytes, text: bytes, kind: str, path: Path, *, texture: bool) -> 
 def _parse(text: bytes) -> Json:
     try:
         tree = json.loads(text.decode("utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # no JSON, no UTF-8, or a number of thousands of digits
         raise InputError(f"not a glTF file: its JSON text is not valid: {error}") from None
     if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
         raise InputError("not a glTF file: its JSON text has no object 'asset'")

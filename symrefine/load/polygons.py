@@ -99,7 +99,16 @@ def _polygon(points: Array) -> Index:
     if np.linalg.norm(normal) <= FLAT * np.linalg.norm(areas, axis=1).sum():
         return np.empty((0, 3), dtype=np.int64)
     flat = (points - points[0]) @ frame_with_z(normal)[:2].T
-    return fan if _is_convex(flat) else _clip_ears(flat)
+    if _is_convex(flat):
+        return fan
+    return np.empty((0, 3), dtype=np.int64) if _runs_twice(flat) else _clip_ears(flat)
+
+
+def _runs_twice(flat: Array) -> bool:
+    """Whether the outline [n, 2] runs along an edge twice the same way: a bridge to a hole it runs there and back."""
+    edges = np.column_stack([flat, np.roll(flat, -1, axis=0)])
+    edges = edges[(edges[:, :2] != edges[:, 2:]).any(axis=1)]
+    return len(np.unique(edges, axis=0)) < len(edges)
 
 
 def _is_convex(flat: Array) -> bool:

@@ -31,7 +31,7 @@ def flattened(scene: Any, *, texture: bool = False) -> Content:
         if hasattr(part, "faces"):
             # A mirroring node turns the triangles inside out; their order must follow.
             faces = np.asarray(part.faces, dtype=np.int64)
-            meshes.append((points, faces[:, ::-1] if np.linalg.det(to_scene[:3, :3]) < 0 else faces))
+            meshes.append((points, faces[:, ::-1] if np.linalg.slogdet(to_scene[:3, :3])[0] < 0 else faces))
             looks += [_look(part, meshes[-1][1])] if texture else []
         elif hasattr(part, "entities"):
             lines += 1
