@@ -64,7 +64,7 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     whole = _of_whole(replace(surface, openings=None), evidence, limit, nothing)
     if surface.openings is None:
         return whole
-    part = _of_part(surface, whole, limit)
+    part = _of_part(surface, whole)
     if not _ends_there(surface, whole.largest) or _places(whole.largest, part.largest) >= PLACES:
         return replace(part, at_least=True)
     if _size(part.largest.placed) <= _size(whole.largest.placed):
@@ -101,29 +101,29 @@ def _places(seen: Hypothesis, found: Hypothesis) -> float:
 def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float) -> Pool:
     pool = Pool(nothing=nothing, limit=limit)
     for starts in proposals(evidence):
-        pool = _with(surface, pool, starts, limit)
+        pool = _with(surface, pool, starts)
     for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
         if glance < HOPELESS and not pool.has(axis):
-            pool = _with(surface, pool, about(evidence, axis.group.frame[2]), limit)
+            pool = _with(surface, pool, about(evidence, axis.group.frame[2]))
     nearest = sorted((*pool.looked, *pool.hopeless), key=lambda k: k[1])[:TOLD] if not pool.small else []
     return replace(pool, small=(*pool.small, *(fitted(surface, start) for start, _ in nearest)))
 
 
-def _of_part(surface: Surface, whole: Pool, limit: float) -> Pool:
-    pool = Pool(nothing=whole.nothing, limit=limit)
+def _of_part(surface: Surface, whole: Pool) -> Pool:
+    pool = Pool(nothing=whole.nothing, limit=whole.limit)
     for known in (whole.largest, *whole.small):
-        pool = _grown(surface, pool, fitted(surface, known.placed), limit) if known.elements else pool
-    pool = _with(surface, pool, voted_mirrors(surface.cloud), limit)
+        pool = _grown(surface, pool, fitted(surface, known.placed)) if known.elements else pool
+    pool = _with(surface, pool, voted_mirrors(surface.cloud))
     # Two mirrors tell the axis that they share, and what may stand beside it; of turns alone only votes know.
-    return pool if _size(pool.largest.placed) > 2 else _with(surface, pool, voted_turns(surface.cloud), limit)
+    return pool if _size(pool.largest.placed) > 2 else _with(surface, pool, voted_turns(surface.cloud))
 
 
-def _with(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float) -> Pool:
+def _with(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
     """The pool with candidates tried, and then the neighbours of its largest group, as long as that grows."""
-    before, pool = pool.largest, _tried(surface, pool, starts, limit)
+    before, pool = pool.largest, _tried(surface, pool, starts)
     while pool.largest is not before:
         before = pool.largest
-        pool = _tried(surface, pool, beside(before.placed), limit)
+        pool = _tried(surface, pool, beside(before.placed))
     return pool
 
 
@@ -144,7 +144,7 @@ def _size(placed: Placed) -> float:
     return placed.group.order if placed.group.is_finite else 100.0
 
 
-def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float) -> Pool:
+def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
     """The pool with candidates fitted, but for those that the group so far has anyway."""
     for start, glance in _glanced(surface, pool, starts):
         if pool.has(start) or pool.shows(start, glance):
@@ -152,15 +152,15 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], limit: float)
         if glance >= _hopeless(surface):
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
             continue
-        moved, needs = looked_at(surface, start, COARSE * limit)
-        if needs > ALIKE * limit:
+        moved, needs = looked_at(surface, start, COARSE * pool.limit)
+        if needs > ALIKE * pool.limit:
             pool = replace(pool, looked=(*pool.looked, (moved, needs)))
         elif not pool.has(moved, needs) and not pool.met(moved):
-            pool = _joined_at_once(surface, pool, moved) if needs <= limit and pool.largest.elements else pool
+            pool = _joined_at_once(surface, pool, moved) if needs <= pool.limit and pool.largest.elements else pool
             if not pool.has(moved, needs):
                 found = fitted(surface, moved)
                 if surface.openings is None or found.supported >= SUPPORTED:
-                    pool = _grown(surface, pool, found, limit)
+                    pool = _grown(surface, pool, found)
     return pool
 
 
@@ -175,14 +175,14 @@ def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
     return pool.with_failed(both)
 
 
-def _grown(surface: Surface, pool: Pool, found: Hypothesis, limit: float) -> Pool:
+def _grown(surface: Surface, pool: Pool, found: Hypothesis) -> Pool:
     """The pool with what was fitted, and its largest group joined to it, if both hold together, or else the larger."""
     if pool.has(found.placed, found.need):
         return pool
-    if found.need > limit:
+    if found.need > pool.limit:
         return replace(pool, small=(*pool.small, found))
-    both = _join(surface, [pool.largest, found], pool.failed, ALIKE * limit)
-    if both is not None and both.need <= limit:
+    both = _join(surface, [pool.largest, found], pool.failed, ALIKE * pool.limit)
+    if both is not None and both.need <= pool.limit:
         largest = both
     else:
         largest, pool = max(pool.largest, found, key=lambda h: _size(h.placed)), pool.with_failed(both)
@@ -191,9 +191,7 @@ def _grown(surface: Surface, pool: Pool, found: Hypothesis, limit: float) -> Poo
     return replace(pool, small=(*pool.small, *kept, found), largest=largest)
 
 
-def _join(
-    surface: Surface, parts: list[Hypothesis], known: Iterable[Hypothesis], most: float = math.inf
-) -> Hypothesis | None:
+def _join(surface: Surface, parts: list[Hypothesis], known: Iterable[Hypothesis], most: float) -> Hypothesis | None:
     """The group that hypotheses generate, fitted unless it is one of them or known; None if they generate none.
 
     Nor is one told that seems to need more than `most`.
@@ -211,7 +209,7 @@ def _generated(
     same = next((h for h in known if h.history and is_at(h.placed, placed)), None)
     if same is not None:
         return same
-    if most < math.inf and surface.openings is None:
+    if surface.openings is None:
         placed, needs = looked_at(surface, placed, COARSE * most)
         if needs > most:
             return None

@@ -89,7 +89,7 @@ NOTHING = Hypothesis(placed=Placed(group=PointGroup(name="C1"), center=np.zeros(
 
 def glances(surface: Surface, starts: Sequence[Placed], most: float = math.inf) -> list[float]:
     """What each of several groups needs, as a few operations tell on a few points; from `most` on a lower bound."""
-    each = [[m for p in _some(elements(s.group)) for m in p.motions(s.center)] for s in starts]
+    each = [_few_motions(s) for s in starts]
     owner = np.repeat(np.arange(len(starts)), [len(motions) for motions in each])
     every, found = [m for motions in each for m in motions], np.zeros(len(starts))
     # Most candidates are hopeless, and seen to be so without a wide search; of an open surface none is made.
@@ -101,8 +101,10 @@ def glances(surface: Surface, starts: Sequence[Placed], most: float = math.inf) 
     return found.tolist()
 
 
-def _some(parts: list[Operations]) -> list[Operations]:
-    return parts[:: max(1, len(parts) // GLANCED)]
+def _few_motions(placed: Placed) -> list[Isometry]:
+    """The operations of a few elements of a group where it stands."""
+    parts = elements(placed.group)
+    return [m for part in parts[:: max(1, len(parts) // GLANCED)] for m in part.motions(placed.center)]
 
 
 def looked_at(surface: Surface, start: Placed, most: float) -> tuple[Placed, float]:
@@ -119,8 +121,7 @@ def looked_at(surface: Surface, start: Placed, most: float) -> tuple[Placed, flo
 
 def _seems(surface: Surface, placed: Placed, sources: int) -> float:
     """What a group where it stands needs, as a few operations tell on a few points."""
-    motions = [m for part in _some(elements(placed.group)) for m in part.motions(placed.center)]
-    return float(surface.needs(motions, sources=sources, tests=GLANCED).max())
+    return float(surface.needs(_few_motions(placed), sources=sources, tests=GLANCED).max())
 
 
 def start_error(surface: Surface) -> float:
