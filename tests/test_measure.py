@@ -7,7 +7,7 @@ import pytest
 
 from experiments.objects.shapes import bottle, mug, sample, table
 from symrefine import Shape, detect
-from symrefine.detection.measure import doubt, gather, is_few, measure, part
+from symrefine.detection.measure import doubt, gather, is_few, measure
 from symrefine.geometry import random_orthogonal
 from symrefine.groups import point_group
 from symrefine.moments.moments import central_moments
@@ -207,10 +207,10 @@ def test_a_part_of_a_cloud_carries_what_belongs_to_its_points():
         rng.random((9, 3)), weights=rng.random(9), normals=rng.standard_normal((9, 3)), labels=np.arange(9) % 3
     )
     some = np.array([4, 1, 8])
-    found = part(whole, some)
+    found = whole.chosen(some)
     for name in ("points", "weights", "normals", "labels"):
         np.testing.assert_allclose(getattr(found, name), getattr(whole, name)[some])
-    bare = part(Shape.of(whole.points), some)
+    bare = Shape.of(whole.points).chosen(some)
     assert (bare.weights, bare.normals, bare.labels) == (None, None, None)
 
 

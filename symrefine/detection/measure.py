@@ -113,7 +113,7 @@ def measure(
     massive = np.arange(len(shape.points))
     if shape.faces is None and shape.weights is not None and not shape.weights.all():
         massive = np.flatnonzero(shape.weights > 0)
-        shape = part(shape, massive)  # points of no mass are no part of the object
+        shape = shape.chosen(massive)  # points of no mass are no part of the object
     count, every = len(shape.points), shape
     if shape.faces is None and not is_few(shape):
         auto = outliers == "auto"
@@ -123,11 +123,11 @@ def measure(
         more = bool(seen.blobs)
         strays, clumps = massive[seen.strays], tuple((massive[c], shape.points[c]) for c in seen.clumps)
         count = len(seen.kept)
-        scan = part(shape, seen.kept) if shape.viewpoint is not None else None
+        scan = shape.chosen(seen.kept) if shape.viewpoint is not None else None
         if shape.weights is None and seen.shares is not None:
-            shape = replace(part(shape, seen.even), weights=seen.shares)
+            shape = replace(shape.chosen(seen.even), weights=seen.shares)
         elif len(seen.kept) < len(massive):
-            shape = part(shape, seen.kept)
+            shape = shape.chosen(seen.kept)
     classes = _classes(shape)
     if whole is not None and shape is every:
         moments = whole
@@ -150,18 +150,6 @@ def measure(
 def is_few(shape: Shape) -> bool:
     """Whether the points are few enough to stand for themselves."""
     return shape.faces is None and len(shape.points) <= FEW
-
-
-def part(shape: Shape, some: Index) -> Shape:
-    """Some of the points of a cloud."""
-    return replace(
-        shape,
-        points=shape.points[some],
-        weights=None if shape.weights is None else shape.weights[some],
-        normals=None if shape.normals is None else shape.normals[some],
-        labels=None if shape.labels is None else shape.labels[some],
-        viewpoint=None if shape.viewpoint is None else shape.viewpoint[some],
-    )
 
 
 def doubt(measured: Measured, surface: Surface, tolerance: float) -> str:

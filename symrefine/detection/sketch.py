@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.clock import passed
-from symrefine.detection.measure import ORDER, PARTS, Measured, masses, part
+from symrefine.detection.measure import ORDER, PARTS, Measured, masses
 from symrefine.geometry import Array
 from symrefine.moments.moments import Moments
 from symrefine.moments.running import running_moments
@@ -71,7 +71,7 @@ def is_large(shape: Shape) -> bool:
 
 def sampled(shape: Shape, seed: int = 0) -> Shape:
     """The sample that stands for a cloud, without the moments of all of it."""
-    return part(shape, _picked(len(shape.points), np.random.default_rng(seed)))
+    return shape.chosen(_picked(len(shape.points), np.random.default_rng(seed)))
 
 
 def sketched(given: Shape | Stream, seed: int = 0) -> Sketch:
@@ -106,7 +106,7 @@ def sketched(given: Shape | Stream, seed: int = 0) -> Sketch:
     if isinstance(given, Stream):
         sample = Shape(np.concatenate(drawn), source=given.source, unit=given.unit)
     else:
-        sample = part(given, picked)
+        sample = given.chosen(picked)
     whole = None if isinstance(given, Stream) else given
     return Sketch(sample=sample, picked=picked, moments=moments, low=low, high=high, count=count, whole=whole)
 
