@@ -325,9 +325,10 @@ def test_the_spread_of_a_body_tells_turns_that_its_outline_does_not():
     points = points @ np.linalg.inv(np.linalg.cholesky(np.cov(points.T))).T * [1.0, 0.6, 0.3]
     turn = random_orthogonal(rng)
     for r in (np.eye(3), turn):
-        quarter, half = (about(r @ rotation(Z, a) @ r.T) for a in (np.pi / 2, np.pi))
-        assert spread_distance(np.cov(r @ points.T), quarter) == pytest.approx(np.sqrt(2) * 0.4, rel=1e-9)
-        assert spread_distance(np.cov(r @ points.T), half) < 1e-6
+        own = np.cov(r @ points.T)
+        quarter, half = (r @ rotation(Z, a) @ r.T for a in (np.pi / 2, np.pi))
+        assert spread_distance(own, quarter @ own @ quarter.T) == pytest.approx(np.sqrt(2) * 0.4, rel=1e-9)
+        assert spread_distance(own, half @ own @ half.T) < 1e-6
 
 
 def test_of_a_volume_the_spread_counts():

@@ -221,7 +221,9 @@ def _moved_each(operations: int) -> int:
 
 def _judged(surface: Surface, parts: _Parts, misses: Array) -> tuple[tuple[Element, ...], float]:
     """The elements of a group from the misses [K, N] of its operations, and what all of them need."""
-    needs = surface.needed(misses, parts.motions, len(parts.operations))
+    tests = len(parts.operations)
+    drifted, all_drifted = surface.drifted(parts.motions, tests)
+    needs = np.maximum(surface.needed(misses, parts.motions, tests), drifted)
     found = tuple(
         Element(
             operations=part,
@@ -233,7 +235,7 @@ def _judged(surface: Surface, parts: _Parts, misses: Array) -> tuple[tuple[Eleme
         for part, rows in zip(parts.operations, parts.rows, strict=True)
     )
     # A part out of place is met by all operations: together they tell it from noise where none does alone.
-    return found, max(surface.needed_by_all(misses), *(e.need for e in found))
+    return found, max(surface.needed_by_all(misses), all_drifted, *(e.need for e in found))
 
 
 def joined(parts: Sequence[Placed]) -> Placed | None:

@@ -18,12 +18,13 @@ from symrefine.ntuples.rank import FixedSubspace, fixed_subspace
 from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
 from symrefine.surface.cameras import Camera, cameras
+from symrefine.surface.drift import Drift
 from symrefine.surface.misses import TOLERANCE, noise_distances
 from symrefine.surface.neighbourhoods import fills_volume
 from symrefine.surface.openings import NEIGHBOURS, openings
 from symrefine.surface.sampling import sampling
 from symrefine.surface.skin import FEW, LocalPlanes, Skin, drawn, isolated_points, make_skin
-from symrefine.surface.surface import Surface
+from symrefine.surface.surface import WINDOWS, Surface
 from symrefine.surface.tree import Tree, side_by_side
 
 Outliers = Literal["auto", "none"]
@@ -302,9 +303,11 @@ def _surface(
     noise = noise_distances(len(local), half, rng, exact=as_they_are if exact else None)
     surface = Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, tolerance=tolerance)
     # Where noise alone needs all that is allowed, nobody sees what is open.
-    if tree is None or (surface.floor >= tolerance and not views):
-        return surface
-    return replace(surface, openings=openings(cloud, local, tree, views, near))
+    if tree is not None and (surface.floor < tolerance or views):
+        surface = replace(surface, openings=openings(cloud, local, tree, views, near))
+    if surface.openings is None and whole.noisy:
+        surface = replace(surface, drift=Drift.of(local, WINDOWS, rng))
+    return surface
 
 
 def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Surface:
@@ -316,7 +319,12 @@ def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Su
 
     diagonal = tight_diagonal(points)
     noise = noise_distances(len(points), some_of, rng)
-    return Surface(cloud=some_of(np.arange(len(points))), diagonal=diagonal, noise=noise / diagonal)
+    return Surface(
+        cloud=some_of(np.arange(len(points))),
+        diagonal=diagonal,
+        noise=noise / diagonal,
+        drift=Drift.of(points, WINDOWS, rng),
+    )
 
 
 def _cloud(

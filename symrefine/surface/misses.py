@@ -142,13 +142,12 @@ def disc_distances(
     return np.asarray(np.where(seen, distance, bound).min(axis=1).clip(max=bound))
 
 
-def spread_distance(own: Array, motion: Isometry) -> float:
-    """Distance (Bures, Wasserstein-2 of Gaussians) between the covariance [3, 3] of points and of their images."""
-    moved = motion.matrix @ own @ motion.matrix.T
-    values, vectors = np.linalg.eigh(own)
+def spread_distance(one: Array, other: Array) -> float:
+    """Distance (Bures, Wasserstein-2 of Gaussians) between two covariances [3, 3]."""
+    values, vectors = np.linalg.eigh(one)
     root = (vectors * np.sqrt(np.clip(values, 0.0, None))) @ vectors.T
-    common = np.sqrt(np.clip(np.linalg.eigvalsh(root @ moved @ root), 0.0, None)).sum()
-    return float(np.sqrt(max(2.0 * (np.trace(own) - common), 0.0)))
+    common = np.sqrt(np.clip(np.linalg.eigvalsh(root @ other @ root), 0.0, None)).sum()
+    return float(np.sqrt(max(np.trace(one) + np.trace(other) - 2.0 * common, 0.0)))
 
 
 def noise_distances(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from symrefine.geometry import Array, ReadOnly
 from symrefine.shape import Index
 from symrefine.surface.neighbourhoods import (
+    NEIGHBOURS,
     PROBES,
     Neighbourhoods,
     choose_neighbours,
@@ -123,6 +124,11 @@ class Skin:
     def isolated(self) -> bool:
         """Whether points meet points."""
         return False
+
+    @property
+    def noisy(self) -> bool:
+        """Whether the smallest neighbourhoods do not look like planes."""
+        return self.neighbours > NEIGHBOURS[0]
 
     @cached_property
     def tree(self) -> Tree:

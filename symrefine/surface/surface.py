@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from symrefine.geometry import Array, Isometry, read_only
-from symrefine.surface.misses import LIMITS, TOLERANCE, miss_distances, needs, needs_of_atoms, spread_distance
+from symrefine.surface.drift import Drift
+from symrefine.surface.misses import LIMITS, SURE, TOLERANCE, miss_distances, needs, needs_of_atoms, spread_distance
 from symrefine.surface.openings import Openings
 from symrefine.surface.skin import LocalPlanes
 
@@ -16,6 +17,10 @@ from symrefine.surface.skin import LocalPlanes
 NEAREST_SPREAD = 0.363
 # Local planes that show how the patches of an image hang together.
 PATCHES = 1500
+# Pieces of a volume that tell how far chance puts its covariance off.
+PIECES = 8
+# Windows that are moved: by all operations together, and by each at least.
+WINDOWS, WINDOWS_EACH = 2400, 400
 # Misses of an open surface end where the least of it needs so many tolerances: nothing beyond is told apart.
 HOPELESS = 3.0
 
@@ -38,6 +43,7 @@ class Surface:
         diagonal: normalised units.
         noise: [M] misses that noise alone shows, fractions of the diagonal; none if empty.
         openings: where the surface is open, or None.
+        drift: windows that tell of parts out of place, where noise is thick.
         tolerance: what is asked for, as a fraction of the diagonal: of a surface with openings, what misses by more
             than 95 % may meets no surface.
     """
@@ -46,6 +52,7 @@ class Surface:
     diagonal: float
     noise: Array = field(default_factory=lambda: np.empty(0))
     openings: Openings | None = None
+    drift: Drift | None = None
     tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
@@ -106,12 +113,29 @@ class Surface:
         found = needs(misses, self.noise, tests)
         if self.cloud.body == "surface":
             return found
-        return np.maximum(found, [spread_distance(self._spread, m) / (self.diagonal * LIMITS[0]) for m in motions])
+        own, chance = self._spread
+        apart = np.array([spread_distance(own, m.matrix @ own @ m.matrix.T) for m in motions]) ** 2
+        return np.maximum(found, np.sqrt(np.maximum(apart - chance, 0.0)) / (self.diagonal * LIMITS[0]))
 
     @cached_property
-    def _spread(self) -> Array:
-        """Covariance of the points [3, 3]."""
-        return np.cov(self.cloud.points.T)
+    def _spread(self) -> tuple[Array, float]:
+        """Covariance of the points [3, 3], and by how much, in squares, chance puts it off an image of it at most."""
+        points = self.cloud.points[np.random.default_rng(0).permutation(len(self.cloud.points))]
+        own, parts = np.cov(points.T), [np.cov(points[k::PIECES].T) for k in range(PIECES)]
+        # One of n pieces is n - 1 times as far off as the whole, in squares, and the image is off as much once more.
+        chance = 2.0 * np.mean([spread_distance(own, part) ** 2 for part in parts]) / (PIECES - 1)
+        return own, float(chance * (1.0 + SURE * math.sqrt(2.0 / own[np.triu_indices(3)].size)))
+
+    def drifted(self, motions: Sequence[Isometry], tests: int = 1) -> tuple[Array, float]:
+        """The smallest tolerances [K] at which operations hold by where windows lie, and that of all of them together.
+
+        `tests` as of `needs`.
+        """
+        if self.drift is None:
+            return np.zeros(len(motions)), 0.0
+        misses = self.drift.misses(motions, max(WINDOWS_EACH, WINDOWS // len(motions))) / self.diagonal
+        noise = self.drift.noise / self.diagonal
+        return needs(misses, noise, tests), float(needs(misses.ravel(), noise))
 
     def needed_by_all(self, misses: Array) -> float:
         """The smallest tolerance at which a surface holds that operations together miss so [K, N]."""
