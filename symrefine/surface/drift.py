@@ -40,9 +40,9 @@ class Windows(ReadOnly):
     tree: Tree
 
     @classmethod
-    def of(cls, points: Array, width: float) -> "Windows":
+    def of(cls, points: Array, width: float, rng: np.random.Generator) -> "Windows":
         """Windows on points [N, 3], with cells so many that `CELLS` of them fill one."""
-        some = points[np.random.default_rng(0).permutation(len(points))]
+        some = points[rng.permutation(len(points))]
         count = len(points)
         while True:
             seeds = Tree(some[:count])
@@ -68,13 +68,13 @@ class Windows(ReadOnly):
         cells, weights = self.seen(queries)
         return np.asarray((weights[:, None] @ cells)[:, 0])
 
-    def ends(self, queries: Array) -> tuple[Array, Array]:
-        """The same, and how much of an offset windows tell of, [Q, 3, 3]: 1 across what is thin, 0 along a sheet."""
+    def spreads(self, queries: Array) -> tuple[Array, Array]:
+        """The same, and the covariance of what each window holds over its width squared [Q, 3, 3]."""
         cells, weights = self.seen(queries)
         middle = weights[:, None] @ cells
         apart = cells - middle
         spread = (apart * weights[..., None]).transpose(0, 2, 1) @ apart
-        return np.asarray(middle[:, 0]), np.eye(3) - spread / self.width**2
+        return np.asarray(middle[:, 0]), np.asarray(spread / self.width**2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -103,14 +103,15 @@ class Drift(ReadOnly):
         some = sources[:: max(1, len(sources) // PROBES)]
         # A disc of radius R holds as many points as a window on it of width R / 2 counts for.
         width = 0.5 * float(np.median(tree.query(some, min(NEIGHBOURS[-1], len(points)))[0][:, -1]))
-        windows = Windows.of(points, width)
-        offsets, tells = windows.ends(sources)
-        order = rng.permutation(len(points))
-        one, other = (Windows.of(points[order[k::2]], width) for k in (0, 1))
-        here, half = one.ends(sources[::2])
-        # Halves have half of the points to a window, so that its middle is off by chance as much more.
-        noise = np.linalg.norm(_applied(_gains(half), other.offsets(sources[::2]) - here), axis=1) / math.sqrt(2.0)
-        return cls(windows=windows, sources=sources, offsets=offsets, gains=_gains(tells), noise=np.sort(noise))
+        windows, again = (Windows.of(points, width, rng) for _ in range(2))
+        offsets, spread = windows.spreads(sources)
+        order, asked = rng.permutation(len(points)), slice(None, None, 2)
+        one, other = (Windows.of(points[order[k::2]], width, rng).spreads(sources[asked]) for k in range(2))
+        # Halves have half of the points to a window, so that its middle is off by chance as much more; what it is to
+        # take points together they show as it is.
+        chance = other[0] - one[0] + again.offsets(sources[asked]) - offsets[asked]
+        noise = np.linalg.norm(_applied(_gains(one[1]), chance), axis=1) / math.sqrt(2.0)
+        return cls(windows=windows, sources=sources, offsets=offsets, gains=_gains(spread), noise=np.sort(noise))
 
     def misses(self, motions: Sequence[Isometry], sources: int) -> Array:
         """How far `sources` windows of each of K images lie from those of the cloud [K, .]."""
@@ -123,14 +124,16 @@ class Drift(ReadOnly):
         return np.linalg.norm(np.stack(back), axis=2)
 
 
-def _gains(tells: Array) -> Array:
-    """Four steps of Landweber's iteration from what windows tell [Q, 3, 3]: what they hardly tell stays untold.
+def _gains(spread: Array) -> Array:
+    """What makes a displacement of an offset [Q, 3, 3], from the covariances of windows over their width squared.
 
-    After so many what noise alone shows needs about as much as it does of local planes: six parts in ten of the
-    tolerance at 1 % noise.
+    An offset shows a part of a displacement: all of it across what is thin, nothing along a sheet. Four steps of
+    Landweber's iteration undo that, and leave untold what windows hardly tell. After so many what noise alone shows
+    needs about as much as it does of local planes: six parts in ten of the tolerance at 1 % noise.
     """
-    left = np.eye(3) - tells @ tells
-    return np.asarray(tells @ (np.eye(3) + left) @ (np.eye(3) + left @ left))
+    values, axes = np.linalg.eigh(spread)
+    shown = np.clip(1.0 - values, 1e-3, 1.0)
+    return np.asarray((axes * ((1.0 - (1.0 - shown**2) ** 4) / shown)[:, None]) @ axes.transpose(0, 2, 1))
 
 
 def _applied(matrices: Array, vectors: Array) -> Array:
