@@ -106,6 +106,7 @@ KIND_OF = {
         "propose.votes": "VOTERS AGREE_RAD TOLD DIRECTIONS FEET",
         "stream": "CHUNK",
         "surface.cameras": "RAYS BESIDE",
+        "surface.clumps": "SPARSE",
         "surface.drift": "CELLS REACH PROBES",
         "surface.misses": "DISCS ASKED",
         "surface.neighbourhoods": "NEIGHBOURS PROBES UNCERTAIN CELLS",

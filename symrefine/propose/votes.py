@@ -97,8 +97,6 @@ def unit_rows(vectors: Array) -> Array:
 
 def _densest(directions: Array, feet: Array, worth: Array, told: int = TOLD) -> list[Vote]:
     """The densest spots of votes for planes or lines: unit vectors [K, 3] without a sign, with their feet [K, 3]."""
-    from scipy.spatial import cKDTree
-
     some = worth > 0.0
     directions, feet, worth = directions[some], feet[some], worth[some]
     if not some.any():
@@ -109,21 +107,15 @@ def _densest(directions: Array, feet: Array, worth: Array, told: int = TOLD) -> 
     order = np.argsort(owner, kind="stable")
     ends = np.searchsorted(owner[order], np.arange(len(density) + 1))
     found: list[Vote] = []
-    chord = 2.0 * np.sin(0.5 * AGREE_RAD)
-    both = np.concatenate([directions, -directions]) / chord
-    around = cKDTree(np.column_stack([both, np.tile(FEET * feet, (2, 1))]))
     for cell in np.argsort(-density)[: 8 * told]:
         votes = order[ends[cell] : ends[cell + 1]]
         for _ in range(2):
             sign = np.where(directions[votes] @ directions[votes[0]] < 0.0, -1.0, 1.0)
             u = unit((worth[votes] * sign) @ directions[votes])
             foot = np.average(feet[votes], axis=0, weights=worth[votes])
-            box = around.query_ball_point(np.concatenate([u / chord, FEET * foot]), 1.0, p=np.inf, return_sorted=True)
-            inside = np.unique(np.array(box, dtype=np.int64) % len(feet))
-            close = (np.abs(directions[inside] @ u) > np.cos(AGREE_RAD)) & (
-                ((feet[inside] - foot) ** 2).sum(axis=1) < FEET**-2.0
-            )
-            votes = inside[close]
+            # One sweep over all is quicker than a tree of directions and feet would be made.
+            along = np.flatnonzero(np.abs(directions @ u) > np.cos(AGREE_RAD))
+            votes = along[((feet[along] - foot) ** 2).sum(axis=1) < FEET**-2.0]
             if not votes.size:
                 break
         known = (abs(v.direction @ u) > np.cos(AGREE_RAD) and np.linalg.norm(v.foot - foot) < 1.0 / FEET for v in found)

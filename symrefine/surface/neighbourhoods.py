@@ -208,22 +208,27 @@ def _blob_flatness(k: int) -> float:
 def fills_volume(points: Array, tree: Tree, rng: np.random.Generator) -> bool:
     """Whether points [N, 3] (RMS radius 1) fill a volume: at no width do neighbourhoods look flatter than a blob."""
     order = rng.permutation(len(points))
-    first = _flattest(points, tree, order[:PROBES])
+    first, widest = _flattest(points, tree, order[:PROBES], NEIGHBOURS[0])
     if abs(first - VOLUME) > UNCERTAIN:
         return first > VOLUME
-    return _flattest(points, tree, order[: 5 * PROBES]) > VOLUME
+    return _flattest(points, tree, order[: 5 * PROBES], widest)[0] > VOLUME
 
 
-def _flattest(points: Array, tree: Tree, pick: Index) -> float:
-    """Smallest median flatness of neighbourhoods of some points, over that of a blob, at any size and width."""
+def _flattest(points: Array, tree: Tree, pick: Index, likely: int) -> tuple[float, int]:
+    """Smallest median flatness of neighbourhoods of some points, over that of a blob, at any size and width.
+
+    Told with the largest size that was asked; sizes up to the one that is `likely` to be it are asked at once.
+    """
     size, flattest = NEIGHBOURS[0], np.inf
+    distance, near = tree.query(points[pick], likely)
     while size <= max(len(points) // 8, NEIGHBOURS[0]):
-        distance, near = tree.query(points[pick], size)
-        if float(np.median(distance[:, -1])) > WIDEST_BLOB:
+        if size > near.shape[1]:
+            distance, near = tree.query(points[pick], size)
+        if float(np.median(distance[:, size - 1])) > WIDEST_BLOB:
             break
-        values = planes_of(points, near)[2]
+        values = planes_of(points, near[:, :size])[2]
         flattest = min(flattest, float(np.median(flatness_of(values))) / _blob_flatness(size))
         if flattest < VOLUME - UNCERTAIN:
             break
         size *= 2
-    return flattest
+    return flattest, near.shape[1]
