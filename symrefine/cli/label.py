@@ -120,8 +120,8 @@ def _detected(args: argparse.Namespace, asked: "Rows", held: "Journal") -> "Rows
     out = Path(args.out)
     if held.torn:
         note(f"{out / ROWS}: the last row is incomplete; it is removed and done again")
-    latest: dict[int, Any] = {row["object"]: row for row in held.rows}
-    rows: dict[int, Row] = {n: latest[n] for n, row in asked.items() if holds(out, latest.get(n), row)}
+    latest = {number: cast("Row | None", held.latest.get(number)) for number in asked}
+    rows: dict[int, Row] = {n: last for n, last in latest.items() if last and holds(out, last, asked[n])}
     todo = [row for number, row in asked.items() if number not in rows]
     jobs = [(row, args.dir, args.out) for row in todo]
     print_lines(_line(row) for row in rows.values())

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from json import dumps, loads
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any, cast
 
 from symrefine.cli.inputs import failure, scans, told_as
@@ -14,9 +15,10 @@ from symrefine.clock import Clock
 from symrefine.errors import InputError, about, one_line
 from symrefine.files import asked_for
 from symrefine.fleet.crew import HERE, Executor
-from symrefine.fleet.journal import Journal, Row
+from symrefine.fleet.journal import Journal, Kinds, Latest
 from symrefine.fleet.limits import Limits, Lost
 from symrefine.fleet.remote import fetched, is_remote, state
+from symrefine.fleet.rows import Row
 from symrefine.fleet.shard import PART, piece
 from symrefine.fleet.tasks import finish, is_final, our_version
 
@@ -25,6 +27,9 @@ if TYPE_CHECKING:
     from symrefine.load import Frames
     from symrefine.plane import PlanarDetection
     from symrefine.shape import Shape
+
+# What every row has.
+KINDS: Kinds = {"file": (str,), "error": (str, NoneType)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +81,7 @@ class Job:
         ]
 
 
-def known_apart(jobs: Sequence[Job], before: Mapping[str, Row], limits: Limits) -> list[Job]:
+def known_apart(jobs: Sequence[Job], before: Latest, limits: Limits) -> list[Job]:
     """The jobs, one for each object of a file of which rows done before say how many it holds."""
     frames = {row["file"].rpartition("#")[0]: row["frames"] for row in before.values() if row.get("frames")}
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from hashlib import file_digest, sha256
 from pathlib import Path
+from types import NoneType
 from typing import Any, cast
 
 from symrefine.errors import InputError
@@ -41,8 +42,8 @@ def opened(out: Path) -> Iterator[journal.Journal]:
     if taken and not rows.exists():
         raise InputError(f"{out}: has a {taken[0]} that `symrefine label` did not write there; name another folder")
     check_target(rows)
-    keys = ("object", "file")
-    with journal.opened(rows, keys, busy=busy, rows_of="`symrefine label`", other="another folder") as held:
+    kinds = {"object": (int,), "file": (str,), "error": (str, NoneType)}
+    with journal.opened(rows, kinds, "object", busy=busy, rows_of="`symrefine label`", other="another folder") as held:
         (out / PICTURES).mkdir(exist_ok=True)
         yield held
 
