@@ -8,7 +8,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from symrefine.cli.inputs import STDIN, TEXTURE, Object, expanded, objects, read_scan, scans
+from symrefine.cli.inputs import STDIN, TEXTURE, Object, expanded, objects, scans
 from symrefine.cli.outputs import (
     check_beside,
     check_outputs,
@@ -34,7 +34,6 @@ from symrefine.cli.values import (
     natural,
     positive,
 )
-from symrefine.clock import Clock
 from symrefine.errors import InputError
 from symrefine.files import Writer, text_writer
 
@@ -174,15 +173,6 @@ def _notes(args: argparse.Namespace, shape: "Shape", detection: Any, record: dic
     is_grey = shape.dim == 2 and "threshold" in record["options"] and args.threshold is None
     if is_grey and (record["undetermined"] or record["point_group"] == "C1"):
         yield f"{shape.source}: if object and background are of different grey, try --threshold otsu"
-
-
-def examine(path: str, options: dict[str, Any]) -> tuple["Shape", Any, dict[str, Any]]:
-    """Shape, detection and JSON record of the one object in a file, with `detection_options`."""
-    clock = Clock()
-    with clock("load"):
-        given = read_scan(path, options, in_chunks=True)
-    found = detected(given, options, path)
-    return found.shape, found, found.to_dict(load_s=clock.seconds["load"])
 
 
 def detected(

@@ -18,7 +18,7 @@ from symrefine.cli.values import (
     positive,
     probability,
 )
-from symrefine.errors import InputError, one_line
+from symrefine.errors import InputError, about, one_line
 from symrefine.files import check_target, json_text, text_writer, whole
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--workers", type=count, default=1, metavar="N", help="files done at the same time (default: %(default)s)"
     )
     add_class_options(parser)
-    add_frame_option(parser)
+    add_frame_option(parser, otherwise="there has to be one; files that hold one are taken as they are")
     add_scan_options(parser)
     add_detection_options(parser)
 
@@ -138,7 +138,7 @@ def _detected(args: argparse.Namespace, asked: "Rows", held: "Journal") -> "Rows
 
 def examine_model(job: Job) -> dict[str, Any]:
     """The row of one object: what was found, or what was wrong with it; its pictures are written first."""
-    from symrefine.cli.detect import examine
+    from symrefine.cli.detect import detected
     from symrefine.detection.result import Detection
     from symrefine.review.objects import examined
     from symrefine.review.store import place_of_picture
@@ -148,16 +148,33 @@ def examine_model(job: Job) -> dict[str, Any]:
     if row["error"] is not None:
         return dict(row)
     try:
-        shape, found, _ = examine(str(path), row["options"])
+        found = detected(_read(str(path), row["options"]), row["options"], str(path))
         if not isinstance(found, Detection):
-            raise InputError(f"{path}: points have {shape.dim} coordinates; labels are for objects in space")
-        kept = examined(found, shape, scale=row["scale"])
+            raise InputError(f"{path}: points have {found.shape.dim} coordinates; labels are for objects in space")
+        kept = examined(found, found.shape, scale=row["scale"])
         for k, picture in enumerate(kept.pictures):
             with whole(place_of_picture(Path(out), row, k)) as draft:
                 draft.write_bytes(picture)
         return {**row, **kept.told}
     except Exception as error:  # noqa: BLE001 - one file must not end the others
         return {**row, "error": failure(str(path), error)}
+
+
+def _read(path: str, options: dict[str, Any]) -> Any:
+    """The object in a file; the one that `frame` of the options chooses where it holds several."""
+    from symrefine.cli.inputs import scans
+
+    frame, others = options.get("frame"), {name: given for name, given in options.items() if name != "frame"}
+    found = scans(path, others, in_chunks=True)
+    if len(found) == 1:
+        return found[0]
+    if frame is None:
+        raise InputError(
+            f"{path}: holds {len(found)} {found.what}, and a label is of one object: choose with --frame, from 0 to "
+            f"{len(found) - 1}, which counts for all such files, or write each to a file obj_NNNNNN of its own"
+        )
+    with about(path):
+        return found.chosen(frame)
 
 
 def lost(job: Job, why: "Lost") -> dict[str, Any]:
