@@ -13,11 +13,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from experiments.studies.pages import check, put
 from symrefine.errors import InputError
+from symrefine.fleet.rows import Row
 from symrefine.fleet.shard import Shard, Whole
 from symrefine.study.tables import grid
 
@@ -47,7 +48,10 @@ tables:
 
 
 def peak(folder: Path, *arguments: str) -> tuple[int, float]:
-    """Bytes that a command holds at most, and the seconds that it takes."""
+    """Bytes that a command holds at most, and the seconds that it takes.
+
+    The system counts what this process holds as it begins, too, which therefore is little.
+    """
     line = [sys.executable, "-m", "symrefine", *arguments, "--quiet"]
     start = time.perf_counter()
     process = subprocess.Popen(line, cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)})
@@ -67,23 +71,24 @@ def lay_out(folder: Path, rows: int) -> None:
         (folder / "objects" / name).symlink_to("../box.xyz")
     peak(folder, "batch", "box.xyz", "--out", "one.jsonl")
     row = json.loads((folder / "one.jsonl").read_text())
-    _write(folder / "rows.jsonl", [json.dumps(row | {"file": name}) for name in names])
-    whole = Whole.of(rows, "memory")
+    _write(folder / "rows.jsonl", (row | {"file": name} for name in names))
+    whole = Whole.of(rows, ["memory"])
     for number in (1, 2):
         shard = Shard(number=number, of=2)
-        part = [row | {"file": names[i]} | whole.mark(shard, i) for i in range(rows) if shard.takes(i)]
-        _write(folder / f"part{number}.jsonl", [json.dumps(one) for one in part])
+        own = (i for i in range(rows) if shard.takes(i))
+        _write(folder / f"part{number}.jsonl", (row | {"file": names[i]} | whole.mark(shard, i) for i in own))
     runs = min(rows, RUNS)
     (folder / "thirds.py").write_text(EXPERIMENT)
     (folder / "thirds.yaml").write_text(STUDY.format(runs=runs))
     peak(folder, "run", "thirds.yaml", "--limit", "1")
     row = json.loads((folder / "thirds" / "journal.jsonl").read_text())
-    done = [row | {"index": i, "results": row["results"] | {"third": i / 3, "name": f"run {i}"}} for i in range(runs)]
-    _write(folder / "thirds" / "journal.jsonl", [json.dumps(one) for one in done])
+    results = ({"third": i / 3, "odd": bool(i % 2), "name": f"run {i}"} for i in range(runs))
+    _write(folder / "thirds" / "journal.jsonl", (row | {"index": i, "results": r} for i, r in enumerate(results)))
 
 
-def _write(path: Path, lines: Sequence[str]) -> None:
-    path.write_text("\n".join(lines) + "\n")
+def _write(path: Path, rows: Iterable[Row]) -> None:
+    with path.open("w") as stream:
+        stream.writelines(json.dumps(row) + "\n" for row in rows)
 
 
 COMMANDS = {

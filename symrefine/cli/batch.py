@@ -4,6 +4,7 @@ import argparse
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -134,28 +135,27 @@ def _jobs(args: argparse.Namespace) -> tuple[list["Job"], dict[str, int]]:
     found = _sources(args)
     check_table_option(args)
     outputs = {"--out": args.out, "--bop": args.bop, "--table": args.table}
-    check_outputs(outputs, [Path(source.path) for source in found])
+    check_outputs(outputs, (Path(source.path) for source in found))
     check_beside("--bop", args.bop, {"--bop-scale": args.bop_scale})
     numbers = {} if args.bop is None else _numbered(args, found)
     options = detection_options(args)
-    scales = [None if args.bop is None else source.told.get("scale", args.bop_scale or 1.0) for source in found]
-    each = [options | dict(source.options) for source in found]
-    wanted = list(zip(found, each, scales, strict=True))
-    about = [[source.name, dict(source.told), own, scale] for source, own, scale in wanted]
-    fleet = Whole.of(len(found), [our_version(), *about])
+    scale = None if args.bop is None else args.bop_scale or 1.0
     jobs = [
         Job(
             name=source.name,
             path=source.path,
-            options=own,
+            options=options | dict(source.options) if source.options else options,  # of many one copy is held
             told=source.told,
-            scale=scale,
-            mark=fleet.mark(args.shard, index),
+            scale=scale and source.told.get("scale", scale),
         )
-        for index, (source, own, scale) in enumerate(wanted)
-        if args.shard is None or args.shard.takes(index)
+        for source in found
     ]
-    return jobs, numbers
+    if args.shard is None:
+        return jobs, numbers
+    about = ([job.name, dict(job.told), dict(job.options), job.scale] for job in jobs)
+    fleet = Whole.of(len(jobs), chain([our_version()], about))
+    own = [index for index in range(len(jobs)) if args.shard.takes(index)]
+    return [replace(jobs[index], mark=fleet.mark(args.shard, index)) for index in own], numbers
 
 
 def _sources(args: argparse.Namespace) -> list["Source"]:

@@ -16,6 +16,8 @@ from symrefine.cli.outputs import (
     is_verbose,
     json_writer,
     note,
+    shown,
+    shown_writers,
     tell,
     write_all,
 )
@@ -41,8 +43,6 @@ if TYPE_CHECKING:
     from symrefine.shape import Shape
     from symrefine.stream import Stream
 
-# Options whose files are of one object.
-_OF_ONE = ("bop", "recording", "report", "picture")
 HELP = "find the planes, axes and point group of a mesh, cloud or picture"
 DESCRIPTION = (
     "Find the mirror planes, rotation axes and point group of the mesh or point cloud in PATH (.ply .stl .obj .off "
@@ -133,8 +133,6 @@ def _check(args: argparse.Namespace, paths: Sequence[str]) -> None:
             raise InputError("-: stdin is one file; name no others beside it")
         of_bop = "`symrefine batch DIR --bop FILE` takes a directory"
         check_alone(_of_one(args), f"PATH names {len(paths)}", of_bop if args.bop else "call `detect` for each")
-    if args.picture is not None and Path(args.picture).suffix.lower() != ".png":
-        raise InputError(f"--picture {args.picture}: expected a name that ends in .png")
     if args.bop is not None:
         from symrefine.export.bop import read_models_info
 
@@ -143,7 +141,7 @@ def _check(args: argparse.Namespace, paths: Sequence[str]) -> None:
 
 def _of_one(args: argparse.Namespace) -> dict[str, str | None]:
     """The outputs that are of one object, with the files that they are to fill."""
-    return {f"--{name}": getattr(args, name) for name in _OF_ONE}
+    return {"--bop": args.bop} | shown(args)
 
 
 def _picture(args: argparse.Namespace) -> dict[str, Any]:
@@ -221,7 +219,4 @@ def _writers(args: argparse.Namespace, shape: "Shape", detection: Any) -> dict[s
         entry = bop_entry(detection, shape, scale=args.bop_scale or 1.0)
         number = 1 if args.bop_id is None else args.bop_id
         writers[args.bop] = text_writer(bop_text(Path(args.bop), {number: entry}))
-    for name, suffix in ((args.recording, ".rrd"), (args.picture, ".png"), (args.report, ".html")):
-        if name is not None:
-            writers[name] = detection.writer(suffix)
-    return writers
+    return writers | shown_writers(args, detection)

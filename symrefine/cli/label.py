@@ -149,9 +149,10 @@ def examine_model(job: Job) -> dict[str, Any]:
         return dict(row)
     try:
         found = detected(_read(str(path), row["options"]), row["options"], str(path))
+        shape = found.shape
         if not isinstance(found, Detection):
-            raise InputError(f"{path}: points have {found.shape.dim} coordinates; labels are for objects in space")
-        kept = examined(found, found.shape, scale=row["scale"])
+            raise InputError(f"{path}: points have {shape.dim} coordinates; labels are for objects in space")
+        kept = examined(found, shape, scale=row["scale"])
         for k, picture in enumerate(kept.pictures):
             with whole(place_of_picture(Path(out), row, k)) as draft:
                 draft.write_bytes(picture)

@@ -59,7 +59,7 @@ def _local(path: str, recursive: bool) -> dict[str, str]:
             raise InputError(f"{missing[0]}: no such directory, file or pattern")
         return {name: name for name in files}
     found = folder.rglob("*") if recursive else folder.glob("*")
-    names = [p.relative_to(folder) for p in found if _is_ours(p) and p.is_file()]
+    names = (p.relative_to(folder) for p in found if _is_ours(p) and p.is_file())
     shown = sorted(name.as_posix() for name in names if not any(part.startswith(".") for part in name.parts))
     return {name: str(folder / name) for name in shown}
 

@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from hashlib import sha256
 from json import dumps
@@ -37,9 +37,12 @@ class Whole:
     digest: str
 
     @classmethod
-    def of(cls, tasks: int, about: Any) -> "Whole":
-        """The fleet of so many tasks that plain data tell about."""
-        return cls(tasks=tasks, digest=sha256(dumps(about, sort_keys=True).encode()).hexdigest()[:12])
+    def of(cls, tasks: int, about: Iterable[Any]) -> "Whole":
+        """The fleet of so many tasks that plain data tell about, one after the other."""
+        digest = sha256()
+        for part in about:
+            digest.update(dumps(part, sort_keys=True).encode() + b"\n")
+        return cls(tasks=tasks, digest=digest.hexdigest()[:12])
 
     def mark(self, shard: Shard | None, index: int) -> Row:
         """What a row says of its place; nothing where there are no shards."""

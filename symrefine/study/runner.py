@@ -79,7 +79,7 @@ def run_study(
     stamp = Stamp(config=plan.config_hash, code=code, libraries=library_versions())
     _refuse_foreign(plan, folder)
     _make(folder)
-    fleet = Whole.of(len(plan.cases), asdict(stamp))
+    fleet = Whole.of(len(plan.cases), [asdict(stamp)])
     first = range(len(plan.cases) if limit is None else min(limit, len(plan.cases)))
     wanted = [index for index in first if shard is None or shard.takes(index)]
     with opened(folder / JOURNAL, stamp, len(plan.cases), replace=replace) as journal:
