@@ -307,6 +307,15 @@ def test_a_person_decides_where_noise_hides_the_answer(run: Run, tmp_path: Path)
     assert of(to, "labels.json")["objects"][0]["found"] is None
 
 
+@pytest.mark.parametrize("changes", [{"choices": 7}, {"file": 1}, {"confidence": None}])
+def test_rows_that_somebody_changed_are_told(run: Run, out: Path, changes: dict[str, Any]) -> None:
+    row = next(iter(rows(out).values()))
+    (out / "objects.jsonl").write_text(json.dumps(row | changes) + "\n")
+    status, _, err = run()
+    assert (status, err.count("\n")) == (2, 1)
+    assert f"objects.jsonl: is damaged: a row has a {next(iter(changes))} that is" in err
+
+
 def test_of_a_file_of_several_objects_one_is_chosen(run: Run, models: Path, tmp_path: Path) -> None:
     """A label is of one object; what is chosen counts for files that hold several, and not for the others."""
     folder, to = tmp_path / "models", tmp_path / "new"

@@ -26,7 +26,7 @@ from symrefine.cli.values import (
     add_frame_option,
     add_scan_options,
     detection_options,
-    positive,
+    millimetres,
 )
 from symrefine.errors import InputError
 from symrefine.files import text_writer
@@ -64,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="FILE.jsonl", help="append the rows to this file (default: print only)")
     parser.add_argument("--bop", metavar="FILE", help="put the symmetries of all into this models_info.json of BOP")
     parser.add_argument(
-        "--bop-scale", type=positive, metavar="X", help="millimetres in one unit of the files (default: 1)"
+        "--bop-scale", type=millimetres, metavar="X", help="millimetres in one unit of the files (default: 1)"
     )
     parser.add_argument("--recursive", action="store_true", help="directories inside directories too")
     add_fleet_options(parser, "file")

@@ -33,8 +33,8 @@ from symrefine.cli.values import (
     add_scan_options,
     detection_options,
     grey,
+    millimetres,
     natural,
-    positive,
 )
 from symrefine.errors import InputError
 from symrefine.files import Writer, text_writer
@@ -69,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--bop-id", type=natural, metavar="N", help="number of the object there (default: 1)")
     parser.add_argument(
         "--bop-scale",
-        type=positive,
+        type=millimetres,
         metavar="X",
         help="millimetres in one unit of PATH: 1000 if it is in metres (default: 1)",
     )

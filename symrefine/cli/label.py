@@ -15,7 +15,7 @@ from symrefine.cli.values import (
     add_scan_options,
     count,
     detection_options,
-    positive,
+    millimetres,
     probability,
 )
 from symrefine.errors import InputError, about, one_line
@@ -56,7 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="P",
         help="settle objects of this confidence or more without a look, such as 0.95 (default: none)",
     )
-    parser.add_argument("--scale", type=positive, metavar="X", help="millimetres in one unit of the files (default: 1)")
+    parser.add_argument(
+        "--scale", type=millimetres, metavar="X", help="millimetres in one unit of the files (default: 1)"
+    )
     parser.add_argument(
         "--workers", type=count, default=1, metavar="N", help="files done at the same time (default: %(default)s)"
     )

@@ -80,7 +80,7 @@ def _one_of(*known: str) -> Callable[[str], str]:
 
 
 # Columns of a manifest, and what reads them: what is told of an object, and the options of `detect` by their names.
-_TOLD: Mapping[str, Callable[[str], Any]] = {"id": str, "scale": values.positive}
+_TOLD: Mapping[str, Callable[[str], Any]] = {"id": str, "scale": values.millimetres}
 _OPTIONS: Mapping[str, Callable[[str], Any]] = {
     "tolerance": values.tolerance,
     "units": _one_of(*METRES),
