@@ -6,6 +6,7 @@ A file that grows row by row has one writer at a time.
 import json
 import os
 import secrets
+import stat
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
@@ -14,6 +15,8 @@ from typing import Any
 
 from symrefine.errors import InputError
 
+# What to say of what is not `is_regular`.
+ENDLESS = "is a pipe or a device; expected a file"
 # A writer fills the file it is given.
 Writer = Callable[[Path], object]
 # The files that were asked for since somebody wants to know.
@@ -157,20 +160,28 @@ def file_bytes(file: Path) -> bytes:
     """What a file holds.
 
     Raises:
-        InputError: it is missing, unreadable or empty.
+        InputError: it is missing, unreadable or empty, or no file.
     """
     ask(file)
     try:
-        data = file.read_bytes()
+        state = file.stat()
+        data = file.read_bytes() if is_regular(state) else None
     except FileNotFoundError:
         raise InputError("no such file") from None
     except ValueError as error:  # a name that no system takes
         raise InputError(f"is no name of a file: {error}") from None
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}") from None
+    if data is None:
+        raise InputError(ENDLESS)
     if not data:
         raise InputError("is empty (0 bytes)")
     return data
+
+
+def is_regular(state: os.stat_result) -> bool:
+    """Whether something is no pipe and no device, which have no end that one could wait for."""
+    return stat.S_ISREG(state.st_mode) or stat.S_ISDIR(state.st_mode)
 
 
 def ask(file: Path) -> None:

@@ -13,12 +13,27 @@ TOLERANCE, LARGEST_TOLERANCE = 0.02, 0.2
 METRES: Mapping[str, float] = {
     "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "A": 1e-10, "in": 0.0254,
 }  # fmt: skip
+# Millimetres in one unit of a file, at least and at most: beyond what anybody measures, and far from overflow.
+LEAST_MM, MOST_MM = 1e-12, 1e12
 # What a length in units of the file is written with, whatever these are.
 OF_FILE = "u"
 # Things that people scan, model and grasp measure 5 mm to 5 m: as numbers, millimetres and metres do not overlap.
 EVERYDAY_M = (5e-3, 5.0)
 _LENGTH = re.compile(r"([-+0-9.eE]*[0-9.])\s*([^\W\d_]+)")
 _SPELT = {"µm": "um", "μm": "um", "Å": "A", "å": "A"}
+
+
+def check_scale(scale: float) -> None:
+    """Refuse a number of millimetres that no unit has.
+
+    Raises:
+        InputError: it is not positive, or far from all that there is.
+    """
+    if not LEAST_MM <= scale <= MOST_MM:
+        raise InputError(
+            f"scale is {scale}; expected millimetres in one unit of the file, such as 1 or 1000, from {LEAST_MM:g} to "
+            f"{MOST_MM:g}"
+        )
 
 
 def read_length(text: str) -> tuple[float, str]:

@@ -218,7 +218,7 @@ def test_a_manifest_says_more_of_each(run: Run, lab: Path) -> None:
         ("path,id\n,4\n", ":2: path: is empty"),
         ("path\na.xyz\nb.xyz\na.xyz\n", ":4: path: a.xyz stands in line 2, too"),
         ("path,id\na.xyz,1\nb.xyz,1\n", ":3: id: 1 stands in line 2, too"),
-        ("path,scale\na.xyz,-1\n", ":2: scale: '-1' is not a number above 0"),
+        ("path,scale\na.xyz,-1\n", ":2: scale: '-1' is not a number of millimetres from 1e-12"),
         ("path,tolerance\na.xyz,3\n", ":2: tolerance: '3' is not a fraction"),
         ("path,units\na.xyz,mmm\n", ":2: units: 'mmm' is not one of .*did you mean mm?"),
         ("path,measure\na.xyz,solids\n", ":2: measure: 'solids' is not one of surface, solid; did you mean solid?"),
@@ -400,6 +400,11 @@ def test_sizes_and_shards_are_read() -> None:
         ("batch objects --memory-limit 0", "'0' is not a size of memory"),
         ("batch objects --memory-limit 2PB", "'2PB' is not a size of memory"),
         ("batch objects --time-limit 0", "--time-limit: '0' is not a number above 0"),
+        ("batch objects --time-limit 1e300", "a limit of time of 1e+300 s is more than 2,147,483, 24 days"),
+        (
+            "batch objects --bop b.json --bop-scale 1e308",
+            "'1e308' is not a number of millimetres from 1e-12",
+        ),
         ("batch objects --table t.xls", "t.xls: expected the name of a table that ends in .csv or .parquet"),
         ("batch objects --table nowhere/t.csv", "there is no directory nowhere"),
         ("batch objects --dask nowhere", "nowhere: is no address of a Dask scheduler"),
@@ -477,6 +482,69 @@ def test_what_meets_a_limit_is_a_row_and_tried_again_under_another(run: Run) -> 
     assert status == 1
     assert "a run failed: the run takes longer than 0.05 s" in err
     assert "2 runs, written" in run("run", "thirds.yaml", "--limit", "2")[1]
+    assert "needs more memory than 1 bytes, the limit" in run(*line, "--memory-limit", "1", "--tolerance", "0.03")[1]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"beside": {"../../../../../../../../../dev/zero": "0"}},
+        {"beside": [1]},
+        {"lost": [1]},
+        {"bop": 7},
+        {"bop": {"scale": 1.0, "entry": {"diameter": "far"}}},
+        {"timings": None},
+        {"timings": {"load_s": "long"}},
+        {"planes": 7},
+        {"planes": [{"normal": [0, 0, 1]}]},
+        {"point_group": None, "undetermined": None},
+        {"axes": None},
+    ],
+)
+@pytest.mark.usefixtures("lab")
+def test_a_row_that_somebody_changed_is_done_again(run: Run, changes: dict[str, Any]) -> None:
+    line = ("batch", "objects/box000.xyz", "--out", "r.jsonl", "--table", "t.csv")
+    assert run(*line)[0] == 0
+    table, [row] = Path("t.csv").read_bytes(), rows("r.jsonl")
+    changed = {key: value for key, value in (row | changes).items() if value is not None or key not in changes}
+    Path("r.jsonl").write_text(json.dumps(changed) + "\n")
+    status, out, err = run(*line)
+    assert (status, err, "done before" in out) == (0, "", False)
+    assert Path("t.csv").read_bytes() == table
+    assert "1 done before" in run(*line)[1]
+
+
+@pytest.mark.parametrize("frames", [10**12, -3, "x", [2], True])
+@pytest.mark.usefixtures("lab")
+def test_a_row_that_tells_of_frames_that_there_are_not_is_no_guide(run: Run, frames: Any) -> None:
+    line = ("batch", "objects/box000.xyz", "--out", "r.jsonl")
+    run(*line)
+    [row] = rows("r.jsonl")
+    Path("r.jsonl").write_text(json.dumps(row | {"file": f"{row['file']}#0", "frames": frames}) + "\n")
+    assert run(*line)[0] == 0
+    assert rows("r.jsonl")[-1]["file"] == row["file"]
+
+
+@posix
+@pytest.mark.usefixtures("lab")
+def test_pipes_and_devices_are_no_objects(run: Run) -> None:
+    os.mkfifo("pipe.xyz")
+    Path("device.xyz").symlink_to("/dev/zero")
+    for name in ("pipe.xyz", "device.xyz"):
+        refused(run("detect", name), f"{name}: is a pipe or a device; expected a file")
+        assert f"failed: {name}: is a pipe or a device" in run("batch", name, "objects/box000.xyz")[1]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems take names in UTF-8 only")
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+@pytest.mark.usefixtures("lab")
+def test_names_of_other_bytes_stand_in_tables(run: Run, kind: str) -> None:
+    Path("objects/box000.xyz").rename(os.fsdecode(b"objects/box\xff.xyz"))
+    status, out, err = run("batch", "objects", "--out", "r.jsonl", "--table", f"t.{kind}")
+    assert (status, err) == (0, "")
+    assert "box\\udcff.xyz" in out
+    assert b"box\\udcff.xyz" in Path(f"t.{kind}").read_bytes()
+    assert "10 done before" in run("batch", "objects", "--out", "r.jsonl")[1]
 
 
 # --- faults -----------------------------------------------------------------------------------------------------------

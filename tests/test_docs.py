@@ -210,7 +210,8 @@ def test_the_page_of_fleets_does_what_it_says(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("page", "name"), [("robustness.md", "fuzz"), ("fleets.md", "kills"), ("fleets.md", "cluster")]
+    ("page", "name"),
+    [("robustness.md", "fuzz"), ("fleets.md", "kills"), ("fleets.md", "cluster"), ("fleets.md", "memory")],
 )
 def test_tables_of_campaigns_are_put_there_by_commands(page: str, name: str, tmp_path: Path) -> None:
     copy = tmp_path / page

@@ -1,11 +1,13 @@
 """Many tasks: the same outcomes by every executor, limits told, dead processes survived, shards made one again."""
 
+import csv
 import json
 import multiprocessing
 import os
 import random
 import sys
 import time
+import tracemalloc
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,13 +16,14 @@ import pytest
 
 from experiments.studies.kills import Cluster
 from symrefine.errors import InputError
-from symrefine.fleet import cell
+from symrefine.fleet import cell, journal
 from symrefine.fleet.cluster import Dask
 from symrefine.fleet.crew import HERE, Executor, Processes, on_this_machine
-from symrefine.fleet.journal import opened
+from symrefine.fleet.journal import opened, passing, read_rows
 from symrefine.fleet.limits import Limits, Lost
+from symrefine.fleet.rows import Rows
 from symrefine.fleet.shard import Shard, Whole, merged, piece
-from symrefine.fleet.table import csv_text, flat, write_table
+from symrefine.fleet.table import flat, write_table
 from symrefine.fleet.tasks import finish, is_final
 
 WORK = """
@@ -187,14 +190,96 @@ def mourn(parcel: int, lost: Lost) -> dict[str, Any]:
 @posix
 def test_every_row_is_on_disk_before_it_is_heard_of(work: Any, tmp_path: Path) -> None:
     path = tmp_path / "rows.jsonl"
-    with opened(path, ("x",), busy="", rows_of="", other="") as journal:
-        for row in finish(HERE, work.square, [3, 5], mourn, journal):
-            assert json.loads(path.read_text().splitlines()[-1]) == row
-        lost = list(finish(Processes(workers=1), work.killed_always, [0], mourn, journal))
+    with opened(path, {"x": (int,)}, "x", busy="", rows_of="", other="") as held:
+        for row in finish(HERE, work.square, [3, 5], mourn, held):
+            assert json.loads(path.read_text().splitlines()[-1]) == row == held.latest[row["x"]]
+        lost = list(finish(Processes(workers=1), work.killed_always, [0], mourn, held))
     assert lost == [
         {"x": 0, "error": "its process was killed by signal 9; perhaps it took too much memory", "lost": ""}
     ]
     assert len(path.read_text().splitlines()) == 3
+
+
+def test_of_rows_of_one_key_the_last_is_read_where_it_stands(tmp_path: Path) -> None:
+    path, rows = tmp_path / "rows.jsonl", [{"x": k % 3, "n": k} for k in range(7)]
+    path.write_text("".join(json.dumps(row) + "\n" for row in rows) + '{"x": 1')
+    with opened(path, {"x": (int,)}, "x", busy="", rows_of="", other="") as held:
+        assert held.torn
+        assert dict(held.latest) == {0: rows[6], 1: rows[4], 2: rows[5]}
+        held.append({"x": 1, "n": 7})
+        assert held.latest[1] == {"x": 1, "n": 7}
+        assert held.latest.get(9) is None
+    told = read_rows(path, {"x": (int,)}, rows_of="")
+    assert list(told) == [*rows, {"x": 1, "n": 7}]
+    assert told[-2:] == [rows[6], {"x": 1, "n": 7}]
+
+
+def test_rows_that_nobody_keeps_leave_nothing_behind() -> None:
+    with passing("x") as held:
+        held.append({"x": "a", "n": 1})
+        held.append({"x": "a", "n": 2})
+        assert dict(held.latest) == {"a": {"x": "a", "n": 2}}
+    assert not held.path.parent.exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('{"x": [1]}\n', r"is damaged: a row has a x that is \[1\]"),
+        ('{"x": true}\n', "a row has a x that is True"),
+        ('{"x": null}\n', "a row has a x that is None"),
+        ('{"x": 1}}\n', "is damaged: Extra data"),
+        ('{"x": ' + "9" * 5000 + "}\n", "is damaged: Exceeds the limit"),
+        ('{"x": 1, "y": ' + "[" * 10**6 + "\n", "is damaged"),
+        ('{"x": "' + "a" * 200, "a row takes more than 100 bytes"),
+        ("\n", "holds no rows of tests"),
+        ('{"y": 1}\n', "holds no rows of tests"),
+        ("{}\n", "holds no rows of tests"),
+    ],
+)
+def test_what_is_no_row_is_told(text: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if "takes more" in message:
+        monkeypatch.setattr(journal, "LONGEST", 100)
+    path = tmp_path / "rows.jsonl"
+    path.write_text('{"x": 1}\n' + text)
+    with (
+        pytest.raises(InputError, match=message),
+        opened(path, {"x": (int,)}, "x", busy="", rows_of="tests", other="another"),
+    ):
+        pass
+    assert path.read_text() == '{"x": 1}\n' + text
+
+
+@pytest.mark.parametrize("name", ["t.csv", "t.parquet"])
+def test_a_table_holds_few_of_its_rows(name: str, tmp_path: Path) -> None:
+    from pyarrow.parquet import read_table
+
+    rows = Rows(40_000, lambda k: {"file": f"f{k}", "planes": f"{k:01000d}", "n": k, "x": k / 3 if k % 7 else None})
+    write_table(rows[:2], tmp_path / name)  # so that what pyarrow imports is not counted
+    tracemalloc.start()
+    write_table(rows, tmp_path / name)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 40_000 * 1000 / 2, most
+    if name.endswith("csv"):
+        with (tmp_path / name).open(newline="") as stream:
+            read = [(row["file"], row["planes"], int(row["n"])) for row in csv.DictReader(stream)]
+    else:
+        read = [(row["file"], row["planes"], row["n"]) for row in read_table(tmp_path / name).to_pylist()]
+    assert read == [(row["file"], row["planes"], row["n"]) for row in rows]
+
+
+def test_numbers_and_names_that_a_column_cannot_hold_are_texts(tmp_path: Path) -> None:
+    rows = [{"file": "a\udcff", "seed": 10**30, "x": 1.5}, {"file": "b", "seed": 1, "x": 2**60 + 1}]
+    for name in ("t.csv", "t.parquet"):
+        write_table(rows, tmp_path / name)
+    from pyarrow.parquet import read_table
+
+    assert read_table(tmp_path / "t.parquet").to_pylist() == [
+        {"file": "a\\udcff", "seed": f"1{'0' * 30}", "x": 1.5},
+        {"file": "b", "seed": "1", "x": 2.0**60},
+    ]
+    assert (tmp_path / "t.csv").read_text().splitlines()[1] == f"a\\udcff,1{'0' * 30},1.5"
 
 
 def test_flat_rows_are_the_same_in_csv_and_parquet(tmp_path: Path) -> None:
@@ -205,11 +290,10 @@ def test_flat_rows_are_the_same_in_csv_and_parquet(tmp_path: Path) -> None:
     ]
     told = [flat(row) for row in rows]
     assert list(told[0]) == ["file", "n", "x", "ok", "options.seed", "options.at", "odd"]
-    text = csv_text(told)
-    assert text.splitlines()[1:3] == ['a,1,1,true,0,"[1, 2]",1,', "b,,0.30000000000000004,false,1,,two,"]
     for name in ("t.csv", "t.parquet", "again.parquet"):
         write_table(told, tmp_path / name)
-    assert (tmp_path / "t.csv").read_text() == text
+    text = (tmp_path / "t.csv").read_text()
+    assert text.splitlines()[1:3] == ['a,1,1,true,0,"[1, 2]",1,', "b,,0.30000000000000004,false,1,,two,"]
     assert (tmp_path / "t.parquet").read_bytes() == (tmp_path / "again.parquet").read_bytes()
     from pyarrow.parquet import read_table
 
@@ -236,7 +320,7 @@ def parts(tasks: int, of: int, about: str = "x") -> dict[str, list[dict[str, Any
 
 @pytest.mark.parametrize(("tasks", "of"), [(1, 1), (10, 3), (16, 16), (3, 5)])
 def test_shards_made_one_are_all_rows_in_order(tasks: int, of: int) -> None:
-    assert merged(parts(tasks, of)) == [{"file": f"f{i}", "i": i} for i in range(tasks)]
+    assert list(merged(parts(tasks, of))) == [{"file": f"f{i}", "i": i} for i in range(tasks)]
 
 
 def test_of_several_rows_of_a_task_in_one_part_the_last_counts() -> None:
@@ -252,9 +336,9 @@ def test_a_task_of_several_rows_is_whole_with_all_of_them() -> None:
         return [{"i": i + k, "part": piece(whole.mark(shard, index)["part"], k, pieces)} for k in range(pieces)]
 
     single = {"i": 9} | whole.mark(shard, 0)
-    assert merged({"p": [*rows(1, 3, 20)[::-1], single]}) == [{"i": 9}, {"i": 20}, {"i": 21}, {"i": 22}]
+    assert list(merged({"p": [*rows(1, 3, 20)[::-1], single]})) == [{"i": 9}, {"i": 20}, {"i": 21}, {"i": 22}]
     # Done again, when the file held two.
-    assert merged({"p": [*rows(1, 3, 20), single, *rows(1, 2, 30)]}) == [{"i": 9}, {"i": 30}, {"i": 31}]
+    assert list(merged({"p": [*rows(1, 3, 20), single, *rows(1, 2, 30)]})) == [{"i": 9}, {"i": 30}, {"i": 31}]
     with pytest.raises(InputError, match="shard 1/1 is not complete: 1 of its 2 tasks"):
         merged({"p": [single, *rows(1, 3, 20)[1:]]})
     with pytest.raises(InputError, match="p: is damaged"):
@@ -277,6 +361,14 @@ def test_a_task_of_several_rows_is_whole_with_all_of_them() -> None:
         ),
         (lambda p: p | {"p2": [{"file": "f1", "part": p["p2"][0]["part"] | {"index": 0}}]}, "p2: is damaged"),
         (lambda p: p | {"p2": [{"file": "f1", "part": 7}]}, "p2: is damaged: .* 7"),
+        (
+            lambda p: {"p1": [{"file": "f", "part": p["p1"][0]["part"] | {"index": 0, "shard": f"1/{10**15}"}}]},
+            "p1: is damaged",
+        ),
+        (
+            lambda p: {"p1": [{"file": "f", "part": p["p1"][0]["part"] | {"index": 0, "tasks": 10**15}}]},
+            "shard 1/3 is not complete",
+        ),
         (lambda _: {"p1": []}, "p1: holds no rows"),
     ],
 )

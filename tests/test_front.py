@@ -244,6 +244,8 @@ EXPORTS = {
     "mirrors for BOP": (("bop", "m.json", {"improper": True}), "improper does not apply to 'bop'"),
     "another suffix": (("npz", "x.dat", {}), "expected a name that ends in .npz"),
     "no turns": (("npz", "x.npz", {"steps": 0}), "steps is 0"),
+    "more than all": (("npz", "x.npz", {"steps": 10**9}), "steps is 1000000000; expected 1 to 360"),
+    "no unit": (("bop", "m.json", {"scale": 1e308}), r"scale is 1e\+308; expected millimetres"),
 }
 
 

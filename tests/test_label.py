@@ -307,6 +307,35 @@ def test_a_person_decides_where_noise_hides_the_answer(run: Run, tmp_path: Path)
     assert of(to, "labels.json")["objects"][0]["found"] is None
 
 
+@pytest.mark.parametrize("changes", [{"choices": 7}, {"file": 1}, {"confidence": None}])
+def test_rows_that_somebody_changed_are_told(run: Run, out: Path, changes: dict[str, Any]) -> None:
+    row = next(iter(rows(out).values()))
+    (out / "objects.jsonl").write_text(json.dumps(row | changes) + "\n")
+    status, _, err = run()
+    assert (status, err.count("\n")) == (2, 1)
+    assert f"objects.jsonl: is damaged: a row has a {next(iter(changes))} that is" in err
+
+
+def test_of_a_file_of_several_objects_one_is_chosen(run: Run, models: Path, tmp_path: Path) -> None:
+    """A label is of one object; what is chosen counts for files that hold several, and not for the others."""
+    folder, to = tmp_path / "models", tmp_path / "new"
+    folder.mkdir()
+    shutil.copy(models / "obj_000004.ply", folder)
+    water, bent = ([[0.76, 0.59, 0], [-x, 0.59, 0]] for x in (0.76, 0.6))
+    frames = [f"3\n\nO 0 0 0\nH {a[0]} {a[1]} 0\nH {b[0]} {b[1]} 0\n" for a, b in (water, bent)]
+    (folder / "obj_000001.xyz").write_text("".join(frames))
+    status, told, _ = run(folder=folder, to=to)
+    assert status == 1
+    wrong = "holds 2 frames, and a label is of one object: choose with --frame, from 0 to 1, which counts for all"
+    assert f"obj_000001.xyz: {wrong}" in told
+    assert "2 objects: 0 settled (0 by confidence, 0 by a person), 1 to look at, 1 failed" in told
+    for frame, group in ((0, "C2v"), (1, "Cs")):
+        assert run("--frame", frame, folder=folder, to=to)[0] == 0
+        assert rows(to)[1]["answer"] == group
+        assert rows(to)[4]["error"] is None
+    assert "frame is 2; the file has 2 frames, from 0 to 1" in run("--frame", 2, folder=folder, to=to)[1]
+
+
 def test_a_run_that_was_killed_goes_on(run: Run, out: Path, first: Path) -> None:
     """Half of a row, and a picture that is not there: those two are done again, and all is as it was."""
     lines = (out / "objects.jsonl").read_bytes()

@@ -6,6 +6,7 @@ import json
 import os
 import pickle
 import struct
+import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -393,6 +394,29 @@ def test_star_shaped_polygons_keep_their_area(tmp_path_factory: pytest.TempPathF
     flat = np.array(radii)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     shape = load_polygon(tmp_path_factory.getbasetemp(), np.column_stack([flat, np.zeros(len(flat))]))
     assert area(shape) == pytest.approx(polygon_area(flat), rel=1e-9)
+
+
+def star(corners: int) -> np.ndarray:
+    rng = np.random.default_rng(0)
+    angle, radius = np.sort(rng.random(corners)) * 2 * np.pi, 0.3 + rng.random(corners)
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(corners)])
+
+
+def test_a_long_concave_outline_takes_seconds_and_a_longer_one_is_refused(tmp_path: Path) -> None:
+    points = star(2000)
+    begun = time.process_time()
+    long = load_bytes(tmp_path, "a.obj", obj(points, [range(2000)]))
+    assert time.process_time() - begun < 5.0
+    assert len(long.faces) == 1998
+    assert area(long) == pytest.approx(polygon_area(points[:, :2]), rel=1e-12)
+    points = star(12_000)
+    begun = time.process_time()
+    # A long one, and two that are so together.
+    most = [k for k in range(12_000) if k % 3]
+    for faces, row in (([range(12_000)], 1), ([most[::1000], most, most], 3)):
+        message = refusal(tmp_path, "a.obj", obj(points, faces))
+        assert f"face {row} (line {12_000 + row}) is concave and has {len(faces[-1]):,} corners" in message
+    assert time.process_time() - begun < 5.0
 
 
 @pytest.mark.parametrize("det", [1, -1])

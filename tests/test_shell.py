@@ -125,6 +125,20 @@ def test_a_picture_is_written(run: Run, folder: Path) -> None:
     assert (folder / "box.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.parametrize("command", ["symmetrize", "complete"])
+def test_what_is_made_has_a_page_and_a_picture(run: Run, folder: Path, command: str) -> None:
+    directions = np.random.default_rng(0).normal(size=(3000, 3))
+    points = directions / np.linalg.norm(directions, axis=1)[:, None] * [1.0, 2.0, 3.0]
+    np.savetxt(folder / "scan.xyz", points)
+    line = (command, "scan.xyz", "-o", "made.ply", "--report", "made.html", "--picture", "made.png")
+    assert_refused(run(*line[:-1], "made.svg"), "--picture made.svg: expected a name", ".png")
+    assert_refused(run(*line[:5], "made.obj"), "--report made.obj: has the suffix of an object")
+    status, out, _ = run(*line)
+    assert (status, *(f"wrote made.{kind}\n" in out for kind in ("ply", "html", "png"))) == (0, True, True, True)
+    assert (folder / "made.png").read_bytes().startswith(b"\x89PNG")
+    assert (folder / "made.html").read_text(encoding="utf-8").lower().startswith("<!doctype html>")
+
+
 # --- stdin ------------------------------------------------------------------------------------------------------------
 
 

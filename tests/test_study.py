@@ -463,7 +463,7 @@ def test_two_runs_cannot_write_to_one_folder(make: Make, lab: Path) -> None:
     stamp = journal.Stamp(config=plan.config_hash, code="test", libraries=versions.library_versions())
     (lab / "out").mkdir()
     with (
-        journal.opened(lab / "out" / "journal.jsonl", stamp, replace=False),
+        journal.opened(lab / "out" / "journal.jsonl", stamp, 5, replace=False),
         pytest.raises(InputError, match="another run is writing there"),
     ):
         run_study(plan, lab / "out")
@@ -553,6 +553,7 @@ def test_code_version_knows_changes(tmp_path: Path) -> None:
     for name, file in (("alone", "alone.py"), ("package.study", "package/beside.py")):
         (tmp_path / file).write_text("x = 1\n")
         first = versions.code_version(name, tmp_path)
+        (tmp_path / "alone").mkdir(exist_ok=True)  # what the study writes
         assert versions.code_version(name, tmp_path) == first
         (tmp_path / file).write_text("x = 2\n")
         assert versions.code_version(name, tmp_path) != first

@@ -153,7 +153,7 @@ KIND_OF = {
         "review.cards": "MOST",
         "review.decisions": "LARGEST LONGEST_NOTE",
         "shape": "CAMERAS LARGEST",
-        "units": "LARGEST_TOLERANCE",
+        "units": "LARGEST_TOLERANCE LEAST_MM MOST_MM",
     },
     "told": {
         "decide.chain": "TOLD",

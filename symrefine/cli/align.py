@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from symrefine.cli.inputs import FRAMES, STDIN, Object, expanded, objects
-from symrefine.cli.outputs import check_outputs, json_writer, tell, write_all
+from symrefine.cli.outputs import check_outputs, json_writer, shown, shown_writers, tell, write_all
 from symrefine.cli.rows import MAP_HEAD, map_line
 from symrefine.cli.several import UNDETERMINED, Many, check_alone
 from symrefine.cli.signs import counting
 from symrefine.cli.values import add_detection_options, natural
 from symrefine.clock import Clock
 from symrefine.errors import InputError
-from symrefine.files import Writer
 
 if TYPE_CHECKING:
     from symrefine.front.aligned import Alignment
@@ -30,8 +29,6 @@ DESCRIPTION = (
     "Several B, or a pattern in quotes, or a file of several molecules, models or volumes, give a line for each; one "
     "that cannot be used is told on its line, the others go on, and the exit status is 2."
 )
-# Options whose files are of one pair, and the suffixes of these.
-_OF_ONE = {"recording": ".rrd", "report": ".html", "picture": ".png"}
 # Status of an answer that can be relied upon.
 _OK = "ok"
 
@@ -85,11 +82,11 @@ def run(args: argparse.Namespace) -> int:
             beside=lambda one: {"source": source.source, "target": one.name},
         )
         if several := len(paths) > 1 or first.frames > 1:
-            check_alone(_of_one(args), f"{paths[0]} holds {first.frames}", "choose one with --target-frame")
+            check_alone(shown(args), f"{paths[0]} holds {first.frames}", "choose one with --target-frame")
             records = list(many.told(chain([first], given), doing))
         else:
             found, record = aligned(first)
-            writers = json_writer(args.json, record) | _writers(args, found)
+            writers = json_writer(args.json, record) | shown_writers(args, found)
             write_all(writers)
     if several:
         return many.end(records, undetermined=args.strict and any(r.get("status", _OK) != _OK for r in records))
@@ -101,18 +98,9 @@ def _check(args: argparse.Namespace, paths: Sequence[str]) -> None:
     """Refuse, before any work, outputs that cannot be written or do not fit together, and what is for one pair."""
     if STDIN in (args.source, *paths):
         raise InputError("-: align reads files; write what comes on stdin to one, with its suffix")
-    check_outputs({"--json": args.json} | _of_one(args), [Path(path) for path in (args.source, *paths)])
+    check_outputs({"--json": args.json} | shown(args), [Path(path) for path in (args.source, *paths)])
     if len(paths) > 1:
-        check_alone(_of_one(args), f"B names {len(paths)}", "call `align` for each")
-    for name, suffix in _OF_ONE.items():
-        given = getattr(args, name)
-        if given is not None and name == "picture" and Path(given).suffix.lower() != suffix:
-            raise InputError(f"--{name} {given}: expected a name that ends in {suffix}")
-
-
-def _of_one(args: argparse.Namespace) -> dict[str, str | None]:
-    """The outputs that are of one pair, with the files that they are to fill."""
-    return {f"--{name}": getattr(args, name) for name in _OF_ONE}
+        check_alone(shown(args), f"B names {len(paths)}", "call `align` for each")
 
 
 def _targets(path: str, args: argparse.Namespace) -> "Frames[Shape]":
@@ -147,8 +135,3 @@ def _aligned(
     chosen = {"measure": args.measure} | {name: k for name, k in frames.items() if k is not None}
     found = replace(found, options={**found.options, **chosen})
     return found, found.to_dict(load_s=load_s + given.load_s)
-
-
-def _writers(args: argparse.Namespace, found: "Alignment") -> dict[str, Writer]:
-    """Writers of the files that are of one pair."""
-    return {getattr(args, name): found.writer(suffix) for name, suffix in _OF_ONE.items() if getattr(args, name)}

@@ -3,7 +3,9 @@
 import argparse
 import re
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,7 +26,7 @@ from symrefine.cli.values import (
     add_frame_option,
     add_scan_options,
     detection_options,
-    positive,
+    millimetres,
 )
 from symrefine.errors import InputError
 from symrefine.files import text_writer
@@ -32,7 +34,8 @@ from symrefine.files import text_writer
 if TYPE_CHECKING:
     from symrefine.cli.objects import Job
     from symrefine.cli.sources import Source
-    from symrefine.fleet.journal import Journal, Row
+    from symrefine.fleet.journal import Journal
+    from symrefine.fleet.rows import Row
 
 HELP = "detect the symmetries of every file of a data set"
 DESCRIPTION = (
@@ -61,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="FILE.jsonl", help="append the rows to this file (default: print only)")
     parser.add_argument("--bop", metavar="FILE", help="put the symmetries of all into this models_info.json of BOP")
     parser.add_argument(
-        "--bop-scale", type=positive, metavar="X", help="millimetres in one unit of the files (default: 1)"
+        "--bop-scale", type=millimetres, metavar="X", help="millimetres in one unit of the files (default: 1)"
     )
     parser.add_argument("--recursive", action="store_true", help="directories inside directories too")
     add_fleet_options(parser, "file")
@@ -80,30 +83,33 @@ def run(args: argparse.Namespace) -> int:
     does = executor(args)
     from symrefine.cli.objects import detected, holds, known_apart
     from symrefine.cli.rows import ROW_HEAD, row_line
+    from symrefine.fleet.journal import passing
+    from symrefine.fleet.rows import Rows
 
-    with opened(Path(args.out)) if args.out else nullcontext() as out:
-        if out and out.torn:
+    with opened(Path(args.out)) if args.out else passing("file") as out:
+        if out.torn:
             note(f"{args.out}: the last row is incomplete; it is removed and done again")
-        before = {row["file"]: row for row in out.rows} if out else {}
-        known = known_apart(jobs, before, does.limits)
-        done = [(job, before[job.name]) for job in known if holds(before.get(job.name), job, does.limits)]
-        kept = {job.name for job, _ in done}
-        print_lines([ROW_HEAD, *(row_line(job.name, row) for job, row in done)])
+        rows_by_name = out.latest
+        known = known_apart(jobs, rows_by_name, does.limits)
+        done = [job for job in known if holds(rows_by_name.get(job.name), job, does.limits)]
+        kept = {job.name for job in done}
+        print_lines(chain([ROW_HEAD], (row_line(job.name, rows_by_name[job.name]) for job in done)))
         with counting("detecting", len(known), len(done)) as doing:
             new = [job for job in known if job.name not in kept]
             for job, row in detected(new, does, out, expect=doing.expect):
-                done.append((job, row))
+                done.append(job)
                 _show(row)
                 doing.advance()
-    order = {job.name: place for place, job in enumerate(jobs)}
-    rows = [row for _, row in sorted(done, key=lambda one: (order[one[0].whole], one[0].frame or 0))]
-    failed = sum(row["error"] is not None for row in rows)
-    files = "1 file" if len(jobs) == 1 else f"{len(jobs)} files"
-    parts = [files, f"{len(rows)} objects" if len(rows) > len(jobs) else ""]
-    parts += [f"{len(kept)} done before" if kept else "", f"{failed} failed" if failed else ""]
-    print_lines([", ".join(part for part in parts if part)])
-    write_rows(args.table, rows)
-    left_out = _write_bop(args, {row["file"]: row for row in rows}, numbers) if args.bop else 0
+        order = {job.name: place for place, job in enumerate(jobs)}
+        done.sort(key=lambda job: (order[job.whole], job.frame or 0))
+        rows = Rows(len(done), lambda k: rows_by_name[done[k].name])
+        failed = sum(row["error"] is not None for row in rows)
+        files = "1 file" if len(jobs) == 1 else f"{len(jobs)} files"
+        parts = [files, f"{len(rows)} objects" if len(rows) > len(jobs) else ""]
+        parts += [f"{len(kept)} done before" if kept else "", f"{failed} failed" if failed else ""]
+        print_lines([", ".join(part for part in parts if part)])
+        write_rows(args.table, rows)
+        left_out = _write_bop(args, rows, numbers) if args.bop else 0
     return int(left_out > 0 or failed > 0)
 
 
@@ -129,28 +135,27 @@ def _jobs(args: argparse.Namespace) -> tuple[list["Job"], dict[str, int]]:
     found = _sources(args)
     check_table_option(args)
     outputs = {"--out": args.out, "--bop": args.bop, "--table": args.table}
-    check_outputs(outputs, [Path(source.path) for source in found])
+    check_outputs(outputs, (Path(source.path) for source in found))
     check_beside("--bop", args.bop, {"--bop-scale": args.bop_scale})
     numbers = {} if args.bop is None else _numbered(args, found)
     options = detection_options(args)
-    scales = [None if args.bop is None else source.told.get("scale", args.bop_scale or 1.0) for source in found]
-    each = [options | dict(source.options) for source in found]
-    wanted = list(zip(found, each, scales, strict=True))
-    about = [[source.name, dict(source.told), own, scale] for source, own, scale in wanted]
-    fleet = Whole.of(len(found), [our_version(), *about])
+    scale = None if args.bop is None else args.bop_scale or 1.0
     jobs = [
         Job(
             name=source.name,
             path=source.path,
-            options=own,
+            options=options | dict(source.options) if source.options else options,  # of many one copy is held
             told=source.told,
-            scale=scale,
-            mark=fleet.mark(args.shard, index),
+            scale=scale and source.told.get("scale", scale),
         )
-        for index, (source, own, scale) in enumerate(wanted)
-        if args.shard is None or args.shard.takes(index)
+        for source in found
     ]
-    return jobs, numbers
+    if args.shard is None:
+        return jobs, numbers
+    about = ([job.name, dict(job.told), dict(job.options), job.scale] for job in jobs)
+    fleet = Whole.of(len(jobs), chain([our_version()], about))
+    own = [index for index in range(len(jobs)) if args.shard.takes(index)]
+    return [replace(jobs[index], mark=fleet.mark(args.shard, index)) for index in own], numbers
 
 
 def _sources(args: argparse.Namespace) -> list["Source"]:
@@ -193,24 +198,25 @@ def opened(path: Path) -> AbstractContextManager["Journal"]:
     Raises:
         InputError: another batch is writing to it, or it holds something else than rows of a batch.
     """
+    from symrefine.cli.objects import KINDS
     from symrefine.fleet import journal
 
     busy = f"{path}: another `symrefine batch` is writing to it"
-    return journal.opened(path, ("file",), busy=busy, rows_of="`symrefine batch`", other="another file")
+    return journal.opened(path, KINDS, "file", busy=busy, rows_of="`symrefine batch`", other="another file")
 
 
-def _write_bop(args: argparse.Namespace, rows: Mapping[str, "Row"], numbers: Mapping[str, int]) -> int:
+def _write_bop(args: argparse.Namespace, rows: Sequence["Row"], numbers: Mapping[str, int]) -> int:
     """Write the entries of all rows that have one; tells of the others, and how many they are."""
     from symrefine.export.bop import bop_text, metres_doubt
 
     entries, left_out, told = {}, 0, args.bop_scale is not None
-    for file, row in sorted(rows.items()):
+    for row in rows:
         found = row.get("bop", {"note": row["error"]})
         if found.get("note"):
             lost = "entry" not in found and row["error"] is None
             (complain if lost and is_quiet() else note)(found["note"])
         if "entry" in found:
-            entries[numbers[file]] = found["entry"]
+            entries[numbers[row["file"]]] = found["entry"]
         else:
             left_out += 1
         told = told or "scale" in row

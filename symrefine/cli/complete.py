@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from symrefine.cli.inputs import loaded, read_scan
-from symrefine.cli.outputs import check_outputs, json_writer, note, tell, write_all
+from symrefine.cli.outputs import check_outputs, json_writer, note, shown, shown_writers, tell, write_all
 from symrefine.cli.signs import waiting
 from symrefine.cli.values import add_depth_options, add_detection_options, add_path, add_scan_options, detection_options
 from symrefine.errors import InputError
@@ -22,6 +22,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_path(parser, "point cloud")
     parser.add_argument("-o", "--out", required=True, metavar="OUT", help="file to write: .ply or .npz")
     parser.add_argument("--json", metavar="FILE|-", help="write the figures as JSON; - is stdout, with no table")
+    parser.add_argument("--picture", metavar="FILE.png", help="write a picture of the scan and what was found")
+    parser.add_argument(
+        "--report",
+        metavar="FILE.html",
+        help="write a page with a model that turns: what was seen, inferred and contradicted",
+    )
     add_scan_options(parser)
     add_depth_options(parser)
     add_detection_options(parser)
@@ -33,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     from symrefine.front.lines import summary
     from symrefine.front.made import complete
 
-    check_outputs({"--out": args.out, "--json": args.json}, [Path(args.path)])
+    check_outputs({"--out": args.out, "--json": args.json} | shown(args), [Path(args.path)])
     suffix = Path(args.out).suffix.lower()
     if suffix not in MARKED:
         raise InputError(
@@ -43,7 +49,8 @@ def run(args: argparse.Namespace) -> int:
         shape = loaded(args.path, args.format, lambda file: read_scan(file, detection_options(args)))
         made = complete(shape, outliers=args.outliers, tolerance=args.tolerance, units=args.units, seed=args.seed)
         record = made.to_dict(options=detection_options(args))
-        write_all(writers := {args.out: made.writer(suffix)} | json_writer(args.json, record))
+        model = {args.out: made.writer(suffix)}
+        write_all(writers := model | shown_writers(args, made) | json_writer(args.json, record))
     tell(args.json, record, summary(record), writers)
     if not made.inferred.any():
         note("nothing was unseen: what was written is the cloud without its outliers")

@@ -8,7 +8,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from symrefine.cli.inputs import STDIN, TEXTURE, Object, expanded, objects, read_scan, scans
+from symrefine.cli.inputs import STDIN, TEXTURE, Object, expanded, objects, scans
 from symrefine.cli.outputs import (
     check_beside,
     check_outputs,
@@ -16,6 +16,8 @@ from symrefine.cli.outputs import (
     is_verbose,
     json_writer,
     note,
+    shown,
+    shown_writers,
     tell,
     write_all,
 )
@@ -31,10 +33,9 @@ from symrefine.cli.values import (
     add_scan_options,
     detection_options,
     grey,
+    millimetres,
     natural,
-    positive,
 )
-from symrefine.clock import Clock
 from symrefine.errors import InputError
 from symrefine.files import Writer, text_writer
 
@@ -42,8 +43,6 @@ if TYPE_CHECKING:
     from symrefine.shape import Shape
     from symrefine.stream import Stream
 
-# Options whose files are of one object.
-_OF_ONE = ("bop", "recording", "report", "picture")
 HELP = "find the planes, axes and point group of a mesh, cloud or picture"
 DESCRIPTION = (
     "Find the mirror planes, rotation axes and point group of the mesh or point cloud in PATH (.ply .stl .obj .off "
@@ -70,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--bop-id", type=natural, metavar="N", help="number of the object there (default: 1)")
     parser.add_argument(
         "--bop-scale",
-        type=positive,
+        type=millimetres,
         metavar="X",
         help="millimetres in one unit of PATH: 1000 if it is in metres (default: 1)",
     )
@@ -134,8 +133,6 @@ def _check(args: argparse.Namespace, paths: Sequence[str]) -> None:
             raise InputError("-: stdin is one file; name no others beside it")
         of_bop = "`symrefine batch DIR --bop FILE` takes a directory"
         check_alone(_of_one(args), f"PATH names {len(paths)}", of_bop if args.bop else "call `detect` for each")
-    if args.picture is not None and Path(args.picture).suffix.lower() != ".png":
-        raise InputError(f"--picture {args.picture}: expected a name that ends in .png")
     if args.bop is not None:
         from symrefine.export.bop import read_models_info
 
@@ -144,7 +141,7 @@ def _check(args: argparse.Namespace, paths: Sequence[str]) -> None:
 
 def _of_one(args: argparse.Namespace) -> dict[str, str | None]:
     """The outputs that are of one object, with the files that they are to fill."""
-    return {f"--{name}": getattr(args, name) for name in _OF_ONE}
+    return {"--bop": args.bop} | shown(args)
 
 
 def _picture(args: argparse.Namespace) -> dict[str, Any]:
@@ -174,15 +171,6 @@ def _notes(args: argparse.Namespace, shape: "Shape", detection: Any, record: dic
     is_grey = shape.dim == 2 and "threshold" in record["options"] and args.threshold is None
     if is_grey and (record["undetermined"] or record["point_group"] == "C1"):
         yield f"{shape.source}: if object and background are of different grey, try --threshold otsu"
-
-
-def examine(path: str, options: dict[str, Any]) -> tuple["Shape", Any, dict[str, Any]]:
-    """Shape, detection and JSON record of the one object in a file, with `detection_options`."""
-    clock = Clock()
-    with clock("load"):
-        given = read_scan(path, options, in_chunks=True)
-    found = detected(given, options, path)
-    return found.shape, found, found.to_dict(load_s=clock.seconds["load"])
 
 
 def detected(
@@ -231,7 +219,4 @@ def _writers(args: argparse.Namespace, shape: "Shape", detection: Any) -> dict[s
         entry = bop_entry(detection, shape, scale=args.bop_scale or 1.0)
         number = 1 if args.bop_id is None else args.bop_id
         writers[args.bop] = text_writer(bop_text(Path(args.bop), {number: entry}))
-    for name, suffix in ((args.recording, ".rrd"), (args.picture, ".png"), (args.report, ".html")):
-        if name is not None:
-            writers[name] = detection.writer(suffix)
-    return writers
+    return writers | shown_writers(args, detection)

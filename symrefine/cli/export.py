@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from symrefine.cli.inputs import loaded
 from symrefine.cli.outputs import check_outputs, note, tell
 from symrefine.cli.signs import waiting
-from symrefine.cli.values import add_detection_options, add_frame_option, add_path, count, natural, positive
+from symrefine.cli.values import add_detection_options, add_frame_option, add_path, count, millimetres, natural
 from symrefine.errors import InputError
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", required=True, metavar="OUT", help="file, or folder for " + ", ".join(_FOLDERS))
     parser.add_argument("--id", type=natural, metavar="N", help="number of the object in models_info.json (default: 1)")
     scaled = "millimetres in one unit of PATH: 1000 for metres (default: 1)"
-    parser.add_argument("--scale", type=positive, metavar="X", help=scaled)
+    parser.add_argument("--scale", type=millimetres, metavar="X", help=scaled)
     parser.add_argument("--improper", action="store_true", default=None, help="npz: mirrors and the like too")
     parser.add_argument("--steps", type=count, metavar="N", help="npz: turns for a continuous axis (default: 72)")
     parser.add_argument(

@@ -2,10 +2,10 @@
 
 import argparse
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from symrefine.cli.outputs import note, print_lines, write_all
 from symrefine.cli.values import count, positive
@@ -13,6 +13,7 @@ from symrefine.errors import InputError
 
 if TYPE_CHECKING:
     from symrefine.fleet.crew import Executor
+    from symrefine.fleet.rows import Row
     from symrefine.fleet.shard import Shard
 
 _BYTES = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "ki": 2**10, "mi": 2**20, "gi": 2**30}
@@ -117,13 +118,17 @@ def check_table_option(args: argparse.Namespace) -> None:
         check_table(Path(args.table))
 
 
-def write_rows(name: str | None, rows: Sequence[Mapping[str, Any]]) -> None:
+def write_rows(name: str | None, rows: "Sequence[Row]") -> None:
     """Write rows as a flat table if one is asked for, without their times, which differ from run to run."""
     if name is None:
         return
+    from symrefine.fleet.rows import Rows
     from symrefine.fleet.shard import PART
     from symrefine.fleet.table import flat, write_table
 
-    told = [flat({key: value for key, value in row.items() if key not in ("timings", PART)}) for row in rows]
+    def told_of(number: int) -> "Row":
+        return flat({key: value for key, value in rows[number].items() if key not in ("timings", PART)})
+
+    told = Rows(len(rows), told_of)
     write_all({name: partial(write_table, told)})
     print_lines([f"wrote {name}: {len(told)} rows"])

@@ -15,10 +15,10 @@ from symrefine.cli.values import (
     add_scan_options,
     count,
     detection_options,
-    positive,
+    millimetres,
     probability,
 )
-from symrefine.errors import InputError, one_line
+from symrefine.errors import InputError, about, one_line
 from symrefine.files import check_target, json_text, text_writer, whole
 
 if TYPE_CHECKING:
@@ -56,12 +56,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="P",
         help="settle objects of this confidence or more without a look, such as 0.95 (default: none)",
     )
-    parser.add_argument("--scale", type=positive, metavar="X", help="millimetres in one unit of the files (default: 1)")
+    parser.add_argument(
+        "--scale", type=millimetres, metavar="X", help="millimetres in one unit of the files (default: 1)"
+    )
     parser.add_argument(
         "--workers", type=count, default=1, metavar="N", help="files done at the same time (default: %(default)s)"
     )
     add_class_options(parser)
-    add_frame_option(parser)
+    add_frame_option(parser, otherwise="there has to be one; files that hold one are taken as they are")
     add_scan_options(parser)
     add_detection_options(parser)
 
@@ -120,8 +122,8 @@ def _detected(args: argparse.Namespace, asked: "Rows", held: "Journal") -> "Rows
     out = Path(args.out)
     if held.torn:
         note(f"{out / ROWS}: the last row is incomplete; it is removed and done again")
-    latest: dict[int, Any] = {row["object"]: row for row in held.rows}
-    rows: dict[int, Row] = {n: latest[n] for n, row in asked.items() if holds(out, latest.get(n), row)}
+    latest = {number: cast("Row | None", held.latest.get(number)) for number in asked}
+    rows: dict[int, Row] = {n: last for n, last in latest.items() if last and holds(out, last, asked[n])}
     todo = [row for number, row in asked.items() if number not in rows]
     jobs = [(row, args.dir, args.out) for row in todo]
     print_lines(_line(row) for row in rows.values())
@@ -138,7 +140,7 @@ def _detected(args: argparse.Namespace, asked: "Rows", held: "Journal") -> "Rows
 
 def examine_model(job: Job) -> dict[str, Any]:
     """The row of one object: what was found, or what was wrong with it; its pictures are written first."""
-    from symrefine.cli.detect import examine
+    from symrefine.cli.detect import detected
     from symrefine.detection.result import Detection
     from symrefine.review.objects import examined
     from symrefine.review.store import place_of_picture
@@ -148,7 +150,8 @@ def examine_model(job: Job) -> dict[str, Any]:
     if row["error"] is not None:
         return dict(row)
     try:
-        shape, found, _ = examine(str(path), row["options"])
+        found = detected(_read(str(path), row["options"]), row["options"], str(path))
+        shape = found.shape
         if not isinstance(found, Detection):
             raise InputError(f"{path}: points have {shape.dim} coordinates; labels are for objects in space")
         kept = examined(found, shape, scale=row["scale"])
@@ -158,6 +161,23 @@ def examine_model(job: Job) -> dict[str, Any]:
         return {**row, **kept.told}
     except Exception as error:  # noqa: BLE001 - one file must not end the others
         return {**row, "error": failure(str(path), error)}
+
+
+def _read(path: str, options: dict[str, Any]) -> Any:
+    """The object in a file; the one that `frame` of the options chooses where it holds several."""
+    from symrefine.cli.inputs import scans
+
+    frame, others = options.get("frame"), {name: given for name, given in options.items() if name != "frame"}
+    found = scans(path, others, in_chunks=True)
+    if len(found) == 1:
+        return found[0]
+    if frame is None:
+        raise InputError(
+            f"{path}: holds {len(found)} {found.what}, and a label is of one object: choose with --frame, from 0 to "
+            f"{len(found) - 1}, which counts for all such files, or write each to a file obj_NNNNNN of its own"
+        )
+    with about(path):
+        return found.chosen(frame)
 
 
 def lost(job: Job, why: "Lost") -> dict[str, Any]:

@@ -12,7 +12,7 @@ from symrefine.errors import InputError
 from symrefine.files import naming, whole
 
 if TYPE_CHECKING:
-    from symrefine.fleet.journal import Row
+    from symrefine.fleet.rows import Row
 
 HELP = "make one of the parts that --shard wrote"
 DESCRIPTION = (
@@ -56,15 +56,16 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _rows(path: Path, *, is_study: bool) -> Sequence["Row"]:
+    from symrefine.cli.objects import KINDS as BATCH
     from symrefine.fleet.journal import read_rows
-    from symrefine.study.journal import ENTRY, STAMP
+    from symrefine.study.journal import KINDS
 
-    keys, rows_of = (STAMP + ENTRY, "a study") if is_study else (("file",), "`symrefine batch`")
-    return read_rows(path, keys, rows_of=rows_of)
+    kinds, rows_of = (KINDS, "a study") if is_study else (BATCH, "`symrefine batch`")
+    return read_rows(path, kinds, rows_of=rows_of)
 
 
 def _write(out: Path, rows: Sequence["Row"]) -> None:
     with naming(str(out)):
         out.parent.mkdir(exist_ok=True)
-    with whole(out) as draft:
-        draft.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="ascii", newline="")
+    with whole(out) as draft, draft.open("w", encoding="ascii", newline="") as stream:
+        stream.writelines(json.dumps(row) + "\n" for row in rows)

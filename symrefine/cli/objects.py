@@ -7,16 +7,19 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from json import dumps, loads
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any, cast
 
-from symrefine.cli.inputs import failure, scans, told_as
+from symrefine.cli.inputs import FRAMES, failure, scans, told_as
+from symrefine.cli.rows import row_line
 from symrefine.clock import Clock
 from symrefine.errors import InputError, about, one_line
-from symrefine.files import asked_for
+from symrefine.files import ENDLESS, asked_for, is_regular
 from symrefine.fleet.crew import HERE, Executor
-from symrefine.fleet.journal import Journal, Row
+from symrefine.fleet.journal import Journal, Kinds, Latest
 from symrefine.fleet.limits import Limits, Lost
 from symrefine.fleet.remote import fetched, is_remote, state
+from symrefine.fleet.rows import Row
 from symrefine.fleet.shard import PART, piece
 from symrefine.fleet.tasks import finish, is_final, our_version
 
@@ -25,6 +28,9 @@ if TYPE_CHECKING:
     from symrefine.load import Frames
     from symrefine.plane import PlanarDetection
     from symrefine.shape import Shape
+
+# What every row has.
+KINDS: Kinds = {"file": (str,), "error": (str, NoneType)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,9 +82,9 @@ class Job:
         ]
 
 
-def known_apart(jobs: Sequence[Job], before: Mapping[str, Row], limits: Limits) -> list[Job]:
+def known_apart(jobs: Sequence[Job], before: Latest, limits: Limits) -> list[Job]:
     """The jobs, one for each object of a file of which rows done before say how many it holds."""
-    frames = {row["file"].rpartition("#")[0]: row["frames"] for row in before.values() if row.get("frames")}
+    frames = {row["file"].rpartition("#")[0]: row["frames"] for row in before.values() if _is_of_several(row)}
 
     def known(job: Job) -> list[Job]:
         one_each = job.apart(frames[job.name]) if job.name in frames and job.is_file else []
@@ -87,6 +93,11 @@ def known_apart(jobs: Sequence[Job], before: Mapping[str, Row], limits: Limits) 
         return one_each if still and not holds(before.get(job.name), job, limits) else [job]
 
     return [one for job in jobs for one in known(job)]
+
+
+def _is_of_several(row: Row) -> bool:
+    """Whether a row done before is of one of several objects in a file, of as many as one file may have."""
+    return type(frames := row.get("frames")) is int and 1 < frames <= FRAMES
 
 
 def detected(
@@ -122,7 +133,7 @@ def detected(
 
 def holds(row: Row | None, job: Job, limits: Limits) -> bool:
     """Whether a row done before still tells of its file, with the entry of BOP if one is wanted and can be had."""
-    if row is None:
+    if row is None or not _is_whole(row):
         return False
     now = loads(dumps(_head(job)))  # as it comes back from the journal, places as lists
     if not is_final(row, limits) or (job.mark and any(row.get(key) != mark for key, mark in job.mark.items())):
@@ -133,6 +144,17 @@ def holds(row: Row | None, job: Job, limits: Limits) -> bool:
     if row.get("beside", {}) != _beside(Path(job.path), row.get("beside", {})):
         return False
     return job.scale is None or row["error"] is not None or row.get("bop", {}).get("scale") == job.scale
+
+
+def _is_whole(row: Row) -> bool:
+    """Whether a row done before has what is told of it; one that somebody changed may not."""
+    try:
+        row_line(row["file"], row)
+        known = isinstance(row.get("beside", {}), dict)
+        entry = row.get("bop", {}).get("entry", {"diameter": 0.0})
+        return known and isinstance(entry["diameter"], float)
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return False
 
 
 def examine_file(job: Job) -> Row:
@@ -222,13 +244,15 @@ def _digest(path: Path) -> str:
     """What tells the content of a file.
 
     Raises:
-        InputError: it cannot be read.
+        InputError: it cannot be read, or is a pipe or a device.
     """
     try:
         seen = path.stat()
-        return _digest_of(path, (seen.st_ino, seen.st_size, seen.st_mtime_ns))
+        if is_regular(seen):
+            return _digest_of(path, (seen.st_ino, seen.st_size, seen.st_mtime_ns))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    raise InputError(f"{path}: {ENDLESS}")
 
 
 @lru_cache(maxsize=1)

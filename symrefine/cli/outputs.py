@@ -13,23 +13,30 @@ from symrefine.files import Writer, check_target, json_text, text_writer
 from symrefine.files import write_all as write_all
 
 if TYPE_CHECKING:
+    import argparse
+
     from rich.console import Console
+
+    from symrefine.front.answers import Answer
 
 STDOUT = "-"
 # Outputs that are no objects, and what they are called as a rule.
 _REPORTS = {"--json": "x.json", "--report": "x.html", "--recording": "x.rrd", "--bop": "models_info.json"}
+# Options that show an answer, and the suffixes of what they write.
+SHOWN = {"recording": ".rrd", "picture": ".png", "report": ".html"}
 # How much is told: "quiet" are errors alone and what stdout was asked to hold, "verbose" tells stages too.
 Loudness = Literal["quiet", "normal", "verbose"]
 loudness: ContextVar[Loudness] = ContextVar("loudness", default="normal")
 
 
-def check_outputs(outputs: dict[str, str | None], inputs: list[Path]) -> None:
+def check_outputs(outputs: dict[str, str | None], inputs: Iterable[Path]) -> None:
     """Refuse, before any work, outputs that cannot be written, that are inputs, or that are one file twice.
 
     Args:
         outputs: option to path, None where the option is not given; only `--json` may be "-", for stdout.
     """
-    taken = {path.resolve(): "the input" for path in inputs}
+    given = {Path(name).resolve() for name in outputs.values() if name not in (None, STDOUT)}
+    taken = {place: "the input" for path in inputs if (place := path.resolve()) in given}
     for option, name in outputs.items():
         if option == "--json" and name == STDOUT:
             check_stdout()
@@ -41,6 +48,8 @@ def check_outputs(outputs: dict[str, str | None], inputs: list[Path]) -> None:
             check_target(path)
         if name == STDOUT or (option != "--json" and path.exists() and not path.is_file()):
             raise InputError(f"{option} {name}: expected a file; only --json writes to stdout and devices")
+        if option == "--picture" and path.suffix.lower() != SHOWN["picture"]:
+            raise InputError(f"{option} {name}: expected a name that ends in {SHOWN['picture']}")
         if path.is_file() or not path.exists():
             if path.resolve() in taken:
                 raise InputError(f"{option} {name}: is the same file as {taken[path.resolve()]}; name another one")
@@ -67,6 +76,16 @@ def check_beside(option: str, name: str | None, details: dict[str, object]) -> N
     given = [detail for detail, value in details.items() if value is not None]
     if name is None and given:
         raise InputError(f"{given[0]}: says how to write {option} FILE, which is not given; add it or leave this out")
+
+
+def shown(args: "argparse.Namespace") -> dict[str, str | None]:
+    """The options of a command that show an answer, with the files that they are to fill."""
+    return {f"--{name}": getattr(args, name) for name in SHOWN if name in args}
+
+
+def shown_writers(args: "argparse.Namespace", answer: "Answer") -> dict[str, Writer]:
+    """The writers of the files that show an answer, as far as they are asked for."""
+    return {name: answer.writer(SHOWN[option[2:]]) for option, name in shown(args).items() if name is not None}
 
 
 def json_writer(name: str | None, record: Mapping[str, Any]) -> dict[str, Writer]:

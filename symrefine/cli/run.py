@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -73,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
             progress=progress,
         )
     print_lines(outcome.tables.split("\n") if outcome.tables else [])
-    for row in [row for row in outcome.rows if row["error"] is not None][:5]:
+    for row in islice((row for row in outcome.rows if row["error"] is not None), 5):
         (complain if is_quiet() else note)(f"a run failed: {row['error']}")
     parts = [f"{len(outcome.rows)} runs", f"{outcome.resumed} done before" if outcome.resumed else ""]
     parts += [f"{outcome.failed} failed" if outcome.failed else "", f"written to {folder}"]

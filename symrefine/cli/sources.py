@@ -59,7 +59,7 @@ def _local(path: str, recursive: bool) -> dict[str, str]:
             raise InputError(f"{missing[0]}: no such directory, file or pattern")
         return {name: name for name in files}
     found = folder.rglob("*") if recursive else folder.glob("*")
-    names = [p.relative_to(folder) for p in found if _is_ours(p) and p.is_file()]
+    names = (p.relative_to(folder) for p in found if _is_ours(p) and p.is_file())
     shown = sorted(name.as_posix() for name in names if not any(part.startswith(".") for part in name.parts))
     return {name: str(folder / name) for name in shown}
 
@@ -80,7 +80,7 @@ def _one_of(*known: str) -> Callable[[str], str]:
 
 
 # Columns of a manifest, and what reads them: what is told of an object, and the options of `detect` by their names.
-_TOLD: Mapping[str, Callable[[str], Any]] = {"id": str, "scale": values.positive}
+_TOLD: Mapping[str, Callable[[str], Any]] = {"id": str, "scale": values.millimetres}
 _OPTIONS: Mapping[str, Callable[[str], Any]] = {
     "tolerance": values.tolerance,
     "units": _one_of(*METRES),

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from symrefine.cli.export import detected
-from symrefine.cli.outputs import check_outputs, json_writer, note, tell, write_all
+from symrefine.cli.outputs import check_outputs, json_writer, note, shown, shown_writers, tell, write_all
 from symrefine.cli.signs import waiting
 from symrefine.cli.values import add_detection_options, add_frame_option, add_path, detection_options
 
@@ -28,6 +28,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--group", metavar="NAME", help="make only this subgroup of what was found exact, such as Cs")
     parser.add_argument("--json", metavar="FILE|-", help="write the figures as JSON; - is stdout, with no table")
+    parser.add_argument("--picture", metavar="FILE.png", help="write a picture of the exact shape")
+    parser.add_argument(
+        "--report",
+        metavar="FILE.html",
+        help="write a page with a model that turns: the shape as it was, and what was found in it",
+    )
     add_frame_option(parser)
     add_detection_options(parser)
 
@@ -38,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     from symrefine.front.lines import summary
     from symrefine.front.made import symmetrize
 
-    check_outputs({"--out": args.out, "--json": args.json}, [Path(args.path)])
+    check_outputs({"--out": args.out, "--json": args.json} | shown(args), [Path(args.path)])
     check_suffix(out := Path(args.out))
     with waiting("detecting"):
         shape, detection = detected(args)
@@ -47,7 +53,8 @@ def run(args: argparse.Namespace) -> int:
         )
         check_suffix(out, made.shape)
         record = made.to_dict(options=detection_options(args) | {"group": args.group})
-        write_all(writers := {args.out: made.writer(out.suffix.lower())} | json_writer(args.json, record))
+        model = {args.out: made.writer(out.suffix.lower())}
+        write_all(writers := model | shown_writers(args, made) | json_writer(args.json, record))
     tell(args.json, record, summary(record), writers)
     if not keeps_labels(out.suffix.lower(), shape):
         note("labels are not written")

@@ -5,7 +5,7 @@ import math
 from typing import Any, Literal
 
 from symrefine.errors import InputError
-from symrefine.units import LARGEST_TOLERANCE, METRES, TOLERANCE, read_length
+from symrefine.units import LARGEST_TOLERANCE, LEAST_MM, METRES, MOST_MM, TOLERANCE, read_length
 
 
 def add_detection_options(parser: argparse.ArgumentParser, counts_as: str = "symmetric") -> None:
@@ -193,6 +193,16 @@ def positive(text: str) -> float:
     value = _float(text)
     if not 0.0 < value < math.inf:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
+    return value
+
+
+def millimetres(text: str) -> float:
+    """Millimetres in one unit of a file."""
+    value = _float(text)
+    if not LEAST_MM <= value <= MOST_MM:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a number of millimetres from {LEAST_MM:g} to {MOST_MM:g}, such as 1000"
+        )
     return value
 
 

@@ -26,7 +26,7 @@ from symrefine.geometry import Array, Isometry, corners, frame_with_z, rotation,
 from symrefine.groups import PointGroup
 from symrefine.shape import Shape
 from symrefine.symmetrize import exact_place
-from symrefine.units import EVERYDAY_M, METRES
+from symrefine.units import EVERYDAY_M, METRES, check_scale
 
 Entry = dict[str, Any]
 
@@ -48,8 +48,7 @@ def bop_entry(detection: Detection, shape: Shape, *, scale: float = 1.0) -> Entr
     Raises:
         InputError: the scale is not positive, or the detection was undecided.
     """
-    if not (math.isfinite(scale) and scale > 0.0):
-        raise InputError(f"scale is {scale}; expected millimetres in one unit of the file, such as 1 or 1000")
+    check_scale(scale)
     group, center = decided(detection, shape)
     return placed_entry(group, center * scale, shape.points * scale)
 

@@ -6,6 +6,7 @@ from symrefine.errors import InputError
 from symrefine.export.models import npz_bytes
 from symrefine.geometry import Array, homogeneous
 from symrefine.groups import PointGroup
+from symrefine.groups.names import MAX_FOLD
 
 # Turns that stand for a continuous axis: every five degrees, as FoundationPose samples one.
 STEPS = 72
@@ -17,10 +18,10 @@ def motions(group: PointGroup, center: Array, *, improper: bool = False, steps: 
     A continuous axis is given by `steps` turns, a sphere by the 60 rotations of an icosahedron.
 
     Raises:
-        InputError: fewer than one step.
+        InputError: fewer than one step, or more turns than a group can have.
     """
-    if steps < 1:
-        raise InputError(f"steps is {steps}; expected at least 1 turn for a continuous axis")
+    if not 1 <= steps <= MAX_FOLD:
+        raise InputError(f"steps is {steps}; expected 1 to {MAX_FOLD} turns for a continuous axis")
     kept = group if improper else group.proper_subgroup()
     return homogeneous((kept if kept.is_finite else kept.sampled(steps)).operations(), center)
 

@@ -18,6 +18,7 @@ from symrefine.export.models import check_suffix, model_bytes, moved, npz_bytes
 from symrefine.export.operations import STEPS, motions_bytes, motions_limits, reflections_left_out
 from symrefine.files import check_target, json_text, write_all
 from symrefine.shape import Shape
+from symrefine.units import check_scale
 
 SCHEMA = "symrefine.canonical/1"
 Format = Literal["bop", "npz", "canonical", "foundationpose", "megapose", "dope", "isaac"]
@@ -63,6 +64,7 @@ def package_of(
         raise InputError(f"to is {to!r}; expected one of {list(get_args(Format))}")
     if improper and to != "npz":
         raise InputError(f"improper does not apply to {to!r}; it is for 'npz'")
+    check_scale(scale)
     if to == "bop":
         made = bop_package(out, detection, shape, number=number, scale=scale)
     elif to == "npz":

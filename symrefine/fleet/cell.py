@@ -102,6 +102,9 @@ def _serve(pipe: Connection, memory: int | None, folder: str) -> None:
             work, parcel = pipe.recv()
         except EOFError:
             return
+        except MemoryError:  # not enough to import what it is asked for
+            pipe.send(out_of_memory(memory))
+            continue
         except Exception as error:  # noqa: BLE001 - what it is sent cannot be imported here
             pipe.send(SymrefineError(one_line(f"a worker process cannot take its task: {error}")))
             continue

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from symrefine.errors import InputError
 
+# Seconds: a system is told how long to wait in milliseconds, by a number of 31 bits.
+LONGEST = 2**31 // 1000
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -56,8 +58,10 @@ def check_limits(limits: Limits) -> None:
     """Refuse a limit that this system cannot hold.
 
     Raises:
-        InputError: memory, elsewhere than on Linux.
+        InputError: memory, elsewhere than on Linux; more time than it can wait.
     """
+    if limits.seconds is not None and limits.seconds > LONGEST:
+        raise InputError(f"a limit of time of {limits.seconds:g} s is more than {LONGEST:,}, 24 days; leave it out")
     if limits.memory is not None and sys.platform != "linux":
         raise InputError(f"a limit of memory needs Linux, this is {sys.platform}; leave it out")
 

@@ -2,18 +2,16 @@
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence, Set
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass, field
 from hashlib import sha256
 from json import dumps
 from typing import Any
 
 from symrefine.errors import InputError
-from symrefine.fleet.journal import Row
+from symrefine.fleet.rows import Row, Rows
 
 PART = "part"
-# The rows of a task by their numbers: 0 alone, or as many as it says.
-Pieces = dict[int, Row]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,9 +37,12 @@ class Whole:
     digest: str
 
     @classmethod
-    def of(cls, tasks: int, about: Any) -> "Whole":
-        """The fleet of so many tasks that plain data tell about."""
-        return cls(tasks=tasks, digest=sha256(dumps(about, sort_keys=True).encode()).hexdigest()[:12])
+    def of(cls, tasks: int, about: Iterable[Any]) -> "Whole":
+        """The fleet of so many tasks that plain data tell about, one after the other."""
+        digest = sha256()
+        for part in about:
+            digest.update(dumps(part, sort_keys=True).encode() + b"\n")
+        return cls(tasks=tasks, digest=digest.hexdigest()[:12])
 
     def mark(self, shard: Shard | None, index: int) -> Row:
         """What a row says of its place; nothing where there are no shards."""
@@ -59,66 +60,97 @@ def piece(mark: Row, number: int, of: int) -> Row:
     return mark | {"piece": number, "pieces": of}
 
 
-def merged(parts: Mapping[str, Sequence[Row]]) -> list[Row]:
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """What the rows of a task say of it: one for all tasks of a shard that have as many rows."""
+
+    fleet: str
+    tasks: int
+    shard: str
+    pieces: int | None
+
+    @property
+    def of(self) -> int:
+        return int(self.shard.partition("/")[2])
+
+
+@dataclass(slots=True)
+class _Task:
+    """Where the rows of a task stand: the part, and which there by their number: 0 alone, or as many as it says."""
+
+    part: str
+    place: _Place
+    rows: dict[int, int] = field(default_factory=dict)
+
+    @property
+    def is_complete(self) -> bool:
+        return len(self.rows) == (self.place.pieces or 1)
+
+
+def merged(parts: Mapping[str, Sequence[Row]]) -> Rows:
     """The rows of all tasks in their order, without their marks; what was done again in one part counts as it was last.
 
     Args:
-        parts: the rows of each part, by the name of its file.
+        parts: the rows of each part, by the name of its file; they are asked for twice.
 
     Raises:
         InputError: a part is no part, or of another fleet; parts overlap, or some tasks are missing.
     """
-    places: dict[int, tuple[str, Pieces]] = {}
-    first: tuple[str, Row] | None = None
+    tasks: dict[int, _Task] = {}
+    first: _Task | None = None
     for name, rows in parts.items():
-        for index, pieces in _latest(name, rows).items():
-            mark = next(iter(pieces.values()))[PART]
-            first = first or (name, mark)
-            _check_same(first, (name, mark))
-            other, _ = places.setdefault(index, (name, pieces))
+        for index, task in _latest(name, rows).items():
+            first = first or task
+            _check_same(first, task)
+            other = tasks.setdefault(index, task).part
             if other != name:
                 raise InputError(
-                    f"{name}: has rows of shard {mark['shard']}, and so has {other}; merge takes each once"
+                    f"{name}: has rows of shard {task.place.shard}, and so has {other}; merge takes each once"
                 )
     if first is None:
         raise InputError(f"{next(iter(parts), 'merge')}: holds no rows; there is nothing to merge")
-    _check_complete(first[1], {index for index, (_, pieces) in places.items() if _is_complete(pieces)})
-    whole = (pieces[number] for _, (_, pieces) in sorted(places.items()) for number in sorted(pieces))
-    return [{key: value for key, value in row.items() if key != PART} for row in whole]
+    _check_complete(first.place, {index for index, task in tasks.items() if task.is_complete})
+    order = [(task.part, task.rows[number]) for _, task in sorted(tasks.items()) for number in sorted(task.rows)]
+
+    def unmarked(k: int) -> Row:
+        part, place = order[k]
+        return {key: value for key, value in parts[part][place].items() if key != PART}
+
+    return Rows(len(order), unmarked)
 
 
-def _latest(name: str, rows: Sequence[Row]) -> dict[int, Pieces]:
-    """The rows of each task of a part; they all say of how many they are, as the last one does."""
-    found: dict[int, Pieces] = {}
-    for row in rows:
+def _latest(name: str, rows: Sequence[Row]) -> dict[int, _Task]:
+    """The tasks of a part with their last rows; these all say of how many they are, as the last one does."""
+    found: dict[int, _Task] = {}
+    known: dict[_Place, _Place] = {}
+    for k, row in enumerate(rows):
         mark = row.get(PART)
         if mark is None:
             raise InputError(f"{name}: holds rows of no shard; merge takes what --shard wrote")
         if not _is_whole(mark):
             raise InputError(f"{name}: is damaged: a row says that its place is {mark}")
-        pieces = found.setdefault(mark["index"], {})
-        if any(other[PART].get("pieces") != mark.get("pieces") for other in pieces.values()):
-            pieces.clear()
-        pieces[mark.get("piece", 0)] = row
+        place = _Place(mark["fleet"], mark["tasks"], mark["shard"], mark.get("pieces"))
+        place = known.setdefault(place, place)
+        task = found.setdefault(mark["index"], _Task(name, place))
+        if task.place.pieces != place.pieces:
+            task.rows.clear()
+        task.place = place
+        task.rows[mark.get("piece", 0)] = k
     return found
 
 
-def _is_complete(pieces: Pieces) -> bool:
-    return len(pieces) == next(iter(pieces.values()))[PART].get("pieces", 1)
+def _check_same(first: _Task, other: _Task) -> None:
+    own, its = first.place, other.place
+    if (own.fleet, own.tasks, own.of) != (its.fleet, its.tasks, its.of):
+        said = [f"{place.fleet} of {place.tasks} tasks in {place.of} shards" for place in (its, own)]
+        raise InputError(f"{other.part}: is part of another fleet, {said[0]}; {first.part} is part of {said[1]}")
 
 
-def _check_same(first: tuple[str, Row], other: tuple[str, Row]) -> None:
-    (name, mark), (foreign, its) = first, other
-    if any(mark[key] != its[key] for key in ("fleet", "tasks")) or _of(mark) != _of(its):
-        said = [f"{m['fleet']} of {m['tasks']} tasks in {_of(m)} shards" for m in (its, mark)]
-        raise InputError(f"{foreign}: is part of another fleet, {said[0]}; {name} is part of {said[1]}")
-
-
-def _check_complete(mark: Row, done: Set[int]) -> None:
-    of = _of(mark)
+def _check_complete(place: _Place, done: Set[int]) -> None:
+    of = place.of
     found = Counter(index % of for index in done)
-    for number in range(1, of + 1):
-        tasks = len(range(number - 1, mark["tasks"], of))
+    for number in range(1, min(of, place.tasks) + 1):
+        tasks = len(range(number - 1, place.tasks, of))
         if missing := tasks - found[number - 1]:
             shard = Shard(number=number, of=of)
             raise InputError(
@@ -135,7 +167,7 @@ def _is_whole(mark: Any) -> bool:
     kinds |= {"piece": int, "pieces": int} if "pieces" in mark else {}
     if {name: type(value) for name, value in mark.items()} != kinds or not _is_piece(mark):
         return False
-    shard = re.fullmatch(r"([1-9][0-9]*)/([1-9][0-9]*)", mark["shard"])
+    shard = re.fullmatch(r"([1-9][0-9]{0,5})/([1-9][0-9]{0,5})", mark["shard"])
     if shard is None or not 0 <= mark["index"] < mark["tasks"]:
         return False
     return Shard(number=int(shard[1]), of=int(shard[2])).takes(mark["index"])
@@ -143,7 +175,3 @@ def _is_whole(mark: Any) -> bool:
 
 def _is_piece(mark: Row) -> bool:
     return 0 <= mark.get("piece", 0) < mark.get("pieces", 1)
-
-
-def _of(mark: Row) -> int:
-    return int(mark["shard"].partition("/")[2])

@@ -5,8 +5,9 @@ from functools import cache
 from typing import TypeVar
 
 from symrefine.fleet.crew import Executor
-from symrefine.fleet.journal import Journal, Row
+from symrefine.fleet.journal import Journal
 from symrefine.fleet.limits import Limits, Lost, spelled
+from symrefine.fleet.rows import Row
 
 P = TypeVar("P")
 

@@ -12,6 +12,8 @@ Flags = NDArray[np.bool_]
 
 # Relative to the polygon's own area: far above rounding, far below any corner that is meant to be concave.
 FLAT = 1e-9
+# Squares of the numbers of corners of all outlines that are cut ear by ear, together: two seconds or so.
+MOST = 10_000**2
 
 
 def triangulate(content: Content, faces: Polygons) -> tuple[Index, Index]:
@@ -21,7 +23,7 @@ def triangulate(content: Content, faces: Polygons) -> tuple[Index, Index]:
     flat; other polygons are fans where convex, cut ear by ear where not.
 
     Raises:
-        InputError: fewer than three corners; outlines that cross themselves.
+        InputError: fewer than three corners; outlines that cross themselves, or are cut ear by ear and too long.
     """
     few = np.flatnonzero(faces.counts < 3)
     if few.size:
@@ -31,9 +33,18 @@ def triangulate(content: Content, faces: Polygons) -> tuple[Index, Index]:
     quads = np.flatnonzero(faces.counts == 4)
     pieces = [_gather(faces, triples, 3), _quads(content, faces, quads)]
     owners = [triples, np.repeat(quads, 2)]
+    steps, starts = 0, faces.starts
     for row in np.flatnonzero(faces.counts > 4).tolist():
-        corners = faces.corners[faces.starts[row] :][: faces.counts[row]]
-        local = _polygon(content.points[corners])
+        corners = faces.corners[starts[row] :][: faces.counts[row]]
+        local, outline = _fan(content.points[corners])
+        if len(outline):
+            steps += len(outline) ** 2
+            if steps > MOST:
+                raise InputError(
+                    f"{content.name('face', row)} is concave and has {len(outline):,} corners; all such faces together "
+                    f"may take {MOST:,} steps, the square of the corners of each: split it into triangles"
+                )
+            local = _clip_ears(outline)
         if len(local) == 0:
             raise _crossing(content, row)
         pieces.append(corners[local])
@@ -88,20 +99,21 @@ def _inside(points: Array, halves: Index, normal: Array) -> Flags:
     return np.asarray((agrees | empty).all(axis=1) & (~cancels | empty.all(axis=1)))
 
 
-def _polygon(points: Array) -> Index:
-    """Triangles [n - 2, 3] of one polygon [n, 3]; none if its outline crosses itself."""
-    fan = np.array([(0, k, k + 1) for k in range(1, len(points) - 1)], dtype=np.int64)
+def _fan(points: Array) -> tuple[Index, Array]:
+    """Triangles [n - 2, 3] of one polygon [n, 3], none if its outline crosses itself; that [n, 2] if it is concave."""
+    inner, convex = np.arange(1, len(points) - 1), np.empty((0, 2))
+    fan = np.stack([np.zeros_like(inner), inner, inner + 1], axis=1)
     if negligible(points, fan).all():
-        return fan
+        return fan, convex
     following = np.roll(points, -1, axis=0)
     areas = np.cross(points - points[0], following - points[0])
     normal = areas.sum(axis=0)
     if np.linalg.norm(normal) <= FLAT * np.linalg.norm(areas, axis=1).sum():
-        return np.empty((0, 3), dtype=np.int64)
+        return fan[:0], convex
     flat = (points - points[0]) @ frame_with_z(normal)[:2].T
     if _is_convex(flat):
-        return fan
-    return np.empty((0, 3), dtype=np.int64) if _runs_twice(flat) else _clip_ears(flat)
+        return fan, convex
+    return fan[:0], convex if _runs_twice(flat) else flat
 
 
 def _runs_twice(flat: Array) -> bool:
@@ -122,30 +134,68 @@ def _is_convex(flat: Array) -> bool:
 
 def _clip_ears(flat: Array) -> Index:
     """Cut off the ear with the shortest diagonal until a triangle is left; nothing if there is no ear."""
-    ring = np.arange(len(flat))
+    corners = _Corners(flat)
     triangles = []
-    while len(ring) > 3:
-        before, after = np.roll(ring, 1), np.roll(ring, -1)
-        length = ((flat[after] - flat[before]) ** 2).sum(axis=1)
-        length[~_ears(flat[before], flat[ring], flat[after])] = np.inf
-        k = int(np.argmin(length))
-        if not np.isfinite(length[k]):
+    for _ in range(len(flat) - 3):
+        k = int(np.argmin(np.where(corners.occupants == 0, corners.diagonals, np.inf)))
+        if corners.occupants[k] or not np.isfinite(corners.diagonals[k]):
             return np.empty((0, 3), dtype=np.int64)
-        triangles.append((before[k], ring[k], after[k]))
-        ring = np.delete(ring, k)
-    a, b, c = flat[ring]
-    if _cross(b - a, c - a) < -FLAT * np.ptp(flat, axis=0).max() ** 2:
+        triangles.append(corners.cut(k))
+    a, b, c = flat[corners.left]
+    if _cross(b - a, c - a) < -corners.tolerance:
         return np.empty((0, 3), dtype=np.int64)
-    return np.array([*triangles, tuple(ring)], dtype=np.int64)
+    return np.array([*triangles, tuple(np.flatnonzero(corners.left))], dtype=np.int64)
 
 
-def _ears(a: Array, b: Array, c: Array) -> Flags:
-    """[n] corners b, between a and c, that turn left and whose triangle holds no other corner."""
-    tolerance = FLAT * np.ptp(b, axis=0).max() ** 2
-    ab, bc, ca = (_cross((v - u)[:, None], b[None] - u[:, None]) for u, v in ((a, b), (b, c), (c, a)))
-    # A corner on the diagonal would pinch what is left; one on the two sides belongs to a bridge to a hole.
-    occupied = ((ab > tolerance) & (bc > tolerance) & (ca > -tolerance)).any(axis=1)
-    return np.asarray((_cross(b - a, c - b) >= -tolerance) & ~occupied)
+class _Corners:
+    """The corners of an outline [n, 2] that are left, each with the triangle of its two neighbours and itself.
+
+    One that is cut off changes the triangles of two others, and leaves those that it stood in: n operations each time.
+
+    Attributes:
+        left: [n] whether a corner is not cut off.
+        diagonals: [n] squared distances of the two neighbours; infinite where the outline turns right, or is cut off.
+        occupants: [n] how many other corners a triangle holds.
+        tolerance: of twice an area.
+    """
+
+    def __init__(self, flat: Array) -> None:
+        count = len(flat)
+        self.tolerance = FLAT * float(np.ptp(flat, axis=0).max()) ** 2
+        # One on the diagonal would pinch what is left; one on the two sides belongs to a bridge to a hole.
+        self._least = np.array([[self.tolerance], [self.tolerance], [-self.tolerance]])
+        self._flat, self._before, self._after = flat, np.arange(-1, count - 1) % count, np.arange(1, count + 1) % count
+        self.left, self.diagonals = np.ones(count, dtype=bool), np.zeros(count)
+        self.occupants = np.zeros(count, dtype=np.int64)
+        # Along the normals of its sides a point of a triangle is farther than the sides are, which reach so far.
+        self._normals, self._reach = np.zeros((2, 3, count)), np.zeros((3, count))
+        self._look(np.arange(count))
+
+    def cut(self, k: int) -> tuple[int, int, int]:
+        """Cut off a corner; its triangle."""
+        a, c = int(self._before[k]), int(self._after[k])
+        self.occupants -= self._holds(slice(None), k)
+        self._after[a], self._before[c] = c, a
+        self.left[k], self.diagonals[k] = False, np.inf
+        self._look(np.array([a, c]))
+        return a, k, c
+
+    def _look(self, corners: Index) -> None:
+        """Look at corners whose neighbours are new."""
+        triangle = self._flat[np.stack([self._before[corners], corners, self._after[corners]])]
+        sides = np.roll(triangle, -1, axis=0) - triangle
+        turns_left = _cross(sides[0], sides[1]) >= -self.tolerance
+        self.diagonals[corners] = np.where(turns_left, (sides[2] ** 2).sum(axis=1), np.inf)
+        self._normals[:, :, corners] = np.stack([-sides[..., 1], sides[..., 0]])
+        self._reach[:, corners] = _cross(sides, triangle)
+        for corner in corners:
+            self.occupants[corner] = np.count_nonzero(self._holds(slice(corner, corner + 1), slice(None)) & self.left)
+
+    def _holds(self, corners: slice, points: int | slice) -> Flags:
+        """Which triangles hold a point, or which points a triangle holds."""
+        x, y = self._flat[points].T
+        across = self._normals[0, :, corners] * x + self._normals[1, :, corners] * y
+        return np.asarray((across - self._reach[:, corners] > self._least).all(axis=0))
 
 
 def _cross(u: Array, v: Array) -> Array:

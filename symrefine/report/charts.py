@@ -80,10 +80,9 @@ def decision_chart(
     reached = {name: min(t for t, at in steps if at == name) for _, name in steps}
     rows = sorted(rows, key=lambda row: (reached.get(row[0], math.inf), row[2])) if steps else rows
     forgives = ["forgives"] if any(forgiven for _, _, forgiven in groups) else []
-    heads = ["group", "probability", *forgives, *(f"{100 * t:g} %" for t, _ in steps)]
-    first = len(heads) - len(steps)
-    head = "".join(
-        f'<th scope="col"{_asked(k - first, steps, tolerance)}>{escape(h)}</th>' for k, h in enumerate(heads)
+    head = "".join(f'<th scope="col">{title}</th>' for title in ("group", "probability", *forgives))
+    head += "".join(
+        f'<th scope="col"{_asked(t == tolerance)}>{100 * t:g}<span class="unit"> %</span></th>' for t, _ in steps
     )
     body = "".join(_decided(row, steps, tolerance, bool(forgives), row[0] == answer) for row in rows)
     return (
@@ -106,13 +105,13 @@ def _decided(
         for t, at in steps
     )
     strong = ' class="answer"' if answer else ""
-    title = "undetermined" if name == "undetermined" else name.replace("inf", "∞")
-    return f'<tr{strong}><th scope="row">{escape(title)}</th><td>{share}</td>{needs}{cells}</tr>'
+    title = "undeter&shy;mined" if name == "undetermined" else escape(name.replace("inf", "∞"))
+    return f'<tr{strong}><th scope="row">{title}</th><td>{share}</td>{needs}{cells}</tr>'
 
 
-def _asked(column: int, steps: Sequence[tuple[float, str]], tolerance: float) -> str:
+def _asked(is_asked: bool) -> str:
     """The mark of the column of the tolerance that was asked for."""
-    return ' class="asked"' if column >= 0 and steps[column][0] == tolerance else ""
+    return ' class="asked"' if is_asked else ""
 
 
 def _svg(title: str, width: int, height: int, parts: Sequence[str]) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from hashlib import file_digest, sha256
 from pathlib import Path
+from types import NoneType
 from typing import Any, cast
 
 from symrefine.errors import InputError
@@ -22,6 +23,11 @@ ROWS, DECISIONS, INFO, LABELS, PAGE, PICTURES = (
     "review.html",
     "pictures",
 )
+# What every row has.
+_KINDS: journal.Kinds = {
+    "object": (int,), "file": (str,), "sha256": (str, NoneType), "error": (str, NoneType), "version": (str,),
+    "options": (dict,), "answer": (str, NoneType), "confidence": (float, int), "doubt": (str,), "choices": (list,),
+}  # fmt: skip
 
 
 @contextmanager
@@ -41,8 +47,7 @@ def opened(out: Path) -> Iterator[journal.Journal]:
     if taken and not rows.exists():
         raise InputError(f"{out}: has a {taken[0]} that `symrefine label` did not write there; name another folder")
     check_target(rows)
-    keys = ("object", "file")
-    with journal.opened(rows, keys, busy=busy, rows_of="`symrefine label`", other="another folder") as held:
+    with journal.opened(rows, _KINDS, "object", busy=busy, rows_of="`symrefine label`", other="another folder") as held:
         (out / PICTURES).mkdir(exist_ok=True)
         yield held
 

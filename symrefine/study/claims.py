@@ -31,7 +31,8 @@ class Verdict:
 def judge(claim: Claim, rows: Sequence[Row], experiment: Experiment) -> Verdict:
     """Our figure and those of others, and whether ours is as expected; a failed run of ours is a miss."""
     own, *others = (
-        chosen(chosen(rows, claim.where, experiment), who, experiment) for who in (claim.ours, *claim.peers.values())
+        chosen(rows, (claim.where, who), experiment, [claim.value.column])
+        for who in (claim.ours, *claim.peers.values())
     )
     ours = summarise(own, claim.value)
     met = None

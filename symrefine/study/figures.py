@@ -53,7 +53,8 @@ def draw(figure: Figure, rows: Sequence[Row], experiment: Experiment, path: Path
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Canvas
 
-    done = [row for row in chosen(rows, figure.where, experiment) if row["error"] is None]
+    columns = ("run", figure.by, figure.x, figure.y.column)
+    done = [row for row in chosen(rows, [figure.where], experiment, columns) if row["error"] is None]
     with mpl.rc_context(_STYLE):
         canvas = Canvas(figsize=(7.2, 4.2), dpi=120, layout="constrained")
         FigureCanvasAgg(canvas)
@@ -77,11 +78,12 @@ def _lines(axes: "Axes", figure: Figure, groups: Mapping[Any, Sequence[Row]]) ->
 
 def _points(figure: Figure, rows: Sequence[Row]) -> list[tuple[Any, Any]]:
     """(x, y) for each value of x that has a y, in order."""
-    values = [value for row in rows if (value := row.get(figure.x)) is not None]
-    steps = list(dict.fromkeys(values))
-    if not any(isinstance(value, str) for value in steps):
-        steps.sort()
-    found = [(x, summarise([row for row in rows if row.get(figure.x) == x], figure.y).values) for x in steps]
+    steps: dict[Any, list[Row]] = {}
+    for row in rows:
+        if (x := row.get(figure.x)) is not None:
+            steps.setdefault(x, []).append(row)
+    order = steps if any(isinstance(x, str) for x in steps) else sorted(steps)
+    found = [(x, summarise(steps[x], figure.y).values) for x in order]
     return [(x, values[0]) for x, values in found if values]
 
 

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields
 from itertools import product
 from pathlib import Path
@@ -179,6 +179,8 @@ def select(where: Node, experiment: Experiment) -> Callable[[Row], bool]:
     return lambda row: all(row[name] in values for name, values in picked.items())
 
 
-def chosen(rows: Sequence[Row], where: Node, experiment: Experiment) -> list[Row]:
-    """The rows that a `where` picks."""
-    return list(filter(select(where, experiment), rows))
+def chosen(rows: Sequence[Row], wheres: Iterable[Node], experiment: Experiment, columns: Iterable[str]) -> list[Row]:
+    """The rows that every `where` picks, of each these columns as far as it has them, and `error`."""
+    picks = [select(where, experiment) for where in wheres]
+    names = frozenset({"error", *columns})
+    return [{k: v for k, v in row.items() if k in names} for row in rows if all(pick(row) for pick in picks)]

@@ -10,8 +10,10 @@ from typing import Any
 from symrefine.errors import InputError
 from symrefine.files import replacing
 from symrefine.fleet.crew import HERE, Executor
+from symrefine.fleet.journal import Latest
+from symrefine.fleet.rows import Rows
 from symrefine.fleet.shard import Shard, Whole
-from symrefine.fleet.table import csv_text
+from symrefine.fleet.table import write_table
 from symrefine.fleet.tasks import finish, is_final
 from symrefine.study.claims import Verdict, claims_table, judge, verdict_rows
 from symrefine.study.document import Node
@@ -33,9 +35,11 @@ Progress = Callable[[str, int, int], AbstractContextManager[Callable[[], None]]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What a study came to, and where it was written: rows of the finished runs, in the order of the sweep, with their
-    timings and without, as in rows.csv; Markdown as in tables.md, figures by title; how many of the runs had been done
-    before, and how many have an error.
+    """What a study came to, and where it was written.
+
+    Rows of the finished runs are in the order of the sweep, with their timings and without, as in rows.csv, and read
+    from the journal when asked for; Markdown is as in tables.md, figures by title. Told is, too, how many of the runs
+    had been done before, and how many have an error.
     """
 
     folder: Path
@@ -75,11 +79,12 @@ def run_study(
     stamp = Stamp(config=plan.config_hash, code=code, libraries=library_versions())
     _refuse_foreign(plan, folder)
     _make(folder)
-    fleet = Whole.of(len(plan.cases), asdict(stamp))
+    fleet = Whole.of(len(plan.cases), [asdict(stamp)])
     first = range(len(plan.cases) if limit is None else min(limit, len(plan.cases)))
     wanted = [index for index in first if shard is None or shard.takes(index)]
-    with opened(folder / JOURNAL, stamp, replace=replace) as (found, journal):
-        kept = {i: row for i, row in found.items() if is_final(row, executor.limits) and fleet.has(row, shard, i)}
+    with opened(folder / JOURNAL, stamp, len(plan.cases), replace=replace) as journal:
+        found = journal.latest
+        kept = {i for i, row in found.items() if is_final(row, executor.limits) and fleet.has(row, shard, int(i))}
         before = sum(index in kept for index in wanted)
         jobs = [
             parcel(plan.experiment, index, plan.cases[index], asdict(stamp) | fleet.mark(shard, index))
@@ -87,11 +92,9 @@ def run_study(
             if index not in kept
         ]
         with progress("running", len(wanted), before) as advance:
-            for row in finish(executor, attempt, jobs, lost, journal):
-                found[row["index"]] = row
+            for _ in finish(executor, attempt, jobs, lost, journal):
                 advance()
-        done = [Entry.of(found[index]) for index in sorted(found)]
-        return _write(plan, folder, stamp, done, measures, before, progress)
+        return _write(plan, folder, stamp, found, measures, before, progress)
 
 
 def _check(plan: Plan) -> list[Measure]:
@@ -143,28 +146,39 @@ def _write(
     plan: Plan,
     folder: Path,
     stamp: Stamp,
-    done: Sequence[Entry],
+    found: Latest,
     measures: Sequence[Measure],
     before: int,
     progress: Progress,
 ) -> Outcome:
     """Write rows first, then what is made of them."""
-    cases = [asdict(plan.cases[entry.index]) for entry in done]
+    order = sorted(found)
     about = {"config": stamp.config, "code": stamp.code, **stamp.libraries}
-    rows = [{**case, **about, "error": e.error, **e.results} for case, e in zip(cases, done, strict=True)]
-    _text(folder / "rows.csv", csv_text(rows))
-    _text(folder / "timings.csv", csv_text([{**case, **e.timings} for case, e in zip(cases, done, strict=True)]))
-    full = [{**row, **e.timings} for row, e in zip(rows, done, strict=True)]
+
+    def made(of: Callable[[Row, Entry], Row]) -> Rows:
+        """A row of each run, from its case and its entry."""
+
+        def make(k: int) -> Row:
+            entry = Entry.of(found[order[k]])
+            return of(asdict(plan.cases[entry.index]), entry)
+
+        return Rows(len(order), make)
+
+    rows = made(lambda case, entry: {**case, **about, "error": entry.error, **entry.results})
+    full = made(lambda case, entry: {**case, **about, "error": entry.error, **entry.results, **entry.timings})
+    _table(folder / "rows.csv", rows)
+    _table(folder / "timings.csv", made(lambda case, entry: {**case, **entry.timings}))
     check_columns(measures, full)
     study, experiment = plan.study, plan.experiment
     verdicts = [judge(claim, full, experiment) for claim in study.claims]
     tables = [markdown(table, full, experiment) for table in study.tables]
     if verdicts:
         tables.append(f"## Claims\n\n{claims_table(verdicts)}")
-        _text(folder / "claims.csv", csv_text(verdict_rows(verdicts)))
+        _table(folder / "claims.csv", verdict_rows(verdicts))
     if tables:
         _text(folder / "tables.md", "\n".join([f"# {study.title or study.experiment}\n", *tables]))
-    chosen = [plan.cases[entry.index] for entry in done if entry.error is None]
+    failed = frozenset(order[k] for k, row in enumerate(rows) if row["error"] is not None)
+    chosen = [plan.cases[int(index)] for index in order if index not in failed]
     figures = _figures(plan, folder, full, chosen, progress)
     _record(plan, folder, chosen, progress)
     return Outcome(
@@ -175,7 +189,7 @@ def _write(
         tables="\n".join(tables),
         figures=figures,
         resumed=before,
-        failed=sum(entry.error is not None for entry in done),
+        failed=len(failed),
     )
 
 
@@ -184,7 +198,7 @@ def _figures(
 ) -> dict[str, Path]:
     iterations = _trace(plan, chosen, progress)
     if iterations:
-        _text(folder / "traces.csv", csv_text(iterations))
+        _table(folder / "traces.csv", iterations)
     written = {}
     for figure in plan.study.figures:
         path = folder / f"{_slug(figure.title)}.png"
@@ -240,6 +254,11 @@ def _name(case: Any, cases: Sequence[Any]) -> str:
 
 def _slug(text: str, keep: str = "") -> str:
     return re.sub(rf"[^a-z0-9{re.escape(keep)}]+", "-", text.lower()).strip("-")
+
+
+def _table(path: Path, rows: Sequence[Row]) -> None:
+    with replacing(path) as draft:
+        write_table(rows, draft)
 
 
 def _text(path: Path, text: str) -> None:

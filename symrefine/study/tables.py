@@ -23,7 +23,8 @@ def check_tables(study: Study, experiment: Experiment) -> list[Measure]:
 
 def markdown(table: Table, rows: Sequence[Row], experiment: Experiment) -> str:
     """A table under its title, with the number of runs that failed."""
-    picked = chosen(rows, table.where, experiment)
+    needed = [*table.groups, *(measure.column for measure in table.values.values())]
+    picked = chosen(rows, [table.where], experiment, needed)
     # In the order in which the sweep came upon them.
     groups: dict[tuple[Scalar | None, ...], list[Row]] = {}
     for row in picked:

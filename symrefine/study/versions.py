@@ -35,14 +35,16 @@ def code_version(experiment: str, root: Path) -> str:
         experiment: name of the module.
         root: directory that the name counts from.
     """
-    top = (root / experiment.split(".")[0]).resolve()
-    files = [*_PACKAGE.rglob("*.py"), *(top.rglob("*.py") if top.is_dir() else root.resolve().glob("*.py"))]
+    package, dot, _ = experiment.partition(".")
+    # A folder of the name of a lone module is none of its code: its results may go there.
+    top = (root / package).resolve() if dot else root.resolve()
+    files = [*_PACKAGE.rglob("*.py"), *(top.rglob("*.py") if dot else top.glob("*.py"))]
     # A package that is installed inside of somebody's repository is no part of it.
     commit = _git("rev-parse", "--short=10", "HEAD") if _git("ls-files", "--error-unmatch", __file__) else None
     if commit is None:
         return f"symrefine {version('symrefine')}+{_digest(files)}"
     changes = _git("status", "--porcelain", "--untracked-files=all", "--", str(_PACKAGE), str(top))
-    if changes is None or not top.is_dir():  # the experiment stands outside of the package's repository
+    if changes is None or not dot:  # the experiment stands outside of the package's repository
         return f"{commit}+{_digest(files)}"
     dirty = any(line.rstrip('"').endswith(".py") for line in changes.splitlines())
     return f"{commit}+dirty.{_digest(files)}" if dirty else commit

@@ -8,8 +8,8 @@ from time import perf_counter
 from typing import Any
 
 from symrefine.errors import SymrefineError
-from symrefine.fleet.journal import Row
 from symrefine.fleet.limits import Lost
+from symrefine.fleet.rows import Row
 from symrefine.study.experiment import Experiment, load_experiment
 from symrefine.study.journal import Entry
 from symrefine.study.versions import LIBRARIES
