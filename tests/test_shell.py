@@ -151,6 +151,25 @@ def test_what_is_wrong_with_stdin_is_told(run: Run, folder: Path, monkeypatch: p
     assert_refused(run("detect", "-", "box.xyz", "--format", "xyz"), "stdin is one file")
 
 
+def test_either_object_of_an_alignment_may_come_on_stdin(
+    run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    box = (folder / "box.xyz").read_bytes()
+    one = json.loads(run("align", "box.xyz", "box.xyz", "--json", "-")[1])
+    for names, side in ((("-", "box.xyz"), "source"), (("box.xyz", "-"), "target")):
+        give(monkeypatch, box)
+        status, out, err = run("align", *names, "--format", "xyz", "--json", "-")
+        assert (status, err) == (0, "")
+        assert json.loads(out) | {"timings": 0} == one | {"timings": 0, side: "stdin"}
+    give(monkeypatch, box)
+    several = json.loads(run("align", "box.xyz", "box.xyz", "-", "--format", "xyz", "--json", "-")[1])
+    assert [each["target"] for each in several] == ["box.xyz", "stdin"]
+    assert_refused(run("align", "-", "-", "--format", "xyz"), "stands for 2 of A and B")
+    assert_refused(run("align", "box.xyz", "-", "-", "--format", "xyz"), "stands for 2 of A and B")
+    assert_refused(run("align", "-", "box.xyz"), "which has no suffix", "--format")
+    assert_refused(run("align", "box.xyz", "box.xyz", "--format", "xyz"), "is for an A or B that is -")
+
+
 # --- how loud it is ---------------------------------------------------------------------------------------------------
 
 

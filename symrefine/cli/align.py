@@ -8,7 +8,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from symrefine.cli.inputs import FRAMES, STDIN, Object, expanded, objects
+from symrefine.cli.inputs import FRAMES, STDIN, Object, expanded, loaded, objects
 from symrefine.cli.outputs import check_outputs, json_writer, tell, write_all
 from symrefine.cli.rows import MAP_HEAD, map_line
 from symrefine.cli.several import UNDETERMINED, Many, check_alone
@@ -38,8 +38,11 @@ _OK = "ok"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("source", metavar="A", help="mesh or point cloud to be moved")
-    parser.add_argument("target", metavar="B", nargs="+", help="meshes or point clouds to move it onto, or patterns")
+    parser.add_argument("source", metavar="A", help="mesh or point cloud to be moved; - is stdin")
+    parser.add_argument(
+        "target", metavar="B", nargs="+", help="meshes or point clouds to move it onto, or patterns; - is stdin"
+    )
+    parser.add_argument("--format", metavar="SUFFIX", help="what stdin holds where A or a B is -: ply, xyz, csv, ...")
     parser.add_argument(
         "--json",
         metavar="FILE|-",
@@ -73,8 +76,11 @@ def run(args: argparse.Namespace) -> int:
     clock = Clock()
     with counting("aligning", len(paths)) as doing:
         with clock("load"):
-            source = load(args.source, measure=args.measure, frame=args.source_frame)
-        given = objects(paths, None, partial(_targets, args=args))
+            read = partial(load, measure=args.measure, frame=args.source_frame)
+            source = loaded(args.source, args.format if args.source == STDIN else None, read)
+        given = chain.from_iterable(
+            objects([path], args.format if path == STDIN else None, partial(_targets, args=args)) for path in paths
+        )
         first = next(given)
         aligned = partial(_aligned, args, source, clock.seconds["load"])
         many = Many(
@@ -99,9 +105,12 @@ def run(args: argparse.Namespace) -> int:
 
 def _check(args: argparse.Namespace, paths: Sequence[str]) -> None:
     """Refuse, before any work, outputs that cannot be written or do not fit together, and what is for one pair."""
-    if STDIN in (args.source, *paths):
-        raise InputError("-: align reads files; write what comes on stdin to one, with its suffix")
-    check_outputs({"--json": args.json} | _of_one(args), [Path(path) for path in (args.source, *paths)])
+    piped = [args.source, *paths].count(STDIN)
+    if piped > 1:
+        raise InputError(f"-: stands for {piped} of A and B, and stdin is one file; write the others to files")
+    if args.format is not None and not piped:
+        raise InputError(f"--format {args.format}: is for an A or B that is -; files have their suffix")
+    check_outputs({"--json": args.json} | _of_one(args), [Path(p) for p in (args.source, *paths) if p != STDIN])
     if len(paths) > 1:
         check_alone(_of_one(args), f"B names {len(paths)}", "call `align` for each")
     for name, suffix in _OF_ONE.items():
