@@ -20,6 +20,8 @@ from symrefine.align.procrustes import procrustes
 from symrefine.align.sides import side_of
 from symrefine.align.span import monomial_pair, span_fit
 from symrefine.align.story import Alignment, align
+from symrefine.decide.maps import Merit, said_by_both, score
+from symrefine.decide.maps import as_good as as_well
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, householder, line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.groups.orthogonal import chord_angles
@@ -660,6 +662,20 @@ def test_what_is_seen_of_a_symmetric_object_leaves_its_equivalents(det: int) -> 
         assert min(angle_deg(m, matrix @ np.diag(signs)) for m in found.equivalents) < 0.3
     assert f"{len(found.equivalents)} maps" in found.observable
     assert "the determinant is free" in found.observable
+
+
+def test_of_maps_that_may_all_be_right_the_one_that_neither_side_denies_comes_first() -> None:
+    # A knob that the source shows, laid where the target shows that there is nothing: but for what the source says of
+    # it the map is as good as the true one. Clutter of the target denies both alike.
+    def seen(clutter: float, *, denied: float) -> list[Merit]:
+        return [Merit(well=0.6, less=0.1, nothing=denied), Merit(well=0.6 + denied / 5.0, less=0.05, nothing=clutter)]
+
+    for clutter in (0.0, 0.3):
+        true, wrong = seen(clutter, denied=0.0), seen(clutter, denied=0.02)
+        assert as_well(score(true), score(wrong))
+        assert as_well(score(wrong), score(true))
+        assert said_by_both(true) > said_by_both(wrong)
+    assert score(seen(0.0, denied=0.02)) > score(seen(0.0, denied=0.0))
 
 
 def test_a_camera_that_saw_free_space_denies_what_borders_leave_open() -> None:

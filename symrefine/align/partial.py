@@ -14,7 +14,7 @@ import numpy as np
 from symrefine.align.alignment import OK, OPEN
 from symrefine.align.pair import THIN, Evidence, Side
 from symrefine.align.polish import Similarity, polish
-from symrefine.decide.maps import Merit, ahead, as_good, fits, score
+from symrefine.decide.maps import Merit, ahead, as_good, fits, said_by_both, score
 from symrefine.detection.measure import SAMPLES
 from symrefine.fit.matching import AGREE
 from symrefine.geometry import Array, Isometry, Mask, householder, tight_diagonal
@@ -164,8 +164,8 @@ class Meeting:
     """The map that two surfaces which share a part agree upon best.
 
     Attributes:
-        best: the map.
-        equals: others that do about as well.
+        best: the map; of those that do about as well the one that both surfaces together say most for.
+        equals: the others.
         confidence: probability that it is right, or one of those.
         determinant_confidence: probability that its determinant is.
         slides: whether it does as well where it slides or turns a little.
@@ -345,13 +345,15 @@ def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool
     others = [r.score for r in rivals if r not in alike]
     slides = best.is_loose or ahead(best.score, [slid]) < 0.5
     certain = 0.0 if slides else fitting * ahead(best.score, [*others, slid])
-    other_hand = [r.score for r in rivals if r.determinant != best.determinant]
+    every = [best, *(r for r in alike if reflections or r.determinant > 0)]
+    first = max(every, key=lambda m: said_by_both(m.sides))
+    other_hand = [m.score for m in (best, *rivals) if m.determinant != first.determinant]
     return Meeting(
-        best=best,
-        equals=tuple(r for r in alike if reflections or r.determinant > 0),
+        best=first,
+        equals=tuple(m for m in every if m is not first),
         confidence=certain,
         # Where nothing fits, either is as likely; where one is not admitted, nobody asks.
-        determinant_confidence=0.5 + fitting * (max(ahead(best.score, other_hand), 0.5) - 0.5) if reflections else 1.0,
+        determinant_confidence=0.5 + fitting * (max(ahead(first.score, other_hand), 0.5) - 0.5) if reflections else 1.0,
         slides=slides,
         status=OK if certain > 0.5 else _doubt(best, rivals, fitting, slides, open_),
     )

@@ -57,6 +57,11 @@ def score(sides: Sequence[Merit]) -> float:
     return max(side.score for side in sides)
 
 
+def said_by_both(sides: Sequence[Merit]) -> float:
+    """What orders maps that may all be right: clutter denies each of them alike, a side without any only wrong ones."""
+    return sum(side.score for side in sides)
+
+
 def fits(sides: Sequence[Merit]) -> float:
     """Probability that two surfaces do not meet so by chance."""
     return max(side.fits for side in sides)
