@@ -12,14 +12,13 @@ from functools import cached_property
 import numpy as np
 
 from symrefine.align.alignment import OK, OPEN
-from symrefine.align.pair import THIN, Evidence, Side
+from symrefine.align.pair import THIN, Evidence, Side, sampled
 from symrefine.align.polish import Similarity, polish
 from symrefine.decide.maps import Merit, ahead, as_good, fits, said_by_both, score
 from symrefine.detection.measure import SAMPLES
 from symrefine.fit.matching import AGREE
 from symrefine.geometry import Array, Isometry, Mask, householder, tight_diagonal
 from symrefine.groups.orthogonal import chord_angles
-from symrefine.moments.quadrature import sample_surface
 from symrefine.propose.consensus import Matches, Proposal, consensus
 from symrefine.propose.signatures import mutual_matches, signatures
 from symrefine.propose.votes import mirror_votes
@@ -81,15 +80,14 @@ class Shown:
     def of(cls, side: Side, unit: float, seed: int) -> "Shown | None":
         """What a mesh or cloud shows; None if its points fill a volume."""
         rng = np.random.default_rng(seed)
-        points, normals, views, weights = side.shape.points, side.shape.normals, side.shape.viewpoint, None
+        shape, weights = side.shape, None
         if side.is_mesh:
-            points, normals = sample_surface(side.shape, SAMPLES, rng)[0], None
+            shape = sampled(shape, SAMPLES, rng)
         else:
-            seen = sampling(points, np.random.default_rng(0), outliers=True, groups=False, asked=ASKED)
-            points, weights = points[seen.even], seen.shares
-            normals, views = (None if v is None else v[seen.even] for v in (normals, views))
-        local = (points - side.moments.center) / unit
-        skin = make_skin(local, rng, normals=normals, thin=THIN)
+            seen = sampling(shape.points, np.random.default_rng(0), outliers=True, groups=False, asked=ASKED)
+            shape, weights = shape.chosen(seen.even), seen.shares
+        local, normals, views = (shape.points - side.moments.center) / unit, shape.normals, shape.viewpoint
+        skin = make_skin(local, rng, normals=normals, labels=shape.labels, thin=THIN)
         if not side.is_mesh and normals is None and fills_volume(local, skin.tree, np.random.default_rng(0)):
             return None
         cloud = skin.local_planes(drawn(len(local), PLANES, rng, weights))
@@ -122,7 +120,7 @@ class Shown:
     @cached_property
     def noise(self) -> Array:
         """Distances [M] of the local planes to the discs of all others: what sampling alone misses by."""
-        return disc_distances(self.cloud, self.cloud.points, skip_self=True)
+        return disc_distances(self.cloud, self.cloud.points, self.cloud.labels, skip_self=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -213,8 +211,9 @@ def partial_meeting(evidence: Evidence, *, reflections: bool) -> Meeting | None:
 def proposals(source: Shown, target: Shown, diagonal: float) -> list[Proposal]:
     """Maps of either determinant that local planes which look alike agree upon."""
     a, b = source.cloud, target.cloud
-    looks = (signatures(cloud, AROUND * diagonal) for cloud in (a, b))
-    i, j = (m[:MATCHES] for m in mutual_matches(*looks))
+    source_looks, target_looks = (signatures(cloud, AROUND * diagonal) for cloud in (a, b))
+    classes = None if a.labels is None or b.labels is None else (a.labels, b.labels)
+    i, j = (m[:MATCHES] for m in mutual_matches(source_looks, target_looks, classes))
     matches = Matches(source=a.points[i], source_normals=a.normals[i], target=b.points[j], target_normals=b.normals[j])
     return consensus(matches, WITHIN * diagonal)
 
@@ -242,8 +241,9 @@ class Judge:
 
     def _meets(self, motion: Similarity) -> Mask:
         """Which of every so many local planes of the source meet others of the target, as they stand."""
-        some = self.source.cloud.chosen(slice(None, None, LOOK))
-        away, met = self.target.cloud.met_by(motion.apply(some.points))
+        every = slice(None, None, LOOK)
+        some, classes = self.source.cloud.chosen(every), self.source.cloud.classes(every)
+        away, met = self.target.cloud.met_by(motion.apply(some.points), classes)
         facing = np.abs(np.einsum("ij,ij->i", motion.turn(some.normals), met.normals)) > AGREE
         return facing & (away < WITHIN * self.diagonal)
 
@@ -280,7 +280,8 @@ class Judge:
     def side(self, here: Shown, there: Shown, motion: Similarity) -> tuple[Merit, Array]:
         """What one side says of a map, and by how much its local planes miss the other where they meet, diagonals."""
         moved = motion.apply(here.cloud.points)
-        misses = disc_distances(there.cloud, moved, bound=HOPELESS * self.far * self.diagonal) / self.diagonal
+        bound = HOPELESS * self.far * self.diagonal
+        misses = disc_distances(there.cloud, moved, here.cloud.labels, bound=bound) / self.diagonal
         met, margin = (there.cloud, there.openings), self.far * self.diagonal
         unseen = here.openings.unseen(here.cloud, moved, misses > self.far, 1, margin, met=met, most=MOST)
         noise = np.concatenate([here.noise, there.noise]) / self.diagonal

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from symrefine.align.alignment import OK, OPEN, Alignment, Miss
 from symrefine.align.coset import Coset, coset_of_group, coset_of_list, coset_of_maps, lifted
+from symrefine.align.kinds import apart, with_one_set_of_classes
 from symrefine.align.landscape import least_misfit
 from symrefine.align.moment_fit import MISFIT, ROUNDING
 from symrefine.align.pair import Evidence, Side, few
@@ -76,6 +77,7 @@ def align(
     """
     a, b = (_shape(s, name) for s, name in ((source, "source"), (target, "target")))
     _check(a, b, tolerance)
+    a, b = with_one_set_of_classes(a, b)
     clock = Clock()
     with clock("moments"):
         a, b = _looked_at(a, b, seed) if polish else (a, b)
@@ -308,9 +310,10 @@ def _nearest(
     """
     from scipy.spatial import cKDTree
 
-    moved = scale * (source.points @ matrix.T) + translation
-    there = cKDTree(target.points).query(moved)[0] / target.diagonal
-    back = cKDTree(moved).query(target.points)[0] / target.diagonal
+    size = target.diagonal
+    moved = apart(scale * (source.points @ matrix.T) + translation, source.labels, size)
+    met = apart(target.points, target.labels, size)
+    there, back = cKDTree(met).query(moved)[0] / size, cKDTree(moved).query(met)[0] / size
     shares = float((there <= tolerance).mean()), float((back <= tolerance).mean())
     return float(np.sqrt(np.mean(there**2))), shares
 

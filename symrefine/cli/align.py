@@ -60,6 +60,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             metavar="N",
             help=f"which of several molecules, models or volumes in {letter}, from 0 (default: {others[name]})",
         )
+    parser.add_argument(
+        "--labels",
+        metavar="NAME",
+        help="classes that what meets has to share, from both files, as of `detect`: numbers or texts that are equal, "
+        "or `color`, where colours closer than a quarter of the scale are the same (default: none, but the elements of "
+        "molecules)",
+    )
     parser.add_argument("--rotations-only", action="store_true", help="admit det M = +1 only")
     parser.add_argument(
         "--strict", action="store_true", help=f"end with status {UNDETERMINED} where the status of an answer is not ok"
@@ -76,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
     clock = Clock()
     with counting("aligning", len(paths)) as doing:
         with clock("load"):
-            read = partial(load, measure=args.measure, frame=args.source_frame)
+            read = partial(load, measure=args.measure, labels=args.labels, frame=args.source_frame)
             source = loaded(args.source, args.format if args.source == STDIN else None, read)
         given = chain.from_iterable(
             objects([path], args.format if path == STDIN else None, partial(_targets, args=args)) for path in paths
@@ -129,8 +136,9 @@ def _targets(path: str, args: argparse.Namespace) -> "Frames[Shape]":
     from symrefine.load import Frames, load, load_frames
 
     if args.target_frame is not None:
-        return Frames("objects", 1, lambda _: load(path, measure=args.measure, frame=args.target_frame))
-    found = load_frames(path, measure=args.measure)
+        one = partial(load, path, measure=args.measure, labels=args.labels, frame=args.target_frame)
+        return Frames("objects", 1, lambda _: one())
+    found = load_frames(path, measure=args.measure, labels=args.labels)
     if len(found) > FRAMES:
         raise InputError(f"{path}: holds {len(found)} {found.what}, more than {FRAMES}; choose one with --target-frame")
     return found
@@ -154,6 +162,7 @@ def _aligned(
     frames = {"source_frame": args.source_frame, "target_frame": args.target_frame}
     frames |= {} if given.frame is None else {"target_frame": given.frame}
     chosen = {"measure": args.measure} | {name: k for name, k in frames.items() if k is not None}
+    chosen |= {} if args.labels is None else {"labels": args.labels}
     found = replace(found, options={**found.options, **chosen})
     return found, found.to_dict(load_s=load_s + given.load_s)
 
