@@ -692,6 +692,25 @@ def test_cuts_from_opposite_sides(det: int) -> None:
     assert found.rms < 0.005
 
 
+@pytest.mark.parametrize(("det", "factor"), [(1, 0.4), (-1, 3.0)])
+def test_the_scale_of_parts(det: int, factor: float) -> None:
+    source, target, matrix = cut_pair(det, 0.7, 0)
+    found = align(source / factor, target, scale=True)
+    assert found.status == "ok"
+    assert angle_deg(found.matrix, matrix) < 0.5
+    assert found.scale == pytest.approx(factor, rel=0.005)
+    assert abs(found.scale - factor) < 4.0 * found.scale_sigma
+    np.testing.assert_allclose(found.apply([[0.0, 0.0, 0.0]]), [[4.0, 4.0, 4.0]], atol=0.02)
+    assert found.overlap[0] == pytest.approx(0.7, abs=0.05)
+
+
+def test_a_small_source_does_not_meet_a_part_of_anything() -> None:
+    rng = rng_of(57)
+    found = align(sample(asymmetric(), 5000, 0.0, rng), sample(table(), 5000, 0.0, rng), scale=True)
+    assert found.status != "ok"
+    assert found.confidence == 0.0
+
+
 def test_partial_alignment_turns_with_its_objects() -> None:
     source, target, _ = cut_pair(-1, 0.7, 1)
     plain = align(source, target)

@@ -14,7 +14,7 @@ import numpy as np
 from symrefine.align.alignment import OK, OPEN
 from symrefine.align.pair import THIN, Evidence, Side, sampled
 from symrefine.align.polish import Similarity, polish
-from symrefine.decide.maps import Merit, ahead, as_good, fits, said_by_both, score
+from symrefine.decide.maps import Merit, ahead, as_good, fits, said_by_both, score, well_met
 from symrefine.detection.measure import SAMPLES
 from symrefine.fit.matching import AGREE
 from symrefine.geometry import Array, Isometry, Mask, householder, tight_diagonal
@@ -22,11 +22,11 @@ from symrefine.groups.orthogonal import chord_angles
 from symrefine.propose.consensus import Matches, Proposal, consensus
 from symrefine.propose.signatures import mutual_matches, signatures
 from symrefine.propose.votes import mirror_votes
+from symrefine.shape import Index
 from symrefine.surface.cameras import cameras
 from symrefine.surface.misses import LIMITS, disc_distances
 from symrefine.surface.neighbourhoods import fills_volume
-from symrefine.surface.openings import Openings, openings
-from symrefine.surface.sampling import sampling
+from symrefine.surface.openings import NEIGHBOURS, Openings, openings
 from symrefine.surface.skin import LocalPlanes, Skin, drawn, make_skin
 from symrefine.surface.surface import HOPELESS
 
@@ -35,8 +35,6 @@ from symrefine.surface.surface import HOPELESS
 PLANES, AROUND, WITHIN, MATCHES = 1500, 0.1, 0.04, 500
 # A side with so many times the surface gets as many more local planes, up to a number.
 COARSER, MOST_PLANES = 1.5, 6000
-# Points that tell whether a side has strays or is uneven; of 2,000 a cloud of 40 % strays may look like a volume.
-ASKED = 3000
 # One in so many local planes is moved by the polish, and by the first look at the maps that are proposed.
 MOVED, LOOK = 2, 3
 # Maps of each determinant that are polished, if they meet at least such a share of what the best does.
@@ -65,6 +63,7 @@ class Shown:
         skin: its points without strays.
         weights: [N] by which local planes are drawn, so that they are even; None where the points are.
         cloud: local planes.
+        near: [M, NEIGHBOURS] of the points near each of them, if they are known.
         views: [N, 3] where the points were seen from, if that is known.
         closed: whether nothing can be missing, as of a mesh.
     """
@@ -72,6 +71,7 @@ class Shown:
     skin: Skin
     weights: Array | None
     cloud: LocalPlanes
+    near: Index | None
     views: Array | None
     closed: bool
     rng: np.random.Generator
@@ -84,15 +84,15 @@ class Shown:
         if side.is_mesh:
             shape = sampled(shape, SAMPLES, rng)
         else:
-            seen = sampling(shape.points, np.random.default_rng(0), outliers=True, groups=False, asked=ASKED)
+            seen = side.sampling
             shape, weights = shape.chosen(seen.even), seen.shares
         local, normals, views = (shape.points - side.moments.center) / unit, shape.normals, shape.viewpoint
         skin = make_skin(local, rng, normals=normals, labels=shape.labels, thin=THIN)
         if not side.is_mesh and normals is None and fills_volume(local, skin.tree, np.random.default_rng(0)):
             return None
-        cloud = skin.local_planes(drawn(len(local), PLANES, rng, weights))
+        cloud, near = _planes(skin, drawn(len(local), PLANES, rng, weights))
         views = None if views is None else (views - side.moments.center) / unit
-        return cls(skin=skin, weights=weights, cloud=cloud, views=views, closed=side.is_mesh, rng=rng)
+        return cls(skin=skin, weights=weights, cloud=cloud, near=near, views=views, closed=side.is_mesh, rng=rng)
 
     def as_fine_as(self, spacing: float) -> "Shown":
         """The same with as many local planes as it takes to lie about so near to one another."""
@@ -101,7 +101,14 @@ class Shown:
             return self
         count = min(round(finer * PLANES), MOST_PLANES)
         pick = drawn(len(self.skin.points), count, self.rng, self.weights)
-        return replace(self, cloud=self.skin.local_planes(pick))
+        cloud, near = _planes(self.skin, pick)
+        return replace(self, cloud=cloud, near=near)
+
+    def scaled(self, factor: float) -> "Shown":
+        """The same about the same centre, so many times as large."""
+        skin = replace(self.skin, points=factor * self.skin.points, given=None)
+        views = None if self.views is None else factor * self.views
+        return replace(self, skin=skin, cloud=self.cloud.scaled(factor), views=views)
 
     @cached_property
     def moving(self) -> LocalPlanes:
@@ -114,13 +121,20 @@ class Shown:
         """Where the surface ends without a reason, and what saw it."""
         none = np.zeros(len(self.cloud.points), dtype=bool)
         eyes = () if self.views is None else cameras(self.skin.points, self.views)
-        open_ = None if self.closed else openings(self.cloud, self.skin.points, self.skin.tree, eyes, least=0.0)
+        given = (self.cloud, self.skin.points, self.skin.tree, eyes, self.near)
+        open_ = None if self.closed else openings(*given, least=0.0)
         return open_ or Openings(line=none, border=none, evident=False)
 
     @cached_property
     def noise(self) -> Array:
         """Distances [M] of the local planes to the discs of all others: what sampling alone misses by."""
         return disc_distances(self.cloud, self.cloud.points, self.cloud.labels, skip_self=True)
+
+
+def _planes(skin: Skin, pick: Index) -> tuple[LocalPlanes, Index | None]:
+    """The local planes of some points, and what is near these: their borders are told from the same points."""
+    near = skin.near(pick, NEIGHBOURS) if len(skin.points) >= NEIGHBOURS else None
+    return skin.local_planes(pick, near=near), near
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -178,13 +192,15 @@ class Meeting:
     status: str
 
 
-def partial_meeting(evidence: Evidence, *, reflections: bool) -> Meeting | None:
-    """How two surfaces of one size meet that share a part only; None where nothing suggests that they do.
+def partial_meeting(evidence: Evidence, *, reflections: bool, factor: float = 1.0) -> Meeting | None:
+    """How two surfaces meet that share a part only; None where nothing suggests that they do.
 
-    Maps of either determinant are tried; without `reflections` those of -1 are rivals only.
+    Maps of either determinant are tried; without `reflections` those of -1 are rivals only. `factor` is the size of the
+    source in units of the target.
     """
     unit = evidence.target.moments.scale
-    source, target = (Shown.of(s, unit, evidence.seed) for s in (evidence.source, evidence.target))
+    sides = (evidence.source, unit / factor), (evidence.target, unit)
+    source, target = (Shown.of(side, own, evidence.seed) for side, own in sides)
     if source is None or target is None:
         return None
     finest = min(source.cloud.spacing, target.cloud.spacing)
@@ -218,7 +234,7 @@ def proposals(source: Shown, target: Shown, diagonal: float) -> list[Proposal]:
     return consensus(matches, WITHIN * diagonal)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Judge:
     """Two surfaces that judge maps between them, the smaller diagonal of both, and the tolerance."""
 
@@ -227,6 +243,11 @@ class Judge:
     diagonal: float
     tolerance: float
 
+    @cached_property
+    def near(self) -> float:
+        """Miss up to which local planes are well met, diagonals."""
+        return well_met(np.concatenate([self.source.noise, self.target.noise])) / self.diagonal
+
     @property
     def far(self) -> float:
         """Miss from which on nothing is met, diagonals."""
@@ -234,12 +255,12 @@ class Judge:
 
     def promising(self, every: Sequence[Proposal]) -> list[Proposal]:
         """The proposals of each determinant under which most local planes meet others, as they stand."""
-        count = [int(self._meets(Similarity(matrix=p.matrix, shift=p.shift)).sum()) for p in every]
+        count = [int(self.meets(Similarity(matrix=p.matrix, shift=p.shift)).sum()) for p in every]
         order = [i for i in np.argsort(-np.array(count), kind="stable") if count[i] >= max(WORTH * max(count), 1.0)]
         signs = [float(np.sign(np.linalg.det(every[i].matrix))) for i in order]
         return [every[i] for k, i in enumerate(order) if signs[:k].count(signs[k]) < POLISHED]
 
-    def _meets(self, motion: Similarity) -> Mask:
+    def meets(self, motion: Similarity) -> Mask:
         """Which of every so many local planes of the source meet others of the target, as they stand."""
         every = slice(None, None, LOOK)
         some, classes = self.source.cloud.chosen(every), self.source.cloud.classes(every)
@@ -247,12 +268,17 @@ class Judge:
         facing = np.abs(np.einsum("ij,ij->i", motion.turn(some.normals), met.normals)) > AGREE
         return facing & (away < WITHIN * self.diagonal)
 
+    def shared(self, motion: Similarity) -> float:
+        """What shares of the local planes of both meet others, as they stand, multiplied."""
+        back = replace(self, source=self.target, target=self.source)
+        return float(self.meets(motion).mean() * back.meets(motion.inverse).mean())
+
     def mirrored(self, best: Met) -> list[Similarity]:
         """What the best map is followed by where what meets under it may be its own mirror image, to be polished.
 
         Of many equal matches few agree on any one map, so that others as good need not be among those proposed.
         """
-        meets = self._meets(best.motion)
+        meets = self.meets(best.motion)
         some = self.source.cloud.chosen(slice(None, None, LOOK)).chosen(meets)
         if len(some.points) < VOTERS // 10:
             return []
@@ -260,7 +286,7 @@ class Judge:
         votes = mirror_votes(points[:VOTERS], normals[:VOTERS], np.random.default_rng(0), told=MIRRORS)
         planes = [Isometry.about(v.foot, householder(v.direction)) for v in votes]
         starts = [_after(Similarity(matrix=p.matrix, shift=p.shift), best.motion) for p in planes]
-        return [s for s in starts if self._meets(s).sum() >= ITS_OWN * meets.sum()]
+        return [s for s in starts if self.meets(s).sum() >= ITS_OWN * meets.sum()]
 
     def polished(self, start: Similarity) -> Met:
         """A map after the polish, judged from both sides."""
@@ -284,8 +310,7 @@ class Judge:
         misses = disc_distances(there.cloud, moved, here.cloud.labels, bound=bound) / self.diagonal
         met, margin = (there.cloud, there.openings), self.far * self.diagonal
         unseen = here.openings.unseen(here.cloud, moved, misses > self.far, 1, margin, met=met, most=MOST)
-        noise = np.concatenate([here.noise, there.noise]) / self.diagonal
-        return Merit.of(misses, unseen, noise, self.far), misses[~unseen & (misses <= self.far)]
+        return Merit.of(misses, unseen, self.near, self.far), misses[~unseen & (misses <= self.far)]
 
     def slid(self, met: Met) -> float:
         """The best score of a map that slides or turns to either side in the way that is known worst."""

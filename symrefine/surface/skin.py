@@ -93,6 +93,18 @@ class LocalPlanes(Planes):
         """The same, both [Q, count], of several; see `Tree.query`."""
         return self.tree.query(_with_class(queries, classes), count, skip=skip, bound=bound)
 
+    def scaled(self, factor: float) -> "LocalPlanes":
+        """The same surface, so many times as large."""
+        points = factor * self.points
+        return replace(
+            self,
+            points=points,
+            thickness=factor * self.thickness,
+            reach=factor * self.reach,
+            spacing=factor * self.spacing,
+            tree=Tree(_with_class(points, self.labels)),
+        )
+
     def shared_by(self, _: int) -> float:
         """How many of the planes each point takes part in, whichever of them are met."""
         return self.redundancy
