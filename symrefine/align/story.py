@@ -64,7 +64,7 @@ def align(
     """Orthogonal map and translation that take one object onto another; samplings, densities and formats may differ.
 
     Args:
-        source: a `Shape`, or points [N, n].
+        source: a `Shape`, or points [N, n]. Labels count where both have them: only what is of one class meets.
         target: a `Shape`, or points [M, n].
         scale: whether the objects may differ in size; then `target ~ scale * matrix @ source + translation`.
         polish: refine on the points (3-space only); without it the moments have the last word, in half of the time.
