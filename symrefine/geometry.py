@@ -6,7 +6,7 @@ direction u ~ -u; `T_a_b` maps b to a.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-from functools import lru_cache
+from functools import cache, lru_cache
 from numbers import Real
 from typing import Any
 
@@ -45,9 +45,14 @@ class ReadOnly:
     """Base of dataclasses that nobody can write to: every field declared as `Array` holds a private, read-only copy."""
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            if field.type == Array:
-                object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
+        for name in _arrays_of(type(self)):  # type: ignore[arg-type]  # classes have hashes, whatever their instances have
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+@cache
+def _arrays_of(kind: Any) -> tuple[str, ...]:
+    """Names of the fields of a dataclass that are declared as `Array`: asked once, as maps are made by the thousand."""
+    return tuple(field.name for field in fields(kind) if field.type == Array)
 
 
 def numbers(values: ArrayLike, name: str) -> Array:

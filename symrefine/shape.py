@@ -29,6 +29,8 @@ class Shape:
         normals: [N, n], any length but zero, any sign; estimated where needed if absent.
         labels: [N] integers for a cloud, [F] for a mesh: classes (elements, colours, materials) that a symmetry must
             keep; one class if absent.
+        kinds: [K, 3] colours, 0 to 255, or [K] texts that labels 0 .. K - 1 stand for; None where they are numbers that
+            mean the same in any object.
         viewpoint: [3] or [N, 3] place of the camera that saw the points of a cloud, or each of them; 64 places at most.
             Beside the outline of what it saw it saw that there is nothing: not for what the edge of a picture cuts off.
         measure: "points" for a cloud; "surface" (if None) or "solid" for a mesh: what carries the mass.
@@ -48,6 +50,7 @@ class Shape:
     weights: Array | None = None
     normals: Array | None = None
     labels: Index | None = None
+    kinds: NDArray[Any] | None = None
     viewpoint: Array | None = None
     measure: Measure = None  # type: ignore[assignment]  # never None once made
     texture: Texture | None = None
@@ -70,6 +73,7 @@ class Shape:
         if self.labels is not None:
             count, what = (len(points), "point") if self.faces is None else (len(self.faces), "face")
             object.__setattr__(self, "labels", _labels(self.labels, count, what, self.source))
+        object.__setattr__(self, "kinds", _kinds(self.kinds, self.labels, self.source))
         if self.texture is not None and len(self.texture.image) != (0 if self.faces is None else len(self.faces)):
             raise InputError(
                 f"{self.source}: texture has {len(self.texture.image)} triangles; expected those of the mesh"
@@ -183,6 +187,21 @@ def _labels(values: ArrayLike, count: int, what: str, source: str) -> Index:
     if array.shape != (count,):
         raise InputError(f"{source}: labels have shape {array.shape}; expected ({count},), one for each {what}")
     array = array.astype(np.int64)
+    array.flags.writeable = False
+    return array
+
+
+def _kinds(values: ArrayLike | None, labels: Index | None, source: str) -> NDArray[Any] | None:
+    if values is None:
+        return None
+    array = np.array(values)
+    if array.dtype.kind not in "US":
+        array = _numbers(array, "kinds", source)
+    right = array.ndim == 1 if array.dtype.kind in "US" else array.ndim == 2 and array.shape[1] == 3
+    if not right or labels is None or not 0 <= int(labels.min()) <= int(labels.max()) < len(array):
+        raise InputError(
+            f"{source}: kinds have shape {array.shape}; expected colours [K, 3] or texts [K] for labels 0 .. K - 1"
+        )
     array.flags.writeable = False
     return array
 

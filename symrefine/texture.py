@@ -116,6 +116,12 @@ def colour_classes(colours: NDArray[Any], weights: Array) -> NDArray[np.int64]:
     return np.asarray(found, dtype=np.int64)
 
 
+def class_colours(colours: NDArray[Any], classes: NDArray[np.int64]) -> Array:
+    """Mean colours [K, 3], 0 to 255, of classes [N], 0 .. K - 1, of colours [N, 3] on any of these scales."""
+    count = np.maximum(np.bincount(classes), 1)
+    return np.stack([np.bincount(classes, channel) for channel in _eight_bit(colours).T], axis=1) / count[:, None]
+
+
 def _centres(colours: Array, mass: Array) -> Array:
     """Centres [K, 3] of the classes."""
     from scipy.sparse import coo_array, eye_array

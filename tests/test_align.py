@@ -20,6 +20,8 @@ from symrefine.align.procrustes import procrustes
 from symrefine.align.sides import side_of
 from symrefine.align.span import monomial_pair, span_fit
 from symrefine.align.story import Alignment, align
+from symrefine.decide.maps import Merit, said_by_both, score
+from symrefine.decide.maps import as_good as as_well
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, householder, line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.groups.orthogonal import chord_angles
@@ -592,6 +594,78 @@ def test_no_map_comes_below_what_lengths_allow() -> None:
     assert least_misfit(harmonic_pair(one, turned_one)) < 1e-12
 
 
+# --- classes ----------------------------------------------------------------------------------------------------------
+
+
+def painted(points: Array, matrix: Array, shift: float) -> Shape:
+    """A cloud whose classes tell the sides of a box apart, moved."""
+    labels = (points[:, 0] > 0.2).astype(int) + 2 * ((points[:, 1] > 0.3) & (points[:, 2] > 0.1))
+    return Shape(points=points @ matrix.T + shift, labels=labels)
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+@pytest.mark.parametrize("parts", [False, True])
+def test_classes_choose_between_equivalents(det: int, parts: bool) -> None:
+    # Of a box eight maps are as good, of a box without two of its corners several; classes leave one, or two.
+    rng, matrix = rng_of(85), random_orthogonal(rng_of(86, det + 1), det=det)
+    body = join([box((0.0, 0.0, 0.0), (1.0, 1.6, 2.7))])
+    source, target = (sample(body, 10000, 0.0, rng) for _ in range(2))
+    if parts:
+        source, target = source[source @ [1.0, 0.7, 0.5] < 0.9], target[target @ [0.6, 0.9, -0.4] > -0.8]
+    found = align(painted(source, np.eye(3), 0.0), painted(target, matrix, 2.0))
+    assert found.status == "ok"
+    assert angle_deg(found.matrix, matrix) < 0.5
+    plain = align(source, painted(target, matrix, 2.0))
+    assert len(found.equivalents) <= 1 + parts < len(plain.equivalents), "classes that only one has tell nothing"
+
+
+def test_what_has_another_class_does_not_meet() -> None:
+    rng = rng_of(87)
+    source, target = (sample(asymmetric(), 8000, 0.0, rng) for _ in range(2))
+    given = Shape(points=source, labels=np.full(8000, 3))
+    same, other = (align(given, Shape(points=target, labels=np.full(8000, k))) for k in (3, 4))
+    assert same.status == "ok"
+    assert same.overlap[0] > 0.95
+    assert other.status != "ok"
+    assert other.overlap == (0.0, 0.0)
+
+
+def test_atoms_meet_atoms_of_their_element() -> None:
+    corners = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.5) for z in (0.0, 2.2)])
+    elements = np.array([6, 7, 8, 6, 6, 16, 6, 6])
+    matrix = random_orthogonal(rng_of(88), det=-1)
+    found = align(Shape(points=corners, labels=elements), Shape(points=corners @ matrix.T, labels=elements))
+    assert found.exact
+    np.testing.assert_allclose(found.matrix, matrix, atol=1e-6)
+    swapped = elements[[1, 0, *range(2, 8)]]
+    assert align(Shape(points=corners, labels=elements), Shape(points=corners, labels=swapped)).status != "ok"
+
+
+def test_colours_and_texts_are_compared_by_what_they_are() -> None:
+    rng = rng_of(89)
+    points = [sample(asymmetric(), 4000, 0.0, rng) for _ in range(2)]
+    top = [(p[:, 2] > 0.0).astype(int) for p in points]
+
+    def shape(k: int, labels: Array, kinds: object) -> Shape:
+        return Shape(points=points[k], labels=labels, kinds=kinds, source="ab"[k])
+
+    red, blue, grey = [200.0, 20.0, 20.0], [10.0, 10.0, 220.0], [120.0, 120.0, 120.0]
+    source = shape(0, top[0], [red, blue])
+    near = [red[0] - 15.0, 30.0, 25.0]
+    for labels, kinds, right in (
+        (1 - top[1], [blue, near], True),
+        (top[1], [blue, near], False),
+        (top[1], [red, grey], False),
+    ):
+        assert (align(source, shape(1, labels, kinds)).status == "ok") is right
+    texts = shape(0, top[0], ["top", "foot"])
+    assert align(texts, shape(1, 1 - top[1], ["foot", "top"])).status == "ok"
+    with pytest.raises(InputError, match="the labels of a are colours, those of b texts"):
+        align(source, shape(1, top[1], ["top", "foot"]))
+    with pytest.raises(InputError, match="kinds have shape"):
+        shape(0, top[0], [red])
+
+
 # --- objects that share a part only -----------------------------------------------------------------------------------
 
 
@@ -616,6 +690,25 @@ def test_cuts_from_opposite_sides(det: int) -> None:
     assert found.determinant_confidence > 0.9
     np.testing.assert_allclose(found.overlap, 0.7, atol=0.05)
     assert found.rms < 0.005
+
+
+@pytest.mark.parametrize(("det", "factor"), [(1, 0.4), (-1, 3.0)])
+def test_the_scale_of_parts(det: int, factor: float) -> None:
+    source, target, matrix = cut_pair(det, 0.7, 0)
+    found = align(source / factor, target, scale=True)
+    assert found.status == "ok"
+    assert angle_deg(found.matrix, matrix) < 0.5
+    assert found.scale == pytest.approx(factor, rel=0.005)
+    assert abs(found.scale - factor) < 4.0 * found.scale_sigma
+    np.testing.assert_allclose(found.apply([[0.0, 0.0, 0.0]]), [[4.0, 4.0, 4.0]], atol=0.02)
+    assert found.overlap[0] == pytest.approx(0.7, abs=0.05)
+
+
+def test_a_small_source_does_not_meet_a_part_of_anything() -> None:
+    rng = rng_of(57)
+    found = align(sample(asymmetric(), 5000, 0.0, rng), sample(table(), 5000, 0.0, rng), scale=True)
+    assert found.status != "ok"
+    assert found.confidence == 0.0
 
 
 def test_partial_alignment_turns_with_its_objects() -> None:
@@ -660,6 +753,20 @@ def test_what_is_seen_of_a_symmetric_object_leaves_its_equivalents(det: int) -> 
         assert min(angle_deg(m, matrix @ np.diag(signs)) for m in found.equivalents) < 0.3
     assert f"{len(found.equivalents)} maps" in found.observable
     assert "the determinant is free" in found.observable
+
+
+def test_of_maps_that_may_all_be_right_the_one_that_neither_side_denies_comes_first() -> None:
+    # A knob that the source shows, laid where the target shows that there is nothing: but for what the source says of
+    # it the map is as good as the true one. Clutter of the target denies both alike.
+    def seen(clutter: float, *, denied: float) -> list[Merit]:
+        return [Merit(well=0.6, less=0.1, nothing=denied), Merit(well=0.6 + denied / 5.0, less=0.05, nothing=clutter)]
+
+    for clutter in (0.0, 0.3):
+        true, wrong = seen(clutter, denied=0.0), seen(clutter, denied=0.02)
+        assert as_well(score(true), score(wrong))
+        assert as_well(score(wrong), score(true))
+        assert said_by_both(true) > said_by_both(wrong)
+    assert score(seen(0.0, denied=0.02)) > score(seen(0.0, denied=0.0))
 
 
 def test_a_camera_that_saw_free_space_denies_what_borders_leave_open() -> None:

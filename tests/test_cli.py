@@ -209,7 +209,7 @@ def test_the_tolerance_of_the_command_line_is_that_of_detect() -> None:
         ("align box.ply scalene.ply cloud.xyz --report x.html", "--report x.html: is for one object, and B names 2"),
         ("align box.ply scalene.ply --picture x.svg", "--picture x.svg: expected a name that ends in .png"),
         ("align box.ply scalene.ply --recording box.ply", "same file as the input"),
-        ("align box.ply -", "-: align reads files"),
+        ("align box.ply -", "-: reads stdin, which has no suffix"),
         ("align nothing.ply box.ply scalene.ply", "nothing.ply: no such file"),
         ("align box.ply *.nothing", "no file matches this pattern"),
         ("detect nothing.ply", "nothing.ply: no such file"),

@@ -165,6 +165,41 @@ def test_what_is_wrong_with_stdin_is_told(run: Run, folder: Path, monkeypatch: p
     assert_refused(run("detect", "-", "box.xyz", "--format", "xyz"), "stdin is one file")
 
 
+def test_either_object_of_an_alignment_may_come_on_stdin(
+    run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    box = (folder / "box.xyz").read_bytes()
+    one = json.loads(run("align", "box.xyz", "box.xyz", "--json", "-")[1])
+    for names, side in ((("-", "box.xyz"), "source"), (("box.xyz", "-"), "target")):
+        give(monkeypatch, box)
+        status, out, err = run("align", *names, "--format", "xyz", "--json", "-")
+        assert (status, err) == (0, "")
+        assert json.loads(out) | {"timings": 0} == one | {"timings": 0, side: "stdin"}
+    give(monkeypatch, box)
+    several = json.loads(run("align", "box.xyz", "box.xyz", "-", "--format", "xyz", "--json", "-")[1])
+    assert [each["target"] for each in several] == ["box.xyz", "stdin"]
+    assert_refused(run("align", "-", "-", "--format", "xyz"), "stands for 2 of A and B")
+    assert_refused(run("align", "box.xyz", "-", "-", "--format", "xyz"), "stands for 2 of A and B")
+    assert_refused(run("align", "-", "box.xyz"), "which has no suffix", "--format")
+    assert_refused(run("align", "box.xyz", "box.xyz", "--format", "xyz"), "is for an A or B that is -")
+
+
+def test_labels_of_an_alignment_are_compared_by_their_texts(run: Run, folder: Path) -> None:
+    corners = [(x, y, z) for x in (0.0, 1.0) for y in (0.0, 1.5) for z in (0.0, 2.2)]
+    kinds = ["screw", "nut", "pin", "pin", "nut", "pin", "pin", "pin"]
+    for name, order in (("a", (0, 1, 2)), ("b", (1, 2, 0))):
+        rows = [",".join([*(str(c[k]) for k in order), kind]) for c, kind in zip(corners, kinds, strict=True)]
+        (folder / f"{name}.csv").write_text("\n".join(["x,y,z,kind", *rows]) + "\n")
+    told = json.loads(run("align", "a.csv", "b.csv", "--labels", "kind", "--json", "-")[1])
+    assert len(told["equivalents"]) == 1, "of eight corners alone eight maps are as good"
+    assert told["options"]["labels"] == "kind"
+    for row, right in zip(told["matrix"], ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]), strict=True):
+        assert row == pytest.approx(right, abs=1e-6)
+    assert_refused(
+        run("align", "a.csv", "b.csv", "--labels", "size"), "a.csv: line 1: columns 'x,y,z,kind'", "name one as labels"
+    )
+
+
 # --- how loud it is ---------------------------------------------------------------------------------------------------
 
 

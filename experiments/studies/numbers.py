@@ -68,11 +68,12 @@ KIND_OF = {
     "looks": {
         "align.landscape": "GRID GRID_DEGREE",
         "align.moment_fit": "LONGEST",
-        "align.pair": "SOURCE_PLANES TARGET_PLANES THIN REACH",
-        "align.partial": "PLANES AROUND WITHIN MATCHES COARSER MOST_PLANES ASKED MOVED LOOK POLISHED WORTH APART "
+        "align.pair": "SOURCE_PLANES TARGET_PLANES THIN ASKED REACH",
+        "align.partial": "PLANES AROUND WITHIN MATCHES COARSER MOST_PLANES MOVED LOOK POLISHED WORTH APART "
         "MOST_MAPS VOTERS MIRRORS",
         "align.polish": "COARSE ENOUGH",
         "align.rivals": "RIVALS",
+        "align.scaled": "WIDEST STEP POLISHED",
         "align.sides": "ORDERS",
         "align.witnesses": "ASKED",
         "complete": "ROUND",

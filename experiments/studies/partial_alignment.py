@@ -2,7 +2,7 @@
 
     python -m experiments.studies.partial_alignment [--quick] [--seeds N] [--first N] [--methods NAME ...]
                                                     [--only CONDITION ...] [--objects NAME ...] [--jobs N]
-                                                    [--rows PATH] [--figure PATH]
+                                                    [--rows PATH] [--beside PATH ...] [--figure PATH]
 
 Ten chiral objects, five of them the project's own and five of `../shared/objects` where these are. Source and target
 are independent samples of 10,000 points, the target turned by a random rotation or reflection. Right is within 5
@@ -311,6 +311,13 @@ def picture(rows: Sequence[Row], methods: Sequence[str], path: Path) -> None:
     plt.close(figure)
 
 
+def read(path: Path) -> Iterator[Row]:
+    """The rows that `--rows` wrote."""
+    for line in path.read_text(encoding="utf-8").splitlines():
+        given = json.loads(line)
+        yield Row(**given | {"case": Case(**given["case"])})
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -321,6 +328,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", default=list(CONDITIONS), choices=list(CONDITIONS), metavar="CONDITION")
     parser.add_argument("--objects", nargs="*", default=objects(), choices=objects(), metavar="NAME")
     parser.add_argument("--rows", type=Path, help="where the rows go, a line of JSON each")
+    parser.add_argument("--beside", type=Path, nargs="*", default=[], help="rows of earlier runs, told as well")
     parser.add_argument("--figure", type=Path, help="where the picture goes")
     add_jobs(parser)
     options = parser.parse_args()
@@ -330,8 +338,10 @@ def main() -> None:
         names, conditions = names[::3], [c for c in QUICK if c in conditions]
     every = list(cases(options.methods, conditions, names, seeds))
     rows = list(in_order(run, every, options.jobs))
-    print("\n".join(table(rows, options.methods)))
-    print("\n" + "\n".join(curves(rows, options.methods)))
+    told = rows + [row for path in options.beside for row in read(path)]
+    methods = [m for m in METHODS if m in {*options.methods, *(r.case.method for r in told)}]
+    print("\n".join(table(told, methods)))
+    print("\n" + "\n".join(curves(told, methods)))
     if OURS in options.methods:
         print("\nour own word, at 95 %")
         print("\n".join(reliability(rows)))
@@ -339,7 +349,7 @@ def main() -> None:
         with whole(options.rows) as draft:
             draft.write_text("".join(json.dumps(asdict(r)) + "\n" for r in rows), encoding="utf-8")
     if options.figure is not None:
-        picture(rows, options.methods, options.figure)
+        picture(told, methods, options.figure)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from symrefine.align.landscape import harmonic_pair
 from symrefine.align.moment_fit import MomentPair
 from symrefine.align.polish import Similarity
 from symrefine.align.procrustes import Procrustes, procrustes
-from symrefine.detection.measure import SAMPLES
+from symrefine.detection.measure import SAMPLES, density_of
 from symrefine.geometry import Array, Isometry, tight_diagonal
 from symrefine.moments.moments import Moments, central_moments
 from symrefine.moments.quadrature import sample_surface
@@ -18,7 +18,7 @@ from symrefine.propose.folds import azimuthal_spectrum
 from symrefine.shape import Shape
 from symrefine.surface.misses import disc_distances, needs
 from symrefine.surface.neighbourhoods import NEIGHBOURS
-from symrefine.surface.sampling import sampling
+from symrefine.surface.sampling import Sampling, sampling
 from symrefine.surface.skin import FEW, LocalPlanes, Skin, isolated_points, make_skin
 from symrefine.surface.surface import Surface
 
@@ -27,11 +27,13 @@ SOURCE_PLANES, TARGET_PLANES = 800, 2000
 # Flatness of thin sheets and edges without noise (0.13 at most at the lower quartile); noise of 0.2 % makes it 0.17.
 THIN = 0.15
 
+# Points that tell whether a side has strays or is uneven; of 2,000 a cloud of 40 % strays may look like a volume.
+ASKED = 3000
 # Spacings that a plane reaches.
 REACH = 3.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Side:
     """One of the two objects: its moments, and the weights of its points if it is a cloud."""
 
@@ -44,6 +46,11 @@ class Side:
         """Whether the points are vertices and the moments exact."""
         return self.shape.faces is not None
 
+    @cached_property
+    def sampling(self) -> Sampling:
+        """Which of the points of a cloud belong to a surface, and how evenly these were sampled."""
+        return sampling(self.shape.points, np.random.default_rng(0), outliers=True, groups=False, asked=ASKED)
+
     def evened(self) -> "Side":
         """The same cloud, each point weighted by the area its neighbours leave it, unless the weights are given."""
         from scipy.spatial import cKDTree
@@ -51,16 +58,16 @@ class Side:
         if self.is_mesh or self.shape.weights is not None:
             return self
         points, reach = self.shape.points, min(NEIGHBOURS[0], len(self.shape.points))
-        weights = cKDTree(points).query(points, k=[reach])[0][:, 0] ** 2
+        weights = shares(self.shape, cKDTree(points).query(points, k=[reach])[0][:, 0] ** 2)
         parts = len(self.moments.replicates)
         moments = central_moments(points, weights, self.moments.order, parts=parts)
-        return Side(shape=self.shape, moments=moments, weights=weights / weights.sum())
+        return Side(shape=self.shape, moments=moments, weights=weights)
 
     def cleaned(self) -> "Side":
         """The same cloud without the points that belong to no surface; the side itself where there are none."""
         if self.is_mesh:
             return self
-        seen = sampling(self.shape.points, np.random.default_rng(0), outliers=True, groups=False)
+        seen = self.sampling
         if not len(seen.strays):
             return self
         shape = self.shape.chosen(seen.kept)
@@ -74,21 +81,21 @@ class Side:
 
         Where one side is a mesh and the other a cloud, planes of both blur edges and curves alike.
         """
-        points, normals = self.shape.points, self.shape.normals
+        shape = self.shape
         if self.is_mesh:
-            points, normals = sample_surface(self.shape, samples, rng)[0], None
-        elif len(points) > SAMPLES:
-            some = rng.choice(len(points), SAMPLES, replace=False)
-            points, normals = points[some], None if normals is None else normals[some]
-        return make_skin((points - self.moments.center) / unit, rng, normals=normals, thin=THIN)
+            shape = sampled(shape, samples, rng)
+        elif len(shape.points) > SAMPLES:
+            shape = shape.chosen(rng.choice(len(shape.points), SAMPLES, replace=False))
+        local = (shape.points - self.moments.center) / unit
+        return make_skin(local, rng, normals=shape.normals, labels=shape.labels, thin=THIN)
 
     def azimuths(self, frame: Array) -> Array:
         """Azimuthal coefficients [K, 4] about the frame's third axis, scaled by what random azimuths would give."""
         points = self.shape.points
         weights = self.weights
         if self.is_mesh:
-            points, _, _ = sample_surface(self.shape, SAMPLES, np.random.default_rng(0))
-            weights = np.full(len(points), 1.0 / len(points))
+            seen = sampled(self.shape, SAMPLES, np.random.default_rng(0))
+            points, weights = seen.points, shares(seen, np.ones(len(seen.points)))
         local = (points - self.moments.center) @ frame.T / self.moments.scale
         c, sigma = azimuthal_spectrum(local, weights, np.array([0.0, 0.0, 1.0]))
         return c / sigma
@@ -131,7 +138,8 @@ class Evidence:
     def _planes(self, index: int, count: int) -> LocalPlanes:
         side = (self.source, self.target)[index]
         if few(self.source.shape, self.target.shape):
-            return isolated_points((side.shape.points - side.moments.center) / self._units[index])
+            local = (side.shape.points - side.moments.center) / self._units[index]
+            return isolated_points(local, side.shape.labels)
         skin = self._skins[index]
         pick = self._rng().choice(len(skin.points), min(count, len(skin.points)), replace=False)
         return skin.local_planes(np.sort(pick))
@@ -155,22 +163,31 @@ class Evidence:
         """
         target = self._planes(1, TARGET_PLANES)
         diagonal = tight_diagonal(target.points)
-        own = [disc_distances(s, s.points, skip_self=True) for s in (self.moving, target)]
+        own = [disc_distances(s, s.points, s.labels, skip_self=True) for s in (self.moving, target)]
         blurred = abs(float(self.moving.thickness.mean() - target.thickness.mean()))
         return Surface(cloud=target, diagonal=diagonal, noise=(np.concatenate(own) + blurred) / diagonal)
 
     def misses(self, motion: Isometry) -> Array:
-        """Distances from the moved source to the target, fractions of the diagonal."""
-        return disc_distances(self.judge.cloud, motion.apply(self.moving.points)) / self.judge.diagonal
+        """Distances from the moved source to what is of its class of the target, fractions of the diagonal.
+
+        They end at the diagonal.
+        """
+        moved, size = motion.apply(self.moving.points), self.judge.diagonal
+        return disc_distances(self.judge.cloud, moved, self.moving.labels, bound=size) / size
 
     def misses_back(self, motion: Similarity) -> Array:
         """Distances from the target to the moved source, fractions of the diagonal."""
-        back = motion.inverse.apply(self.judge.cloud.points)
-        return motion.scale * disc_distances(self.moving, back) / self.judge.diagonal
+        cloud, size = self.judge.cloud, self.judge.diagonal
+        back = disc_distances(self.moving, motion.inverse.apply(cloud.points), cloud.labels, bound=size / motion.scale)
+        return motion.scale * back / size
 
-    def excess(self, motion: Isometry) -> float:
-        """The largest statistic of the miss over its limit; <= 1 if the surfaces agree. Of atoms every one counts."""
-        return float(self.judge.needed(self.misses(motion)[None], [motion])[0]) / self.tolerance
+    def excess(self, motion: Similarity) -> float:
+        """The largest statistic of the miss over its limit; <= 1 if the surfaces agree. Of atoms every one counts.
+
+        Where the scale is open the target has to meet the source as well: a source that is small enough misses nothing.
+        """
+        ways = [self.misses(motion), self.misses_back(motion)] if self.scale else [self.misses(motion)]
+        return max(float(self.judge.needed(misses[None], [motion])[0]) for misses in ways) / self.tolerance
 
     def agree_at_once(self, motion: Similarity) -> bool:
         """Whether the surfaces agree under a map even if nothing that they miss by is noise.
@@ -178,11 +195,12 @@ class Evidence:
         That is told from the planes of the target that are met, which the judge need not be made for.
         """
         moved = motion.apply(self.moving.points)
-        away, met = self.met.met_by(moved)
+        away, met = self.met.met_by(moved, self.moving.labels)
         across = np.abs(np.einsum("ij,ij->i", moved - met.points, met.normals))
         # A plane reaches as far as the points that it was fitted to; beyond, the point that is nearest counts.
         misses = np.where(away < REACH * self.met.spacing, across, np.maximum(away, across))
-        return float(needs(misses / tight_diagonal(self.moving.points), np.empty(0))) <= self.tolerance
+        misses = np.minimum(misses / tight_diagonal(self.moving.points), 1.0)
+        return float(needs(misses, np.empty(0))) <= self.tolerance
 
     def cleaned(self) -> "Evidence | None":
         """The same without points that belong to no surface; None where there are none."""
@@ -199,6 +217,20 @@ class Evidence:
         """Whether both sides can be judged: surfaces, or few points that stand for themselves, but no filled solid."""
         sides = (self.source.shape, self.target.shape)
         return few(*sides) or {s.measure for s in sides} != {"solid", "points"}
+
+
+def shares(shape: Shape, weights: Array) -> Array:
+    """What share [N] the points of a cloud have in its moments, given what each stands for; [0] of a mesh."""
+    if shape.faces is not None:
+        return np.zeros(0)
+    weights = weights if shape.labels is None else weights * density_of(shape.labels)
+    return np.asarray(weights / weights.sum())
+
+
+def sampled(mesh: Shape, count: int, rng: np.random.Generator) -> Shape:
+    """So many samples of the surface of a mesh, with their classes."""
+    points, _, face = sample_surface(mesh, count, rng)
+    return Shape(points=points, labels=None if mesh.labels is None else mesh.labels[face], source=mesh.source)
 
 
 def few(source: Shape, target: Shape) -> bool:

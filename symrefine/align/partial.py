@@ -12,22 +12,21 @@ from functools import cached_property
 import numpy as np
 
 from symrefine.align.alignment import OK, OPEN
-from symrefine.align.pair import THIN, Evidence, Side
+from symrefine.align.pair import THIN, Evidence, Side, sampled
 from symrefine.align.polish import Similarity, polish
-from symrefine.decide.maps import Merit, ahead, as_good, fits, score
+from symrefine.decide.maps import Merit, ahead, as_good, fits, said_by_both, score, well_met
 from symrefine.detection.measure import SAMPLES
 from symrefine.fit.matching import AGREE
 from symrefine.geometry import Array, Isometry, Mask, householder, tight_diagonal
 from symrefine.groups.orthogonal import chord_angles
-from symrefine.moments.quadrature import sample_surface
 from symrefine.propose.consensus import Matches, Proposal, consensus
 from symrefine.propose.signatures import mutual_matches, signatures
 from symrefine.propose.votes import mirror_votes
+from symrefine.shape import Index
 from symrefine.surface.cameras import cameras
 from symrefine.surface.misses import LIMITS, disc_distances
 from symrefine.surface.neighbourhoods import fills_volume
-from symrefine.surface.openings import Openings, openings
-from symrefine.surface.sampling import sampling
+from symrefine.surface.openings import NEIGHBOURS, Openings, openings
 from symrefine.surface.skin import LocalPlanes, Skin, drawn, make_skin
 from symrefine.surface.surface import HOPELESS
 
@@ -36,8 +35,6 @@ from symrefine.surface.surface import HOPELESS
 PLANES, AROUND, WITHIN, MATCHES = 1500, 0.1, 0.04, 500
 # A side with so many times the surface gets as many more local planes, up to a number.
 COARSER, MOST_PLANES = 1.5, 6000
-# Points that tell whether a side has strays or is uneven; of 2,000 a cloud of 40 % strays may look like a volume.
-ASKED = 3000
 # One in so many local planes is moved by the polish, and by the first look at the maps that are proposed.
 MOVED, LOOK = 2, 3
 # Maps of each determinant that are polished, if they meet at least such a share of what the best does.
@@ -66,6 +63,7 @@ class Shown:
         skin: its points without strays.
         weights: [N] by which local planes are drawn, so that they are even; None where the points are.
         cloud: local planes.
+        near: [M, NEIGHBOURS] of the points near each of them, if they are known.
         views: [N, 3] where the points were seen from, if that is known.
         closed: whether nothing can be missing, as of a mesh.
     """
@@ -73,6 +71,7 @@ class Shown:
     skin: Skin
     weights: Array | None
     cloud: LocalPlanes
+    near: Index | None
     views: Array | None
     closed: bool
     rng: np.random.Generator
@@ -81,20 +80,19 @@ class Shown:
     def of(cls, side: Side, unit: float, seed: int) -> "Shown | None":
         """What a mesh or cloud shows; None if its points fill a volume."""
         rng = np.random.default_rng(seed)
-        points, normals, views, weights = side.shape.points, side.shape.normals, side.shape.viewpoint, None
+        shape, weights = side.shape, None
         if side.is_mesh:
-            points, normals = sample_surface(side.shape, SAMPLES, rng)[0], None
+            shape = sampled(shape, SAMPLES, rng)
         else:
-            seen = sampling(points, np.random.default_rng(0), outliers=True, groups=False, asked=ASKED)
-            points, weights = points[seen.even], seen.shares
-            normals, views = (None if v is None else v[seen.even] for v in (normals, views))
-        local = (points - side.moments.center) / unit
-        skin = make_skin(local, rng, normals=normals, thin=THIN)
+            seen = side.sampling
+            shape, weights = shape.chosen(seen.even), seen.shares
+        local, normals, views = (shape.points - side.moments.center) / unit, shape.normals, shape.viewpoint
+        skin = make_skin(local, rng, normals=normals, labels=shape.labels, thin=THIN)
         if not side.is_mesh and normals is None and fills_volume(local, skin.tree, np.random.default_rng(0)):
             return None
-        cloud = skin.local_planes(drawn(len(local), PLANES, rng, weights))
+        cloud, near = _planes(skin, drawn(len(local), PLANES, rng, weights))
         views = None if views is None else (views - side.moments.center) / unit
-        return cls(skin=skin, weights=weights, cloud=cloud, views=views, closed=side.is_mesh, rng=rng)
+        return cls(skin=skin, weights=weights, cloud=cloud, near=near, views=views, closed=side.is_mesh, rng=rng)
 
     def as_fine_as(self, spacing: float) -> "Shown":
         """The same with as many local planes as it takes to lie about so near to one another."""
@@ -103,7 +101,14 @@ class Shown:
             return self
         count = min(round(finer * PLANES), MOST_PLANES)
         pick = drawn(len(self.skin.points), count, self.rng, self.weights)
-        return replace(self, cloud=self.skin.local_planes(pick))
+        cloud, near = _planes(self.skin, pick)
+        return replace(self, cloud=cloud, near=near)
+
+    def scaled(self, factor: float) -> "Shown":
+        """The same about the same centre, so many times as large."""
+        skin = replace(self.skin, points=factor * self.skin.points, given=None)
+        views = None if self.views is None else factor * self.views
+        return replace(self, skin=skin, cloud=self.cloud.scaled(factor), views=views)
 
     @cached_property
     def moving(self) -> LocalPlanes:
@@ -116,13 +121,20 @@ class Shown:
         """Where the surface ends without a reason, and what saw it."""
         none = np.zeros(len(self.cloud.points), dtype=bool)
         eyes = () if self.views is None else cameras(self.skin.points, self.views)
-        open_ = None if self.closed else openings(self.cloud, self.skin.points, self.skin.tree, eyes, least=0.0)
+        given = (self.cloud, self.skin.points, self.skin.tree, eyes, self.near)
+        open_ = None if self.closed else openings(*given, least=0.0)
         return open_ or Openings(line=none, border=none, evident=False)
 
     @cached_property
     def noise(self) -> Array:
         """Distances [M] of the local planes to the discs of all others: what sampling alone misses by."""
-        return disc_distances(self.cloud, self.cloud.points, skip_self=True)
+        return disc_distances(self.cloud, self.cloud.points, self.cloud.labels, skip_self=True)
+
+
+def _planes(skin: Skin, pick: Index) -> tuple[LocalPlanes, Index | None]:
+    """The local planes of some points, and what is near these: their borders are told from the same points."""
+    near = skin.near(pick, NEIGHBOURS) if len(skin.points) >= NEIGHBOURS else None
+    return skin.local_planes(pick, near=near), near
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -164,8 +176,8 @@ class Meeting:
     """The map that two surfaces which share a part agree upon best.
 
     Attributes:
-        best: the map.
-        equals: others that do about as well.
+        best: the map; of those that do about as well the one that both surfaces together say most for.
+        equals: the others.
         confidence: probability that it is right, or one of those.
         determinant_confidence: probability that its determinant is.
         slides: whether it does as well where it slides or turns a little.
@@ -180,13 +192,15 @@ class Meeting:
     status: str
 
 
-def partial_meeting(evidence: Evidence, *, reflections: bool) -> Meeting | None:
-    """How two surfaces of one size meet that share a part only; None where nothing suggests that they do.
+def partial_meeting(evidence: Evidence, *, reflections: bool, factor: float = 1.0) -> Meeting | None:
+    """How two surfaces meet that share a part only; None where nothing suggests that they do.
 
-    Maps of either determinant are tried; without `reflections` those of -1 are rivals only.
+    Maps of either determinant are tried; without `reflections` those of -1 are rivals only. `factor` is the size of the
+    source in units of the target.
     """
     unit = evidence.target.moments.scale
-    source, target = (Shown.of(s, unit, evidence.seed) for s in (evidence.source, evidence.target))
+    sides = (evidence.source, unit / factor), (evidence.target, unit)
+    source, target = (Shown.of(side, own, evidence.seed) for side, own in sides)
     if source is None or target is None:
         return None
     finest = min(source.cloud.spacing, target.cloud.spacing)
@@ -213,13 +227,14 @@ def partial_meeting(evidence: Evidence, *, reflections: bool) -> Meeting | None:
 def proposals(source: Shown, target: Shown, diagonal: float) -> list[Proposal]:
     """Maps of either determinant that local planes which look alike agree upon."""
     a, b = source.cloud, target.cloud
-    looks = (signatures(cloud, AROUND * diagonal) for cloud in (a, b))
-    i, j = (m[:MATCHES] for m in mutual_matches(*looks))
+    source_looks, target_looks = (signatures(cloud, AROUND * diagonal) for cloud in (a, b))
+    classes = None if a.labels is None or b.labels is None else (a.labels, b.labels)
+    i, j = (m[:MATCHES] for m in mutual_matches(source_looks, target_looks, classes))
     matches = Matches(source=a.points[i], source_normals=a.normals[i], target=b.points[j], target_normals=b.normals[j])
     return consensus(matches, WITHIN * diagonal)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Judge:
     """Two surfaces that judge maps between them, the smaller diagonal of both, and the tolerance."""
 
@@ -228,6 +243,11 @@ class Judge:
     diagonal: float
     tolerance: float
 
+    @cached_property
+    def near(self) -> float:
+        """Miss up to which local planes are well met, diagonals."""
+        return well_met(np.concatenate([self.source.noise, self.target.noise])) / self.diagonal
+
     @property
     def far(self) -> float:
         """Miss from which on nothing is met, diagonals."""
@@ -235,24 +255,30 @@ class Judge:
 
     def promising(self, every: Sequence[Proposal]) -> list[Proposal]:
         """The proposals of each determinant under which most local planes meet others, as they stand."""
-        count = [int(self._meets(Similarity(matrix=p.matrix, shift=p.shift)).sum()) for p in every]
+        count = [int(self.meets(Similarity(matrix=p.matrix, shift=p.shift)).sum()) for p in every]
         order = [i for i in np.argsort(-np.array(count), kind="stable") if count[i] >= max(WORTH * max(count), 1.0)]
         signs = [float(np.sign(np.linalg.det(every[i].matrix))) for i in order]
         return [every[i] for k, i in enumerate(order) if signs[:k].count(signs[k]) < POLISHED]
 
-    def _meets(self, motion: Similarity) -> Mask:
+    def meets(self, motion: Similarity) -> Mask:
         """Which of every so many local planes of the source meet others of the target, as they stand."""
-        some = self.source.cloud.chosen(slice(None, None, LOOK))
-        away, met = self.target.cloud.met_by(motion.apply(some.points))
+        every = slice(None, None, LOOK)
+        some, classes = self.source.cloud.chosen(every), self.source.cloud.classes(every)
+        away, met = self.target.cloud.met_by(motion.apply(some.points), classes)
         facing = np.abs(np.einsum("ij,ij->i", motion.turn(some.normals), met.normals)) > AGREE
         return facing & (away < WITHIN * self.diagonal)
+
+    def shared(self, motion: Similarity) -> float:
+        """What shares of the local planes of both meet others, as they stand, multiplied."""
+        back = replace(self, source=self.target, target=self.source)
+        return float(self.meets(motion).mean() * back.meets(motion.inverse).mean())
 
     def mirrored(self, best: Met) -> list[Similarity]:
         """What the best map is followed by where what meets under it may be its own mirror image, to be polished.
 
         Of many equal matches few agree on any one map, so that others as good need not be among those proposed.
         """
-        meets = self._meets(best.motion)
+        meets = self.meets(best.motion)
         some = self.source.cloud.chosen(slice(None, None, LOOK)).chosen(meets)
         if len(some.points) < VOTERS // 10:
             return []
@@ -260,7 +286,7 @@ class Judge:
         votes = mirror_votes(points[:VOTERS], normals[:VOTERS], np.random.default_rng(0), told=MIRRORS)
         planes = [Isometry.about(v.foot, householder(v.direction)) for v in votes]
         starts = [_after(Similarity(matrix=p.matrix, shift=p.shift), best.motion) for p in planes]
-        return [s for s in starts if self._meets(s).sum() >= ITS_OWN * meets.sum()]
+        return [s for s in starts if self.meets(s).sum() >= ITS_OWN * meets.sum()]
 
     def polished(self, start: Similarity) -> Met:
         """A map after the polish, judged from both sides."""
@@ -280,11 +306,11 @@ class Judge:
     def side(self, here: Shown, there: Shown, motion: Similarity) -> tuple[Merit, Array]:
         """What one side says of a map, and by how much its local planes miss the other where they meet, diagonals."""
         moved = motion.apply(here.cloud.points)
-        misses = disc_distances(there.cloud, moved, bound=HOPELESS * self.far * self.diagonal) / self.diagonal
+        bound = HOPELESS * self.far * self.diagonal
+        misses = disc_distances(there.cloud, moved, here.cloud.labels, bound=bound) / self.diagonal
         met, margin = (there.cloud, there.openings), self.far * self.diagonal
         unseen = here.openings.unseen(here.cloud, moved, misses > self.far, 1, margin, met=met, most=MOST)
-        noise = np.concatenate([here.noise, there.noise]) / self.diagonal
-        return Merit.of(misses, unseen, noise, self.far), misses[~unseen & (misses <= self.far)]
+        return Merit.of(misses, unseen, self.near, self.far), misses[~unseen & (misses <= self.far)]
 
     def slid(self, met: Met) -> float:
         """The best score of a map that slides or turns to either side in the way that is known worst."""
@@ -345,13 +371,15 @@ def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool
     others = [r.score for r in rivals if r not in alike]
     slides = best.is_loose or ahead(best.score, [slid]) < 0.5
     certain = 0.0 if slides else fitting * ahead(best.score, [*others, slid])
-    other_hand = [r.score for r in rivals if r.determinant != best.determinant]
+    every = [best, *(r for r in alike if reflections or r.determinant > 0)]
+    first = max(every, key=lambda m: said_by_both(m.sides))
+    other_hand = [m.score for m in (best, *rivals) if m.determinant != first.determinant]
     return Meeting(
-        best=best,
-        equals=tuple(r for r in alike if reflections or r.determinant > 0),
+        best=first,
+        equals=tuple(m for m in every if m is not first),
         confidence=certain,
         # Where nothing fits, either is as likely; where one is not admitted, nobody asks.
-        determinant_confidence=0.5 + fitting * (max(ahead(best.score, other_hand), 0.5) - 0.5) if reflections else 1.0,
+        determinant_confidence=0.5 + fitting * (max(ahead(first.score, other_hand), 0.5) - 0.5) if reflections else 1.0,
         slides=slides,
         status=OK if certain > 0.5 else _doubt(best, rivals, fitting, slides, open_),
     )

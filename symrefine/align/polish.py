@@ -99,10 +99,10 @@ def polish(
             return _ended(start.moved(x), covariance, index - 1, converged=False)
         before, settled = x, False
         for _ in range(MAX_OUTER):
-            motion = start.moved(x)
-            squares = met.squares(motion)
+            phi = _phi(start, x)
+            squares = met.squares(phi)
             scale_now = robust_scale(np.sqrt(squares), target.spacing, reach)
-            step, inverse, sigmas = _step(*_normal_equations(met, motion, squares, scale_now, prior, x))
+            step, inverse, sigmas = _step(*_normal_equations(met, phi, squares, scale_now, prior, x))
             x, covariance, length = x + step, inverse, float(np.linalg.norm(step))
             settled = scale_now > reach and (length < SETTLED or sigmas < WITHIN_NOISE)
             reach = min(reach, 4.0 * length)
@@ -136,14 +136,19 @@ class _Met:
     each: int
     redundancy: float
 
-    def squares(self, motion: Similarity) -> Array:
-        """Squared distances [P] that the pairs are left with."""
-        squares = (self.rows @ _phi(motion)) ** 2
+    def squares(self, phi: Array) -> Array:
+        """Squared distances [P] that the pairs are left with under phi [13]."""
+        squares = (self.rows @ phi) ** 2
         return squares if self.each == 1 else np.asarray(squares.reshape(-1, self.each).sum(axis=1))
 
 
-def _phi(motion: Similarity) -> Array:
-    return np.concatenate([(motion.scale * motion.matrix).ravel(), motion.shift, [1.0]])
+def _phi(start: Similarity, x: Array) -> Array:
+    """phi [13] of a map that is moved by x [6 or 7], as `Similarity.moved` has it."""
+    stretch = start.scale * (float(np.exp(x[6])) if len(x) > 6 else 1.0)
+    phi = np.ones(SIZE)
+    phi[:9] = (stretch * turn_frame(start.matrix, x[:3])).ravel()
+    phi[9:12] = start.shift + x[3:6]
+    return phi
 
 
 def _met(source: LocalPlanes, target: Skin | LocalPlanes, motion: Similarity, reach: float, stride: int) -> _Met:
@@ -157,7 +162,7 @@ def _met(source: LocalPlanes, target: Skin | LocalPlanes, motion: Similarity, re
 
 
 def _normal_equations(
-    met: _Met, motion: Similarity, squares: Array, scale: float, prior: Array, x: Array
+    met: _Met, phi: Array, squares: Array, scale: float, prior: Array, x: Array
 ) -> tuple[Array, Array]:
     """Gradient and Gauss-Newton matrix at x of the robust cost over the pairs, and of the prior.
 
@@ -167,14 +172,15 @@ def _normal_equations(
     weights = met.worth * geman_mcclure(squares, scale)
     variance = met.redundancy * float(weights @ squares) / (met.each * float(weights.sum()))
     variance = max(variance, float(np.finfo(float).eps))
-    g, jacobian = gram(met.rows, np.repeat(weights, met.each)), _jacobian(motion, len(x))
-    gradient = jacobian.T @ (g @ _phi(motion)) / variance + prior @ x
+    every = weights if met.each == 1 else np.repeat(weights, met.each)
+    g, jacobian = gram(met.rows, every), _jacobian(phi, len(x))
+    gradient = jacobian.T @ (g @ phi) / variance + prior @ x
     return gradient, jacobian.T @ g @ jacobian / variance + prior
 
 
-def _jacobian(motion: Similarity, size: int) -> Array:
+def _jacobian(phi: Array, size: int) -> Array:
     """Derivatives [13, size] of phi by rotation, shift and log scale."""
-    matrix = motion.scale * motion.matrix
+    matrix = phi[:9].reshape(3, 3)
     jacobian: Array = np.zeros((SIZE, 7))
     jacobian[:9, :3] = (TURNS @ matrix).reshape(3, 9).T
     jacobian[9:12, 3:6] = np.eye(3)

@@ -4,10 +4,11 @@ import numpy as np
 
 from symrefine.align.alignment import OK
 from symrefine.align.moment_fit import ROUNDING
-from symrefine.align.pair import Side
+from symrefine.align.pair import Side, shares
 from symrefine.decide.doubts import FLAT
+from symrefine.detection.measure import class_moments
 from symrefine.geometry import Array
-from symrefine.moments.moments import Moments, central_moments, deviations, shape_moments, tensor_index
+from symrefine.moments.moments import Moments, central_moments, deviations, tensor_index
 from symrefine.moments.quadrature import mesh_nodes
 from symrefine.shape import Shape
 
@@ -18,12 +19,14 @@ RADII = 1.2
 
 
 def side_of(shape: Shape, parts: int) -> Side:
-    """A side with its moments, and replicates of them that leave out one of so many parts."""
-    weights = np.ones(len(shape.points)) if shape.weights is None else shape.weights
+    """A side with its moments, and replicates of them that leave out one of so many parts.
+
+    Each class of its labels has a density of its own.
+    """
     return Side(
         shape=shape,
-        moments=shape_moments(shape, ORDERS[shape.dim], parts=parts),
-        weights=weights / weights.sum() if shape.faces is None else np.zeros(0),
+        moments=class_moments(shape, shape.labels, parts, ORDERS[shape.dim]),
+        weights=shares(shape, np.ones(len(shape.points)) if shape.weights is None else shape.weights),
     )
 
 

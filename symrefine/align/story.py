@@ -14,12 +14,14 @@ from numpy.typing import ArrayLike
 
 from symrefine.align.alignment import OK, OPEN, Alignment, Miss
 from symrefine.align.coset import Coset, coset_of_group, coset_of_list, coset_of_maps, lifted
+from symrefine.align.kinds import apart, with_one_set_of_classes
 from symrefine.align.landscape import least_misfit
 from symrefine.align.moment_fit import MISFIT, ROUNDING
 from symrefine.align.pair import Evidence, Side, few
 from symrefine.align.partial import Meeting, partial_meeting
 from symrefine.align.polish import Similarity
 from symrefine.align.rivals import Choice, choose, information, polished
+from symrefine.align.scaled import Size, size_of_parts
 from symrefine.align.sides import (
     ORDERS,
     differ_in_size,
@@ -62,7 +64,7 @@ def align(
     """Orthogonal map and translation that take one object onto another; samplings, densities and formats may differ.
 
     Args:
-        source: a `Shape`, or points [N, n].
+        source: a `Shape`, or points [N, n]. Labels count where both have them: only what is of one class meets.
         target: a `Shape`, or points [M, n].
         scale: whether the objects may differ in size; then `target ~ scale * matrix @ source + translation`.
         polish: refine on the points (3-space only); without it the moments have the last word, in half of the time.
@@ -76,6 +78,7 @@ def align(
     """
     a, b = (_shape(s, name) for s, name in ((source, "source"), (target, "target")))
     _check(a, b, tolerance)
+    a, b = with_one_set_of_classes(a, b)
     clock = Clock()
     with clock("moments"):
         a, b = _looked_at(a, b, seed) if polish else (a, b)
@@ -171,7 +174,7 @@ def _align_solid(
             motion, covariance = done.motion, done.covariance
             # Noise may move all planes of a side outwards or inwards at once, by half of their thickness.
             scale_sigma = float(np.hypot(done.scale_sigma, 0.5 * np.median(whole.moving.thickness)))
-        at_once = surfaces and whole.agree_at_once(motion)
+        at_once = surfaces and not scale and whole.agree_at_once(motion)
     excess = 0.0 if at_once or not surfaces else whole.excess(motion) if agree else np.inf
     likely = meant(Link(need=excess), 1.0) if excess <= 1.0 else 0.0
     if likely < SURE and not cleaned and (clean := evidence.cleaned()) is not None:
@@ -180,6 +183,10 @@ def _align_solid(
     if partly and not tried and likely < SURE:
         part = _in_part(evidence, reflections, clock)
         if part is not None and part.confidence >= likely:
+            return part
+    if scale and surfaces and likely < SURE:
+        part = _in_part(evidence, reflections, clock, scale=True)
+        if part is not None and part.confidence >= max(likely, SURE):
             return part
     evidence = whole
     matrix, translation, factor = _in_input_units(evidence, motion, scale)
@@ -202,17 +209,17 @@ def _align_solid(
     )
 
 
-def _in_part(evidence: Evidence, reflections: bool, clock: Clock) -> Alignment | None:
+def _in_part(evidence: Evidence, reflections: bool, clock: Clock, *, scale: bool = False) -> Alignment | None:
     """The answer for surfaces that share a part only; None where there is nothing to be said for it."""
     with clock("partial"):
-        meeting = partial_meeting(evidence, reflections=reflections)
-    return _met_in_part(meeting, evidence, clock) if meeting is not None and meeting.status else None
+        size = size_of_parts(evidence) if scale else Size(factor=1.0, sigma=0.0)
+        meeting = size and partial_meeting(evidence, reflections=reflections, factor=size.factor)
+    return _met_in_part(meeting, evidence, size, clock) if size and meeting and meeting.status else None
 
 
-def _met_in_part(meeting: Meeting, evidence: Evidence, clock: Clock) -> Alignment:
-    """The answer for surfaces that share a part only; sizes are as given."""
-    evidence = replace(evidence, scale=False)
-    maps = [_in_input_units(evidence, m.motion, False)[:2] for m in (meeting.best, *meeting.equals)]
+def _met_in_part(meeting: Meeting, evidence: Evidence, size: Size, clock: Clock) -> Alignment:
+    """The answer for surfaces that share a part only, the source at this size."""
+    maps = [_placed(evidence, m.motion, size.factor) for m in (meeting.best, *meeting.equals)]
     (matrix, translation), best = maps[0], meeting.best
     coset = coset_of_maps(*(np.array(parts) for parts in zip(*maps, strict=True)))
     miss = Miss(
@@ -226,10 +233,10 @@ def _met_in_part(meeting: Meeting, evidence: Evidence, clock: Clock) -> Alignmen
     return Alignment(
         matrix=matrix,
         translation=translation,
-        scale=1.0,
-        scale_sigma=0.0,
+        scale=size.factor,
+        scale_sigma=size.factor * size.sigma,
         sigma_rad=np.inf if meeting.slides else float(np.sqrt(np.trace(best.covariance[:3, :3]))),
-        covariance=_of_transform(best.covariance, evidence, matrix, 1.0),
+        covariance=_of_transform(best.covariance, evidence, matrix, size.factor),
         exact=False,
         timings=clock.seconds,
         _coset=lambda: coset,
@@ -261,7 +268,13 @@ def _in_input_units(evidence: Evidence, motion: Similarity, scale: bool) -> tupl
     """Matrix, translation and scale for the input's own coordinates."""
     a, b = evidence.source.moments, evidence.target.moments
     factor = motion.scale * b.scale / a.scale if scale else 1.0
-    return motion.matrix, b.center + b.scale * motion.shift - factor * (motion.matrix @ a.center), factor
+    return *_placed(evidence, motion, factor), factor
+
+
+def _placed(evidence: Evidence, motion: Similarity, factor: float) -> tuple[Array, Array]:
+    """Matrix and translation for the input's own coordinates, given the size of the source in units of the target."""
+    a, b = evidence.source.moments, evidence.target.moments
+    return motion.matrix, b.center + b.scale * motion.shift - factor * (motion.matrix @ a.center)
 
 
 def _miss(choice: Choice, motion: Similarity, scale: bool, reflections: bool) -> Miss:
@@ -308,9 +321,10 @@ def _nearest(
     """
     from scipy.spatial import cKDTree
 
-    moved = scale * (source.points @ matrix.T) + translation
-    there = cKDTree(target.points).query(moved)[0] / target.diagonal
-    back = cKDTree(moved).query(target.points)[0] / target.diagonal
+    size = target.diagonal
+    moved = apart(scale * (source.points @ matrix.T) + translation, source.labels, size)
+    met = apart(target.points, target.labels, size)
+    there, back = cKDTree(met).query(moved)[0] / size, cKDTree(moved).query(met)[0] / size
     shares = float((there <= tolerance).mean()), float((back <= tolerance).mean())
     return float(np.sqrt(np.mean(there**2))), shares
 

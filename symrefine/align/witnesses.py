@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
+from symrefine.align.kinds import apart, with_one_set_of_classes
 from symrefine.align.pair import Side, few
 from symrefine.align.partial import MOST, Shown
 from symrefine.geometry import Array, Isometry, tight_diagonal
@@ -17,6 +18,7 @@ from symrefine.moments.moments import shape_moments
 from symrefine.shape import Index, Shape
 from symrefine.surface.misses import LIMITS, disc_distances
 from symrefine.surface.surface import HOPELESS
+from symrefine.surface.tree import Tree
 
 # Points that are asked of either object where none of them stand for a surface.
 ASKED = 20_000
@@ -42,6 +44,7 @@ class Witnesses(Protocol):
 
 def witnesses(source: Shape, target: Shape, *, scale: float = 1.0, tolerance: float, seed: int = 0) -> Witnesses:
     """The two objects, ready to be asked about any map of this scale, in the units of the input."""
+    source, target = with_one_set_of_classes(source, target)
     if source.dim == 3 and not few(source, target) and {source.measure, target.measure} != {"solid", "points"}:
         sides = [_side(shape) for shape in (source, target)]
         unit = sides[1].moments.scale
@@ -51,8 +54,13 @@ def witnesses(source: Shape, target: Shape, *, scale: float = 1.0, tolerance: fl
             shown = one.as_fine_as(finest), other.as_fine_as(finest)
             centers = sides[0].moments.center, sides[1].moments.center
             return _Surfaces(shown=shown, centers=centers, unit=unit, scale=scale, tolerance=tolerance)
-    some = (shape.points[:: max(1, -(-len(shape.points) // ASKED))] for shape in (source, target))
-    return _Points(*some, scale=scale, tolerance=tolerance, diagonal=target.diagonal)
+    points, labels = [], []
+    for shape in (source, target):
+        some = slice(None, None, max(1, -(-len(shape.points) // ASKED)))
+        points.append(shape.points[some])
+        labels.append(None if shape.labels is None else shape.labels[some])
+    size = target.diagonal
+    return _Points(*points, labels=(labels[0], labels[1]), scale=scale, tolerance=tolerance, diagonal=size)
 
 
 def _side(shape: Shape) -> Side:
@@ -83,16 +91,17 @@ class _Surfaces:
 
     def _asked(self, here: Shown, there: Shown, motion: Isometry, diagonal: float) -> Array:
         moved = motion.apply(here.cloud.points)
-        found = disc_distances(there.cloud, moved, bound=HOPELESS * self.far * diagonal) / diagonal
+        classes, bound = here.cloud.labels, HOPELESS * self.far * diagonal
+        found = disc_distances(there.cloud, moved, classes, bound=bound) / diagonal
         # Where a wall is too thin for the local planes its points still tell that there is something.
-        found = np.minimum(found, there.skin.tree.nearest(moved)[0] / diagonal)
+        found = np.minimum(found, there.skin.nearest(moved, classes) / diagonal)
         met, margin = (there.cloud, there.openings), self.far * diagonal
         unseen = here.openings.unseen(here.cloud, moved, found > self.far, 1, margin, met=met, most=MOST)
         return np.where(unseen, np.nan, found)
 
     def nearest(self, side: int, points: Array) -> tuple[Array, Index]:
         unit = (self.unit / self.scale, self.unit)[side]
-        away, owner = self.shown[side].cloud.tree.nearest((points - self.centers[side]) / unit)
+        away, owner = Tree(self.shown[side].cloud.points).nearest((points - self.centers[side]) / unit)
         return unit * away, owner
 
 
@@ -102,6 +111,7 @@ class _Points:
 
     source: Array
     target: Array
+    labels: tuple[Index | None, Index | None] = field(kw_only=True)
     scale: float = field(kw_only=True)
     tolerance: float = field(kw_only=True)
     diagonal: float = field(kw_only=True)
@@ -113,8 +123,9 @@ class _Points:
     def misses(self, matrix: Array, translation: Array) -> Misses:
         from scipy.spatial import cKDTree
 
-        moved = self.scale * (self.source @ matrix.T) + translation
-        there, back = cKDTree(self.target).query(moved)[0], cKDTree(moved).query(self.target)[0]
+        moved = apart(self.scale * (self.source @ matrix.T) + translation, self.labels[0], self.diagonal)
+        met = apart(self.target, self.labels[1], self.diagonal)
+        there, back = cKDTree(met).query(moved)[0], cKDTree(moved).query(met)[0]
         return there / self.diagonal, back / self.diagonal
 
     def nearest(self, side: int, points: Array) -> tuple[Array, Index]:

@@ -8,7 +8,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from symrefine.cli.inputs import FRAMES, STDIN, Object, expanded, objects
+from symrefine.cli.inputs import FRAMES, STDIN, Object, expanded, loaded, objects
 from symrefine.cli.outputs import check_outputs, json_writer, shown, shown_writers, tell, write_all
 from symrefine.cli.rows import MAP_HEAD, map_line
 from symrefine.cli.several import UNDETERMINED, Many, check_alone
@@ -35,8 +35,11 @@ _OK = "ok"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("source", metavar="A", help="mesh or point cloud to be moved")
-    parser.add_argument("target", metavar="B", nargs="+", help="meshes or point clouds to move it onto, or patterns")
+    parser.add_argument("source", metavar="A", help="mesh or point cloud to be moved; - is stdin")
+    parser.add_argument(
+        "target", metavar="B", nargs="+", help="meshes or point clouds to move it onto, or patterns; - is stdin"
+    )
+    parser.add_argument("--format", metavar="SUFFIX", help="what stdin holds where A or a B is -: ply, xyz, csv, ...")
     parser.add_argument(
         "--json",
         metavar="FILE|-",
@@ -54,6 +57,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             metavar="N",
             help=f"which of several molecules, models or volumes in {letter}, from 0 (default: {others[name]})",
         )
+    parser.add_argument(
+        "--labels",
+        metavar="NAME",
+        help="classes that what meets has to share, from both files, as of `detect`: numbers or texts that are equal, "
+        "or `color`, where colours closer than a quarter of the scale are the same (default: none, but the elements of "
+        "molecules)",
+    )
     parser.add_argument("--rotations-only", action="store_true", help="admit det M = +1 only")
     parser.add_argument(
         "--strict", action="store_true", help=f"end with status {UNDETERMINED} where the status of an answer is not ok"
@@ -70,8 +80,11 @@ def run(args: argparse.Namespace) -> int:
     clock = Clock()
     with counting("aligning", len(paths)) as doing:
         with clock("load"):
-            source = load(args.source, measure=args.measure, frame=args.source_frame)
-        given = objects(paths, None, partial(_targets, args=args))
+            read = partial(load, measure=args.measure, labels=args.labels, frame=args.source_frame)
+            source = loaded(args.source, args.format if args.source == STDIN else None, read)
+        given = chain.from_iterable(
+            objects([path], args.format if path == STDIN else None, partial(_targets, args=args)) for path in paths
+        )
         first = next(given)
         aligned = partial(_aligned, args, source, clock.seconds["load"])
         many = Many(
@@ -96,9 +109,12 @@ def run(args: argparse.Namespace) -> int:
 
 def _check(args: argparse.Namespace, paths: Sequence[str]) -> None:
     """Refuse, before any work, outputs that cannot be written or do not fit together, and what is for one pair."""
-    if STDIN in (args.source, *paths):
-        raise InputError("-: align reads files; write what comes on stdin to one, with its suffix")
-    check_outputs({"--json": args.json} | shown(args), [Path(path) for path in (args.source, *paths)])
+    piped = [args.source, *paths].count(STDIN)
+    if piped > 1:
+        raise InputError(f"-: stands for {piped} of A and B, and stdin is one file; write the others to files")
+    if args.format is not None and not piped:
+        raise InputError(f"--format {args.format}: is for an A or B that is -; files have their suffix")
+    check_outputs({"--json": args.json} | shown(args), [Path(p) for p in (args.source, *paths) if p != STDIN])
     if len(paths) > 1:
         check_alone(shown(args), f"B names {len(paths)}", "call `align` for each")
 
@@ -108,8 +124,9 @@ def _targets(path: str, args: argparse.Namespace) -> "Frames[Shape]":
     from symrefine.load import Frames, load, load_frames
 
     if args.target_frame is not None:
-        return Frames("objects", 1, lambda _: load(path, measure=args.measure, frame=args.target_frame))
-    found = load_frames(path, measure=args.measure)
+        one = partial(load, path, measure=args.measure, labels=args.labels, frame=args.target_frame)
+        return Frames("objects", 1, lambda _: one())
+    found = load_frames(path, measure=args.measure, labels=args.labels)
     if len(found) > FRAMES:
         raise InputError(f"{path}: holds {len(found)} {found.what}, more than {FRAMES}; choose one with --target-frame")
     return found
@@ -133,5 +150,6 @@ def _aligned(
     frames = {"source_frame": args.source_frame, "target_frame": args.target_frame}
     frames |= {} if given.frame is None else {"target_frame": given.frame}
     chosen = {"measure": args.measure} | {name: k for name, k in frames.items() if k is not None}
+    chosen |= {} if args.labels is None else {"labels": args.labels}
     found = replace(found, options={**found.options, **chosen})
     return found, found.to_dict(load_s=load_s + given.load_s)

@@ -34,9 +34,12 @@ class Merit:
     nothing: float
 
     @classmethod
-    def of(cls, misses: Array, unseen: Mask, noise: Array, far: float) -> "Merit":
-        """From the misses [N] of a map, where nobody looked [N], the misses [M] of noise, and when nothing is met."""
-        well, met = ~unseen & (misses <= np.quantile(noise, WELL)), ~unseen & (misses <= far)
+    def of(cls, misses: Array, unseen: Mask, near: float, far: float) -> "Merit":
+        """From the misses [N] of a map, where nobody looked [N], and the misses up to which they meet well, or at all.
+
+        The first is that of `well_met`.
+        """
+        well, met = ~unseen & (misses <= near), ~unseen & (misses <= far)
         shares = (well & met).mean(), (met & ~well).mean(), (~met & ~unseen).mean()
         return cls(well=float(shares[0]), less=float(shares[1]), nothing=float(shares[2]))
 
@@ -52,9 +55,19 @@ class Merit:
         return _rising(self.well, *SHARE) * _rising(self.less / met, *UNLIKE) * _rising(self.nothing / met, *DENIED)
 
 
+def well_met(noise: Array) -> float:
+    """The miss up to which what meets does so as well as noise alone, that misses by [M], lets it."""
+    return float(np.quantile(noise, WELL))
+
+
 def score(sides: Sequence[Merit]) -> float:
     """Of a map that two surfaces judge: that of the one which fits better, as the other may be cluttered."""
     return max(side.score for side in sides)
+
+
+def said_by_both(sides: Sequence[Merit]) -> float:
+    """What orders maps that may all be right: clutter denies each of them alike, a side without any only wrong ones."""
+    return sum(side.score for side in sides)
 
 
 def fits(sides: Sequence[Merit]) -> float:

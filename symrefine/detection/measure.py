@@ -133,7 +133,7 @@ def measure(
     if whole is not None and shape is every:
         moments = whole
     else:
-        moments = _moments(shape, classes, parts=0 if is_few(shape) or shape.faces is not None else PARTS)
+        moments = class_moments(shape, classes, parts=0 if is_few(shape) or shape.faces is not None else PARTS)
     vectors = ntuples(moments)
     return Measured(
         shape=shape,
@@ -226,28 +226,28 @@ def _classes(shape: Shape) -> Index | None:
 def masses(shape: Shape) -> Array:
     """Masses [N] of the points of a cloud, where each class has a density of its own."""
     classes = _classes(shape)
-    return _mass(shape) if classes is None else _mass(shape) * _density(classes)
+    return _mass(shape) if classes is None else _mass(shape) * density_of(classes)
 
 
 def _mass(shape: Shape) -> Array:
     return np.ones(len(shape.points)) if shape.weights is None else shape.weights
 
 
-def _density(classes: Index) -> Array:
+def density_of(classes: Index) -> Array:
     """Densities of classes [N]: multiples of the golden ratio modulo 1 keep any number of them apart."""
     return np.asarray(0.5 + np.modf(0.6180339887498949 * (classes + 1))[0])
 
 
-def _moments(shape: Shape, classes: Index | None, parts: int) -> Moments:
+def class_moments(shape: Shape, classes: Index | None, parts: int, order: int = ORDER) -> Moments:
     """Moments of the shape in which each class has a density of its own, so that they know one class from another."""
     if classes is None:
-        return shape_moments(shape, ORDER, parts=parts)
+        return shape_moments(shape, order, parts=parts)
     if shape.faces is None:
-        return shape_moments(replace(shape, weights=_mass(shape) * _density(classes)), ORDER, parts=parts)
-    density = _density(classes)
-    nodes, weights = mesh_nodes(replace(shape, measure="surface"), ORDER)
+        return shape_moments(replace(shape, weights=_mass(shape) * density_of(classes)), order, parts=parts)
+    density = density_of(classes)
+    nodes, weights = mesh_nodes(replace(shape, measure="surface"), order)
     heavier = weights * np.repeat(density, len(weights) // len(density))
-    return shape_moments(Shape(points=shape.points[0] + nodes, weights=heavier), ORDER)
+    return shape_moments(Shape(points=shape.points[0] + nodes, weights=heavier), order)
 
 
 def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLERANCE) -> tuple[Evidence, Surface]:

@@ -64,8 +64,9 @@ def meet(
     source: LocalPlanes, target: Skin | LocalPlanes, motion: Isometry, uncertainty: float, *, stride: int = 1
 ) -> tuple[Planes, Planes]:
     """Every `stride`-th local plane of one object that, moved, meets one of another by the same rules, and these."""
-    some = source.chosen(slice(None, None, stride))
-    distance, met = target.met_by(motion.apply(some.points))
+    every = slice(None, None, stride)
+    some = source.chosen(every)
+    distance, met = target.met_by(motion.apply(some.points), source.classes(every))
     keep = distance < _reach(target.spacing, uncertainty)
     if not target.isolated:
         keep &= _facing(motion.turn(some.normals), met.normals)

@@ -212,7 +212,7 @@ def align(
     """The orthogonal map and the translation that take one object onto another; samplings and formats may differ.
 
     Args:
-        source: whatever `detect` takes.
+        source: whatever `detect` takes. Labels count where both have them: only what is of one class meets.
         target: whatever `detect` takes; or a list of such, or the frames of a file, for a list of answers: the source
             is read once.
         scale: whether the objects may differ in size; then `target ~ scale * matrix @ source + translation`.

@@ -306,10 +306,12 @@ def _arrays(
         return {"measure": measure or "surface"} | mesh_arrays(content, content.faces, labels, source)
     if measure is not None:
         raise InputError(f"has no faces, so measure {measure!r} does not apply; leave it out for clouds")
+    classes, kinds = (content.labels, None) if labels is None else point_classes(content, labels)
     return {
         "points": content.points,
         "normals": content.normals,
         "weights": content.weights if weights is None else point_weights(content, weights),
-        "labels": content.labels if labels is None else point_classes(content, labels),
+        "labels": classes,
+        "kinds": kinds,
         "viewpoint": content.viewpoint,
     }

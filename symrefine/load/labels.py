@@ -1,18 +1,22 @@
 """Fields of a file to classes that a symmetry must keep, and to weights."""
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.content import Content, Values, are_whole
 from symrefine.shape import Index
-from symrefine.texture import colour_classes
+from symrefine.texture import class_colours, colour_classes
+
+# Classes [N], and the colours [K, 3] or texts [K] that they stand for; None where they are numbers of their own.
+Classes = tuple[Index, NDArray[Any] | None]
 
 
-def point_classes(content: Content, name: str) -> Index:
-    """Classes [N] of the points of a cloud by a field of that name.
+def point_classes(content: Content, name: str) -> Classes:
+    """Classes [N] of the points of a cloud by a field of that name, and what they stand for.
 
     Raises:
         InputError: no such field, or values that are neither whole numbers, texts nor colours.
@@ -22,8 +26,8 @@ def point_classes(content: Content, name: str) -> Index:
     return _classes(content, key, "point", weights)
 
 
-def triangle_classes(content: Content, name: str, owner: Index, corners: Index) -> Index:
-    """Classes [T] of the triangles of a mesh by a field of its faces, or else of its vertices.
+def triangle_classes(content: Content, name: str, owner: Index, corners: Index) -> Classes:
+    """Classes [T] of the triangles of a mesh by a field of its faces, or else of its vertices, and what they stand for.
 
     A triangle takes the class of two corners or more; where all three differ, that of the first.
 
@@ -39,10 +43,12 @@ def triangle_classes(content: Content, name: str, owner: Index, corners: Index) 
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     if key in content.face_fields:
         covered = np.bincount(owner, areas, minlength=len(content.face_fields[key])).astype(np.float64)
-        return _classes(content, key, "face", covered)[owner]
+        classes, kinds = _classes(content, key, "face", covered)
+        return classes[owner], kinds
     covered = np.bincount(corners.ravel(), np.repeat(areas, 3), minlength=len(content.points)).astype(np.float64)
-    first, second, third = _classes(content, key, "point", covered)[corners].T
-    return np.asarray(np.where(second == third, second, first))
+    classes, kinds = _classes(content, key, "point", covered)
+    first, second, third = classes[corners].T
+    return np.asarray(np.where(second == third, second, first)), kinds
 
 
 def point_weights(content: Content, name: str) -> Array:
@@ -70,16 +76,18 @@ def _key(content: Content, name: str, what: str) -> str:
     raise InputError(f"no {what} {name!r}; {told}")
 
 
-def _classes(content: Content, key: str, kind: Literal["point", "face"], weights: Array) -> Index:
+def _classes(content: Content, key: str, kind: Literal["point", "face"], weights: Array) -> Classes:
     values = (content.face_fields if kind == "face" else content.point_fields)[key]
     if values.dtype.kind not in "US" and (row := _unfit(values)) is not None:
         right = "whole numbers" if values.ndim == 1 else "finite colours from 0 on"
         raise InputError(f"{key} of {content.name(kind, row)} is {values[row].tolist()}; labels are {right}")
     if values.ndim == 2:
-        return colour_classes(values, weights)
+        classes = colour_classes(values, weights)
+        return classes, class_colours(values, classes)
     if values.dtype.kind in "US":
-        return np.unique(values, return_inverse=True)[1].reshape(-1).astype(np.int64)
-    return values.astype(np.int64)
+        kinds, own = np.unique(values, return_inverse=True)
+        return own.reshape(-1).astype(np.int64), kinds
+    return values.astype(np.int64), None
 
 
 def _unfit(values: Values) -> int | None:

@@ -44,8 +44,9 @@ def mesh_arrays(content: Content, faces: Polygons, labels: str | None, source: s
         "%s: %d vertices, %d triangles; left out %d triangles without area and %d vertices without a face",
         source, len(used), int((~flat).sum()), int(flat.sum()), len(points) - len(used),
     )  # fmt: skip
-    classes = None if labels is None else triangle_classes(content, labels, owner[~flat], corners[~flat])
-    arrays = {"points": points[used], "faces": compact.reshape(-1, 3), "labels": classes}
+    none = None, None
+    classes, kinds = none if labels is None else triangle_classes(content, labels, owner[~flat], corners[~flat])
+    arrays = {"points": points[used], "faces": compact.reshape(-1, 3), "labels": classes, "kinds": kinds}
     if content.paint is None:
         return arrays
     return arrays | {"texture": texture_of(content.paint, faces, corners[~flat], owner[~flat])}

@@ -110,8 +110,8 @@ def _settled(matches: Matches, inside: Mask, within: float, det: int) -> tuple[t
         matrix, shift = map_
         away = np.linalg.norm(matches.source @ matrix.T + shift - matches.target, axis=1)
         facing = np.abs(np.einsum("ij,ij->i", matches.source_normals @ matrix.T, matches.target_normals))
-        inside = (away < within) & (facing > FACING)
-        if inside.sum() < 3:
+        before, inside = inside, (away < within) & (facing > FACING)
+        if inside.sum() < 3 or (inside == before).all():
             break
         map_ = _fitted(matches, inside, det)
     return map_, inside

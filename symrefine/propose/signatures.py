@@ -19,7 +19,7 @@ SHELLS, BINS = 3, 6
 def signatures(cloud: LocalPlanes, radius: float) -> Array:
     """Histograms [M, SHELLS * 3 * BINS] of the neighbours within a radius of each local plane."""
     count, points, normals = len(cloud.points), cloud.points, cloud.normals
-    one, other = pairs_within(cloud.tree.points, radius).T
+    one, other = pairs_within(points, radius).T
     own = np.concatenate([one, other])
     toward = points[other] - points[one]
     length = np.maximum(np.linalg.norm(toward, axis=1), 1e-300)
@@ -51,8 +51,8 @@ def _histograms(owner: Index, values: Array, count: int) -> Array:
     return found / np.maximum(found.sum(axis=1, keepdims=True), 1.0)
 
 
-def mutual_matches(source: Array, target: Array) -> tuple[Index, Index]:
-    """Indices of the signatures [N, F] and [M, F] that are each nearest to the other.
+def mutual_matches(source: Array, target: Array, classes: tuple[Index, Index] | None = None) -> tuple[Index, Index]:
+    """Indices of the signatures [N, F] and [M, F] that are each nearest to the other, of those of its class.
 
     Those come first that are least like a plane, which is like any other.
     """
@@ -60,8 +60,11 @@ def mutual_matches(source: Array, target: Array) -> tuple[Index, Index]:
     a, b = source.astype(np.float32), target.astype(np.float32)
     squares = (b**2).sum(axis=1) - 2.0 * (a @ b.T)
     squares += (a**2).sum(axis=1)[:, None]
+    if classes is not None:
+        squares[classes[0][:, None] != classes[1]] = np.inf
     nearest, back = squares.argmin(axis=1), np.ascontiguousarray(squares.T).argmin(axis=1)
-    mutual = np.flatnonzero(back[nearest] == np.arange(len(source)))
+    found = back[nearest] == np.arange(len(source))
+    mutual = np.flatnonzero(found & np.isfinite(squares[np.arange(len(source)), nearest]))
     turned = source.reshape(len(source), SHELLS, 3, BINS)[mutual, :, 1, -1].mean(axis=1)
     mutual = mutual[np.argsort(turned, kind="stable")]
     return mutual, nearest[mutual]

@@ -94,13 +94,25 @@ class LocalPlanes(Planes):
         """The same, both [Q, count], of several; see `Tree.query`."""
         return self.tree.query(_with_class(queries, classes), count, skip=skip, bound=bound)
 
+    def scaled(self, factor: float) -> "LocalPlanes":
+        """The same surface, so many times as large."""
+        points = factor * self.points
+        return replace(
+            self,
+            points=points,
+            thickness=factor * self.thickness,
+            reach=factor * self.reach,
+            spacing=factor * self.spacing,
+            tree=Tree(_with_class(points, self.labels)),
+        )
+
     def shared_by(self, _: int) -> float:
         """How many of the planes each point takes part in, whichever of them are met."""
         return self.redundancy
 
-    def met_by(self, queries: Array) -> tuple[Array, Planes]:
-        """Distance [Q] from each query [Q, 3] to the nearest of the planes, and these."""
-        distance, near = self.nearest(queries, None)
+    def met_by(self, queries: Array, classes: Index | None = None) -> tuple[Array, Planes]:
+        """Distance [Q] from each query [Q, 3] of the classes [Q] to the nearest of the planes, and these."""
+        distance, near = self.nearest(queries, classes)
         return distance, self.chosen(near)
 
 
@@ -113,12 +125,14 @@ class Skin:
         normals: [N, 3] unit normals that are known, any sign, or None.
         neighbours: points to a plane; 1 where points and normals are exact.
         given: kd-tree over `points`, if there is one already.
+        labels: [N] class of each point; None where all are of one.
     """
 
     points: Array
     normals: Array | None
     neighbours: int
     given: Tree | None = None
+    labels: Index | None = None
 
     @property
     def isolated(self) -> bool:
@@ -145,10 +159,22 @@ class Skin:
     def _neighbourhoods(self) -> Neighbourhoods:
         return Neighbourhoods.of(self.points, self.tree, self.neighbours)
 
-    def met_by(self, queries: Array) -> tuple[Array, Planes]:
-        """Distance [Q] from each query [Q, 3] to the nearest point, and the planes of the points around the queries."""
+    def met_by(self, queries: Array, classes: Index | None = None) -> tuple[Array, Planes]:
+        """Distance [Q] from each query [Q, 3] to the nearest point, and the planes of the points around the queries.
+
+        Infinite where that point is not of the class [Q] of the query.
+        """
         distance, near = self.tree.nearest(queries)
-        return distance, self._planes(queries, near)
+        return self._of_class(distance, near, classes), self._planes(queries, near)
+
+    def nearest(self, queries: Array, classes: Index | None = None) -> Array:
+        """Distance [Q] from each query [Q, 3] to the nearest point; infinite where that is not of its class [Q]."""
+        return self._of_class(*self.tree.nearest(queries), classes)
+
+    def _of_class(self, distance: Array, near: Index, classes: Index | None) -> Array:
+        if self.labels is None or classes is None:
+            return distance
+        return np.where(self.labels[near] == classes, distance, np.inf)
 
     def shared_by(self, count: int) -> float:
         """How many of the planes at `count` of the points each point takes part in; at least 1."""
@@ -178,9 +204,9 @@ class Skin:
     def local_planes(self, pick: Index, labels: Index | None = None, near: Index | None = None) -> LocalPlanes:
         """The planes of some of the points as a surface of their own.
 
-        `labels` [N] are the classes of all points; `near` as of `denoised`.
+        `labels` [N] are the classes of all points, those of the skin if None; `near` as of `denoised`.
         """
-        planes = self.denoised(pick, near)
+        planes, labels = self.denoised(pick, near), self.labels if labels is None else labels
         classes = None if labels is None else labels[pick]
         tree = Tree(planes.points)
         distance, _ = tree.query(planes.points, min(6, len(pick)))
@@ -237,6 +263,7 @@ def make_skin(
     rng: np.random.Generator,
     *,
     normals: Array | None = None,
+    labels: Index | None = None,
     exact: bool = False,
     thin: float = 0.0,
     tree: Tree | None = None,
@@ -246,10 +273,10 @@ def make_skin(
     Arguments as those of `local_planes` and `choose_neighbours`.
     """
     if exact and normals is not None:
-        return Skin(points=points, normals=normals, neighbours=1, given=tree)
+        return Skin(points=points, normals=normals, neighbours=1, given=tree, labels=labels)
     tree = Tree(points) if tree is None else tree
     size = choose_neighbours(points, tree, rng, thin=thin)
-    return Skin(points=points, normals=normals, neighbours=size, given=tree)
+    return Skin(points=points, normals=normals, neighbours=size, given=tree, labels=labels)
 
 
 def isolated_points(points: Array, labels: Index | None = None, *, body: Body = "atoms") -> LocalPlanes:
