@@ -26,8 +26,8 @@ ALONE = 2.0
 # to that of the first version, which was fitted to half of its drawings; see `experiments.studies.planar_reliability`.
 EVEN_PICTURE, EVEN_PICTURE_MIRROR, STEEPNESS_PICTURE = 0.6, 0.75, 3.6
 # How much of what noise alone needs is left to doubt, once it was taken away, and by how much it blurs a miss: with 1 %
-# noise parts that are out of place show half of their miss. With 2.5 more of them are told, but intact bodies are lost
-# that are thin (a wheel with 7 spokes) or made inexactly (a camera), and a gear's sibling is sure and wrong.
+# noise parts that are out of place show half to two thirds of their miss. With 1 a few more of intact bodies are sure
+# that noise makes volumes of, and of 76 that have a part out of place two to three fewer are told, and 10 fewer surely.
 UNKNOWN, BLURRED = 0.7, 2.0
 # Probability that what no camera saw breaks what the rest shows, by how much is missing at least (`cameras.unclosed`,
 # in single views two thirds). Of 20 of the objects that constants are fitted to, seen once, one was told wrong, 2 of
