@@ -16,15 +16,16 @@ from symrefine.surface.neighbourhoods import FLAT, WIDEST, Neighbourhoods, conne
 from symrefine.surface.skin import LocalPlanes
 from symrefine.surface.tree import Tree
 
-# Neighbours that tell a border: the middle of half a disc lies 0.75 of its width off the point, that of a whole disc 0,
-# with a standard deviation of 0.12 for so many. At the edge of a solid it is 0.4, but the neighbourhood is bent there:
-# more than so many times as thick as most.
-NEIGHBOURS, ASIDE = 32, 0.4
-# A surface counts as open from this share of local planes on that lie farther aside than this: on 76 closed objects it
-# stays below 0.11 %, where 5 % of the surface are missing it is 0.2 % and more. Neighbourhoods so much narrower than
-# long are wires, which end anyway.
-OPEN, FAR_ASIDE, WIRE = 0.0012, 0.55, 0.2
-BENT = 1.8
+# Neighbours that tell a border, and how far off the point their middle lies from there on, in standard deviations along
+# the surface: 1.6 for half a disc as for half a tube, 0.7 where the border is a third of the radius away, 0 for a whole
+# disc, with a standard deviation of 0.18 for so many.
+NEIGHBOURS, ASIDE = 32, 0.7
+# Where normals turn, a surface bends away and does not end: their mean square along a direction, so many times, counts
+# as spread there, by the size of the neighbourhood. At the edge of a solid 0.3 is left of what would be 1 or more.
+BENDS = 4.0
+# A surface counts as open from this share of local planes at a border on. Neighbourhoods so much narrower than long are
+# wires, which end anyway.
+OPEN, WIRE = 0.0012, 0.2
 # So much of it leaves no doubt: four times what closed objects reach.
 EVIDENT = 0.005
 # Neighbours by which the patches of an image hang together.
@@ -138,23 +139,31 @@ def openings(
         none = np.zeros(len(cloud.points), dtype=bool)
         missing = unclosed(cameras, cloud.points, cloud.normals, cloud.reach**2)
         return Openings(line=none, border=none, evident=True, cameras=cameras, unclosed=missing)
-    around = Neighbourhoods.of(points, tree, NEIGHBOURS).around(cloud.points, near)
-    mean, normals, variances = fit_planes(around)
-    aside = mean - cloud.points
-    aside -= np.einsum("ni,ni->n", aside, normals)[:, None] * normals
-    width = np.sqrt(variances[:, 1] + variances[:, 2])
-    if np.median(width) > WIDEST:
-        return None
-    aside = np.linalg.norm(aside, axis=1) / np.maximum(width, 1e-300)
-    thick = np.sqrt(variances[:, 0])
-    thin = thick < np.maximum(BENT * np.median(thick), 0.5 * FLAT * width)
-    sheet = thin & (variances[:, 1] > WIRE**2 * variances[:, 2])
-    share = _lines(cloud, sheet & (aside > FAR_ASIDE)).mean()
+    line = _lines(cloud, _borders(cloud, points, tree, near))
+    share = line.mean()
     if share < least:
         return None
-    line = _lines(cloud, thin & (aside > ASIDE))
     border = Tree(cloud.points[line]).nearest(cloud.points)[0] < 2.0 * np.median(cloud.reach)
     return Openings(line=line, border=border, evident=bool(share > EVIDENT))
+
+
+def _borders(cloud: LocalPlanes, points: Array, tree: Tree, near: Index | None) -> Mask:
+    """Which local planes [M] have the surface on one side only; none where they are too coarse to tell."""
+    sums = Neighbourhoods.of(points, tree, NEIGHBOURS).around(cloud.points, near)
+    mean, _, variances = fit_planes(sums)
+    size = variances.sum(axis=1)
+    if np.median(np.sqrt(size)) > WIDEST:
+        return np.zeros(len(size), dtype=bool)
+    aside = mean - cloud.points
+    products = (sums[:, 4:] / sums[:, :1]).reshape(-1, 3, 3)
+    spread = products - mean[:, :, None] * mean[:, None, :]
+    # The normals of as wide a neighbourhood.
+    count = min(max(LINKS, round(NEIGHBOURS * len(cloud.points) / len(points))), len(cloud.points))
+    normals = cloud.normals[cloud.around(cloud.points, cloud.labels, count)[1]]
+    spread += BENDS / count * size[:, None, None] * (normals.transpose(0, 2, 1) @ normals)
+    along = np.linalg.solve(spread, aside[:, :, None])[:, :, 0]
+    one_sided = np.einsum("ni,ni->n", aside, along) > ASIDE**2
+    return np.asarray(one_sided & (variances[:, 1] > WIRE**2 * variances[:, 2]))
 
 
 def _lines(cloud: LocalPlanes, chosen: Mask) -> Mask:
