@@ -168,6 +168,21 @@ def test_what_is_closed_has_no_borders(make):
     assert all(p.coverage.unseen == 0.0 for p in found.planes)
 
 
+@pytest.mark.parametrize("noise_rel", [0.0, 0.003])
+@pytest.mark.parametrize("radius", [0.06, 0.15, 0.5])
+def test_a_tube_is_open_at_its_ends_and_nowhere_else(radius, noise_rel):
+    """However thin it is, so that what is around a point of its end goes all the way round."""
+    rng = np.random.default_rng(12)
+    angle, along = rng.random((2, 20000)) * np.array([[2.0 * np.pi], [1.0]])
+    tube = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), along])
+    made = surface_of(tube + noise_rel * rng.normal(size=tube.shape))
+    height = made.cloud.points[:, 2]
+    from_end = np.minimum(height - height.min(), height.max() - height) / np.ptp(height)
+    # Points at random leave a gap here and there.
+    assert (from_end[made.openings.line] < 0.1).mean() > 0.9
+    assert made.openings.border[from_end < 0.01].mean() > 0.9
+
+
 def test_a_cut_that_one_of_many_mirrors_keeps_hides_no_other():
     """Its border is carried onto itself by that mirror, as what a sensor leaves out is by chance."""
     made, truth = damaged.damaged(damaged.Case(family="shape", name="starfish", kind="cut", strength=0.2, seed=21))

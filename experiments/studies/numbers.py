@@ -59,7 +59,7 @@ KIND_OF = {
         "surface.clumps": "CLUMP COUNTERPART FILLED SIZES",
         "surface.misses": "LIMITS SHARES ATOM_LIMITS SURE",
         "surface.neighbourhoods": "WIDEST FLAT VOLUME WIDEST_BLOB",
-        "surface.openings": "ASIDE OPEN FAR_ASIDE WIRE BENT EVIDENT MOST",
+        "surface.openings": "ASIDE OPEN FAR_ASIDE BENDS WIRE EVIDENT MOST",
         "surface.sampling": "FAR CROWDED UNEVEN DENSER LONELY",
         "surface.skin": "FEW",
         "texture": "COLOUR_TOLERANCE RARE",
@@ -136,6 +136,7 @@ KIND_OF = {
         "poses.minimax": "_MET",
         "poses.symmetry": "_WRITTEN",
         "surface.neighbourhoods": "ROUNDING",
+        "surface.openings": "ROUNDING",
         "survey": "COARSE",
     },
     "limit": {

@@ -12,7 +12,7 @@ import numpy as np
 from symrefine.geometry import Array, Mask
 from symrefine.shape import Index
 from symrefine.surface.cameras import Camera, unclosed
-from symrefine.surface.neighbourhoods import FLAT, WIDEST, Neighbourhoods, connected_parts, fit_planes
+from symrefine.surface.neighbourhoods import WIDEST, Neighbourhoods, connected_parts, fit_planes
 from symrefine.surface.skin import LocalPlanes
 from symrefine.surface.tree import Tree
 
@@ -25,6 +25,8 @@ NEIGHBOURS, FAR_ASIDE, ASIDE = 32, 0.7, 0.5
 # as spread there, by the size of the neighbourhood. Of 1, 2 and 4 this one finds most of the borders of 14 damaged
 # objects where as few others pass for one.
 BENDS = 2.0
+# Variances (RMS radius 1) that rounding leaves of points on a plane, a line or one another.
+ROUNDING = 1e-12
 # A surface counts as open from this share of local planes at a border on. Neighbourhoods so much narrower than long are
 # wires, which end anyway.
 OPEN, WIRE = 0.0012, 0.2
@@ -166,14 +168,14 @@ def _aside(cloud: LocalPlanes, points: Array, tree: Tree, near: Index | None) ->
         return np.zeros(len(size))
     aside = mean - cloud.points
     products = (sums[:, 4:] / sums[:, :1]).reshape(-1, 3, 3)
-    spread = products - mean[:, :, None] * mean[:, None, :]
+    spread = products - mean[:, :, None] * mean[:, None, :] + ROUNDING * np.eye(3)
     # The normals of as wide a neighbourhood.
     count = min(max(LINKS, round(NEIGHBOURS * len(cloud.points) / len(points))), len(cloud.points))
     normals = cloud.normals[cloud.around(cloud.points, cloud.labels, count)[1]]
     spread += BENDS / count * size[:, None, None] * (normals.transpose(0, 2, 1) @ normals)
     along = np.linalg.solve(spread, aside[:, :, None])[:, :, 0]
     sheet = variances[:, 1] > WIRE**2 * variances[:, 2]
-    return np.sqrt(np.where(sheet, np.einsum("ni,ni->n", aside, along), 0.0))
+    return np.sqrt(np.where(sheet, np.clip(np.einsum("ni,ni->n", aside, along), 0.0, None), 0.0))
 
 
 def _lines(cloud: LocalPlanes, chosen: Mask) -> Mask:
