@@ -6,6 +6,7 @@ import pytest
 from symrefine.geometry import Array, Isometry, Plane
 from symrefine.surface.drift import Drift
 from symrefine.surface.misses import needs
+from symrefine.surface.tree import Tree
 
 NOISE, AWAY = 0.03, 0.06
 MIRROR = Isometry.reflection(Plane(normal=np.array([1.0, 0.0, 0.0]), offset=0.0))
@@ -26,7 +27,7 @@ def sheet(rng: np.random.Generator) -> Array:
 
 
 def drift(points: Array) -> Drift:
-    return Drift.of(points, 1500, np.random.default_rng(0))
+    return Drift.of(points, Tree(points), 1500, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -307,7 +307,7 @@ def _surface(
         surface = replace(surface, openings=openings(cloud, local, tree, views, near))
     # Where density differs, a window and its image hold more of chance than one window and itself.
     if surface.openings is None and whole.noisy and uneven is None:
-        surface = replace(surface, drift=Drift.of(local, WINDOWS, rng))
+        surface = replace(surface, drift=Drift.of(local, whole.tree, WINDOWS, rng))
     return surface
 
 
@@ -320,12 +320,9 @@ def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Su
 
     diagonal = tight_diagonal(points)
     noise = noise_distances(len(points), some_of, rng)
-    return Surface(
-        cloud=some_of(np.arange(len(points))),
-        diagonal=diagonal,
-        noise=noise / diagonal,
-        drift=Drift.of(points, WINDOWS, rng),
-    )
+    cloud = some_of(np.arange(len(points)))
+    drift = Drift.of(points, Tree(points) if labels is not None else cloud.tree, WINDOWS, rng)
+    return Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, drift=drift)
 
 
 def _cloud(

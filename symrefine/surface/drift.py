@@ -96,9 +96,11 @@ class Drift(ReadOnly):
     noise: Array
 
     @classmethod
-    def of(cls, points: Array, count: int, rng: np.random.Generator) -> "Drift":
-        """Windows at `count` of the points [N, 3], as wide as the widest neighbourhoods that planes are fitted to."""
-        tree = Tree(points)
+    def of(cls, points: Array, tree: Tree, count: int, rng: np.random.Generator) -> "Drift":
+        """Windows at `count` of the points [N, 3], as wide as the widest neighbourhoods that planes are fitted to.
+
+        `tree` is the kd-tree over the points.
+        """
         sources = points[np.sort(rng.choice(len(points), min(count, len(points)), replace=False))]
         some = sources[:: max(1, len(sources) // PROBES)]
         # A disc of radius R holds as many points as a window on it of width R / 2 counts for.
