@@ -40,18 +40,9 @@ class Windows(ReadOnly):
     tree: Tree
 
     @classmethod
-    def of(cls, points: Array, width: float, rng: np.random.Generator) -> "Windows":
-        """Windows on points [N, 3], with cells so many that `CELLS` of them fill one."""
-        some = points[rng.permutation(len(points))]
-        count = len(points)
-        while True:
-            seeds = Tree(some[:count])
-            reach = float(np.median(seeds.query(some[:PROBES], min(CELLS, count))[0][:, -1]))
-            if reach >= REACH * width or count <= CELLS:
-                break
-            # In a sheet the reach grows with the root of what a cell holds.
-            count = max(CELLS, min(int(0.9 * count), int(count * (reach / (REACH * width)) ** 2)))
-        own = seeds.nearest(points)[1]
+    def of(cls, points: Array, width: float, count: int, rng: np.random.Generator) -> "Windows":
+        """Windows on points [N, 3], which are taken together in `count` cells."""
+        own = Tree(points[rng.permutation(len(points))[:count]]).nearest(points)[1]
         counts = np.bincount(own, minlength=count).astype(float)
         sums = np.stack([np.bincount(own, weights=x, minlength=count) for x in points.T], axis=1)
         middles = sums[counts > 0] / counts[counts > 0, None]
@@ -105,10 +96,11 @@ class Drift(ReadOnly):
         some = sources[:: max(1, len(sources) // PROBES)]
         # A disc of radius R holds as many points as a window on it of width R / 2 counts for.
         width = 0.5 * float(np.median(tree.query(some, min(NEIGHBOURS[-1], len(points)))[0][:, -1]))
-        windows, again = (Windows.of(points, width, rng) for _ in range(2))
+        cells = _cells(points, width, rng)
+        windows, again = (Windows.of(points, width, cells, rng) for _ in range(2))
         offsets, spread = windows.spreads(sources)
         order, asked = rng.permutation(len(points)), slice(None, None, 2)
-        one, other = (Windows.of(points[order[k::2]], width, rng).spreads(sources[asked]) for k in range(2))
+        one, other = (Windows.of(points[order[k::2]], width, cells, rng).spreads(sources[asked]) for k in range(2))
         # Halves have half of the points to a window, so that its middle is off by chance as much more; what it is to
         # take points together they show as it is.
         chance = other[0] - one[0] + again.offsets(sources[asked]) - offsets[asked]
@@ -124,6 +116,18 @@ class Drift(ReadOnly):
         # Back where the image came from, the gains are those of the cloud itself.
         back = [_applied(gains, t @ m.matrix - offsets) for t, m in zip(there, motions, strict=True)]
         return np.linalg.norm(np.stack(back), axis=2)
+
+
+def _cells(points: Array, width: float, rng: np.random.Generator) -> int:
+    """Into how many cells points [N, 3] go such that `CELLS` of them fill a window."""
+    some, count = points[rng.permutation(len(points))], len(points)
+    while count > CELLS:
+        reach = float(np.median(Tree(some[:count]).query(some[:PROBES], CELLS)[0][:, -1])) / (REACH * width)
+        if reach >= 1.0:
+            break
+        # In a sheet the reach grows with the root of what a cell holds.
+        count = max(CELLS, min(int(0.9 * count), int(count * reach**2)))
+    return count
 
 
 def _gains(spread: Array) -> Array:
