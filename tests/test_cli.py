@@ -332,12 +332,13 @@ def test_a_full_disk_is_told() -> None:
 def test_a_full_disk_is_told_with_the_file(run: Run, data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told = "symrefine: /dev/full: cannot be written: No space left on device\n"
     assert run("derive", "--dim", 3, "--orders", 3, "--json", "/dev/full") == (2, "", told)
-    with (
-        Path("/dev/full").open("ab", buffering=0) as full,
-        pytest.raises(InputError, match=r"^/dev/full: cannot be written: No space left on device$"),
-        naming("/dev/full"),
-    ):
-        Journal(path=Path("/dev/full"), rows=[], torn=False, descriptor=full.fileno()).append({"file": "a.ply"})
+    with Path("/dev/full").open("ab", buffering=0) as full:
+        journal = Journal(path=Path("/dev/full"), by="file", places={}, torn=False, descriptor=full.fileno())
+        with (
+            pytest.raises(InputError, match=r"^/dev/full: cannot be written: No space left on device$"),
+            naming("/dev/full"),
+        ):
+            journal.append({"file": "a.ply"})
 
     def fail(*_: object) -> None:
         with whole(data / "draft.html"):
