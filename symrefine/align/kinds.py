@@ -31,9 +31,20 @@ def with_one_set_of_classes(source: Shape, target: Shape) -> tuple[Shape, Shape]
     return first, second
 
 
-def apart(points: Array, labels: Index | None, far: float) -> Array:
-    """Points [N, n], those of different classes so far from one another along one more coordinate."""
-    return points if labels is None else np.column_stack([points, far * labels])
+def nearest_both_ways(
+    moved: Array, target: Array, labels: tuple[Index | None, Index | None], size: float
+) -> tuple[Array, Array]:
+    """Distances over a size from points [N, n] to the nearest of [M, n], [N], and back, [M].
+
+    Points of different classes stand apart by the size along one more coordinate, where there are classes.
+    """
+    from scipy.spatial import cKDTree
+
+    one, other = (
+        points if own is None else np.column_stack([points, size * own])
+        for points, own in zip((moved, target), labels, strict=True)
+    )
+    return cKDTree(other).query(one)[0] / size, cKDTree(one).query(other)[0] / size
 
 
 def _compared(source: Shape, target: Shape) -> tuple[Index, Index]:

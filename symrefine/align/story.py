@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from symrefine.align.alignment import OK, OPEN, Alignment, Miss
 from symrefine.align.coset import Coset, coset_of_group, coset_of_list, coset_of_maps, lifted
-from symrefine.align.kinds import apart, with_one_set_of_classes
+from symrefine.align.kinds import nearest_both_ways, with_one_set_of_classes
 from symrefine.align.landscape import least_misfit
 from symrefine.align.moment_fit import MISFIT, ROUNDING
 from symrefine.align.pair import Evidence, Side, few
@@ -319,12 +319,8 @@ def _nearest(
 
     And the shares of the points of either side that the other has one within the tolerance of.
     """
-    from scipy.spatial import cKDTree
-
-    size = target.diagonal
-    moved = apart(scale * (source.points @ matrix.T) + translation, source.labels, size)
-    met = apart(target.points, target.labels, size)
-    there, back = cKDTree(met).query(moved)[0] / size, cKDTree(moved).query(met)[0] / size
+    moved, labels = scale * (source.points @ matrix.T) + translation, (source.labels, target.labels)
+    there, back = nearest_both_ways(moved, target.points, labels, target.diagonal)
     shares = float((there <= tolerance).mean()), float((back <= tolerance).mean())
     return float(np.sqrt(np.mean(there**2))), shares
 

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from symrefine.align.kinds import apart, with_one_set_of_classes
+from symrefine.align.kinds import nearest_both_ways, with_one_set_of_classes
 from symrefine.align.pair import Side, few
 from symrefine.align.partial import MOST, Shown
 from symrefine.geometry import Array, Isometry, tight_diagonal
@@ -121,12 +121,8 @@ class _Points:
         return self.tolerance
 
     def misses(self, matrix: Array, translation: Array) -> Misses:
-        from scipy.spatial import cKDTree
-
-        moved = apart(self.scale * (self.source @ matrix.T) + translation, self.labels[0], self.diagonal)
-        met = apart(self.target, self.labels[1], self.diagonal)
-        there, back = cKDTree(met).query(moved)[0], cKDTree(moved).query(met)[0]
-        return there / self.diagonal, back / self.diagonal
+        moved = self.scale * (self.source @ matrix.T) + translation
+        return nearest_both_ways(moved, self.target, self.labels, self.diagonal)
 
     def nearest(self, side: int, points: Array) -> tuple[Array, Index]:
         from scipy.spatial import cKDTree

@@ -68,12 +68,13 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     ends = not surface.openings.evident or _ends_there(surface, whole.largest)
     if not ends or _places(whole.largest, part.largest) >= PLACES:
         return replace(part, at_least=True)
+    whole = replace(whole, at_least=surface.openings.evident)
     if _size(part.largest.placed) <= _size(whole.largest.placed):
-        return replace(whole, at_least=surface.openings.evident)
+        return whole
     # To believe that what ends so evenly, or may not be open at all, is missing a part takes as much as to believe in
     # as much as was seen.
     rival = replace(part.largest, need=math.hypot(part.largest.need, surface.tolerance))
-    return replace(whole, small=(*whole.small, rival), at_least=surface.openings.evident)
+    return replace(whole, small=(*whole.small, rival))
 
 
 def _ends_there(surface: Surface, found: Hypothesis) -> bool:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, Isometry, ReadOnly
-from symrefine.surface.neighbourhoods import NEIGHBOURS
+from symrefine.surface.neighbourhoods import NEIGHBOURS, in_cells
 from symrefine.surface.tree import Tree
 
 # Cells that a window is put together from, and how far they reach, in standard deviations of its weights.
@@ -42,11 +42,10 @@ class Windows(ReadOnly):
     @classmethod
     def of(cls, points: Array, width: float, count: int, rng: np.random.Generator) -> "Windows":
         """Windows on points [N, 3], which are taken together in `count` cells."""
-        own = Tree(points[rng.permutation(len(points))[:count]]).nearest(points)[1]
-        counts = np.bincount(own, minlength=count).astype(float)
-        sums = np.stack([np.bincount(own, weights=x, minlength=count) for x in points.T], axis=1)
-        middles = sums[counts > 0] / counts[counts > 0, None]
-        return cls(middles=middles, counts=counts[counts > 0], width=width, tree=Tree(middles))
+        sums = in_cells(np.column_stack([np.ones(len(points)), points]), points, count, rng)[1]
+        sums = sums[sums[:, 0] > 0]
+        middles = sums[:, 1:] / sums[:, :1]
+        return cls(middles=middles, counts=sums[:, 0], width=width, tree=Tree(middles))
 
     def seen(self, queries: Array) -> tuple[Array, Array]:
         """What windows at queries [Q, 3] hold: cells from there [Q, CELLS, 3], their weights [Q, CELLS] (sum 1)."""

@@ -79,15 +79,31 @@ def _added(sums: Array, members: Index, ends: Index) -> Array:
     return np.asarray(groups @ sums)
 
 
+def in_cells(values: Array, points: Array, count: int, rng: np.random.Generator) -> tuple[Tree, Array]:
+    """Points [N, d] taken together around `count` of them: a kd-tree over these, and sums [count, k] of values [N, k].
+
+    Of points that are fewer than `count` each is a cell, and the rest are empty.
+    """
+    cells = Tree(points[rng.permutation(len(points))[:count]])
+    own = cells.nearest(points)[1]
+    order = np.argsort(own, kind="stable")
+    return cells, _added(values, order, np.searchsorted(own[order], np.arange(count + 1)))
+
+
+def spreads_of(sums: Array) -> tuple[Array, Array]:
+    """Means [M, d] and covariances [M, d, d] of neighbourhoods, from their sums [M, 1 + d + d d]."""
+    dim = math.isqrt(sums.shape[1])
+    averages = sums[:, 1:] / sums[:, :1]
+    mean, squares = averages[:, :dim], averages[:, dim:].reshape(-1, dim, dim)
+    return mean, squares - mean[:, :, None] * mean[:, None, :]
+
+
 def fit_planes(sums: Array, normals: Array | None = None) -> tuple[Array, Array, Array]:
     """Means, normals and variances (across first), all [M, d], of neighbourhoods, from their sums [M, 1 + d + d d].
 
     With `normals` [M, d] these are taken, and the first variance is that along them.
     """
-    dim = math.isqrt(sums.shape[1])
-    averages = sums[:, 1:] / sums[:, :1]
-    mean, squares = averages[:, :dim], averages[:, dim:].reshape(-1, dim, dim)
-    covariance = squares - mean[:, :, None] * mean[:, None, :]
+    mean, covariance = spreads_of(sums)
     values, fitted = smallest_eigenvectors(covariance)
     if normals is None:
         return mean, fitted, values
@@ -117,12 +133,8 @@ class Neighbourhoods:
         if size <= CELLS:
             return cls(tree=tree, sums=sums_of(points), count=size)
         count = max(CELLS, len(points) * CELLS // size)
-        middles = points[np.random.default_rng(0).permutation(len(points))[:count]]
-        cells = Tree(middles)
-        own = cells.nearest(points)[1]
-        order = np.argsort(own, kind="stable")
-        ends = np.searchsorted(own[order], np.arange(count + 1))
-        return cls(tree=cells, sums=_added(sums_of(points), order, ends), count=CELLS)
+        cells, sums = in_cells(sums_of(points), points, count, np.random.default_rng(0))
+        return cls(tree=cells, sums=sums, count=CELLS)
 
     def around(self, points: Array, near: Index | None = None) -> Array:
         """Sums [M, .] of the neighbourhoods of points [M, d]; `near` [M, .] are the cells near them, if known."""

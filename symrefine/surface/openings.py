@@ -12,7 +12,7 @@ import numpy as np
 from symrefine.geometry import Array, Mask
 from symrefine.shape import Index
 from symrefine.surface.cameras import Camera, unclosed
-from symrefine.surface.neighbourhoods import WIDEST, Neighbourhoods, connected_parts, fit_planes
+from symrefine.surface.neighbourhoods import WIDEST, Neighbourhoods, connected_parts, smallest_eigenvectors, spreads_of
 from symrefine.surface.skin import LocalPlanes
 from symrefine.surface.tree import Tree
 
@@ -164,16 +164,15 @@ def _aside(cloud: LocalPlanes, points: Array, tree: Tree, near: Index | None) ->
     Nothing in wires. And how wide neighbourhoods are.
     """
     sums = Neighbourhoods.of(points, tree, NEIGHBOURS).around(cloud.points, near)
-    mean, _, variances = fit_planes(sums)
+    mean, spread = spreads_of(sums)
+    variances, _ = smallest_eigenvectors(spread)
     size = variances.sum(axis=1)
     aside = mean - cloud.points
-    products = (sums[:, 4:] / sums[:, :1]).reshape(-1, 3, 3)
-    spread = products - mean[:, :, None] * mean[:, None, :] + ROUNDING * np.eye(3)
     # The normals of as wide a neighbourhood.
     count = min(max(LINKS, round(NEIGHBOURS * len(cloud.points) / len(points))), len(cloud.points))
     normals = cloud.normals[cloud.around(cloud.points, cloud.labels, count)[1]]
-    spread += BENDS / count * size[:, None, None] * (normals.transpose(0, 2, 1) @ normals)
-    along = np.linalg.solve(spread, aside[:, :, None])[:, :, 0]
+    bends = BENDS / count * size[:, None, None] * (normals.transpose(0, 2, 1) @ normals)
+    along = np.linalg.solve(spread + ROUNDING * np.eye(3) + bends, aside[:, :, None])[:, :, 0]
     sheet = variances[:, 1] > WIRE**2 * variances[:, 2]
     across = np.where(sheet, np.clip(np.einsum("ni,ni->n", aside, along), 0.0, None), 0.0)
     return np.sqrt(across), float(np.median(np.sqrt(size)))
