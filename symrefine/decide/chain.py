@@ -65,14 +65,15 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     if surface.openings is None:
         return whole
     part = _of_part(surface, whole)
-    ends = not surface.openings.evident or _ends_there(surface, whole.largest)
-    if not ends or _places(whole.largest, part.largest) >= PLACES:
+    more = _size(part.largest.placed) > _size(whole.largest.placed)
+    # What may not be open at all is missing a part only where that explains more.
+    missing = (more or surface.openings.evident) and not _ends_there(surface, whole.largest)
+    if missing or _places(whole.largest, part.largest) >= PLACES:
         return replace(part, at_least=True)
     whole = replace(whole, at_least=surface.openings.evident)
-    if _size(part.largest.placed) <= _size(whole.largest.placed):
+    if not more:
         return whole
-    # To believe that what ends so evenly, or may not be open at all, is missing a part takes as much as to believe in
-    # as much as was seen.
+    # To believe that what ends so evenly is missing a part takes as much as to believe in as much as was seen.
     rival = replace(part.largest, need=math.hypot(part.largest.need, surface.tolerance))
     return replace(whole, small=(*whole.small, rival))
 
