@@ -15,6 +15,7 @@ from symrefine.surface.tree import Tree
 
 # A clump holds at most this share of the points, so many that it counts, and has no counterpart: none of half its size.
 CLUMP, COUNTERPART = 0.1, 0.5
+HALF = 0.5
 # Neighbourhoods as thick as this, over that of points at random in a ball, fill a volume if they do at all these sizes
 # and at one where noise alone makes no surface look so: details of objects do at some sizes, hollow as they are, wires
 # at the smallest. At 0.8 to 0.9 as many of 114 whole objects hold such a part by mistake as by one size alone, and at
@@ -31,7 +32,7 @@ def clumps(points: Array, around: Surroundings) -> list[Index]:
     Points hang together if each is among the nearest of the other, whatever the density: a few between two dense parts
     join nothing. `around` tells of some of the points.
     """
-    apart = [m for m in _lone(_parts(around)) if _gap(around, m)] if np.median(around.reach) > 0.0 else []
+    apart = [m for m in _lone(_parts(around), CLUMP) if _gap(around, m)] if np.median(around.reach) > 0.0 else []
     return _members(points, around, apart)
 
 
@@ -73,7 +74,7 @@ def filled(points: Array, around: Surroundings, rng: np.random.Generator) -> lis
                 return []
             part = _parts_of(_filled_at(size, part >= 0, points, tree, around, step), around, enough)
         within &= _beside(_beside(part >= 0, around), around)
-    return _members(points, around, [_grown(m, around) for m in _lone(part)])
+    return _members(points, around, [_grown(m, around) for m in _lone(part, HALF)])
 
 
 def _parts_of(within: Mask, around: Surroundings, enough: float) -> Index:
@@ -116,15 +117,13 @@ def _blobness(points: Array, tree: Tree, queries: Array, size: int) -> Array:
     return blobness(planes_of(points, tree.query(queries, size)[1])[2], size)
 
 
-def _small(sizes: Index, count: int) -> Mask:
-    """Which parts of so many points are too small to be the body, and large enough to be seen."""
-    return np.asarray((sizes <= CLUMP * count) & (sizes > SHARES[-1] * count))
+def _lone(part: Index, most: float) -> list[Mask]:
+    """Parts that none other is about as large as, and that count, given the number of each point's part; -1 is no part.
 
-
-def _lone(part: Index) -> list[Mask]:
-    """Small parts, given the number of each point's part, that none other is about as large as; -1 is no part."""
+    None holds more than a share `most` of the points.
+    """
     sizes = np.bincount(part + 1)[1:]
-    small = np.flatnonzero(_small(sizes, len(part)))
+    small = np.flatnonzero((sizes <= most * len(part)) & (sizes > SHARES[-1] * len(part)))
     own = sizes[small, None]
     alike = (sizes >= COUNTERPART * own) & (sizes <= own / COUNTERPART)
     return [part == k for k in small[alike.sum(axis=1) == 1]]
