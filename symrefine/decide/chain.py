@@ -61,8 +61,9 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
         finest: the smallest tolerance that is asked for.
     """
     nothing = max(ALIKE * exact_need(surface.floor), certain(finest))
-    whole = _of_whole(replace(surface, openings=None), evidence, limit, nothing)
-    if surface.openings is None:
+    closed = None if surface.openings is None else surface.openings.closed
+    whole = _of_whole(replace(surface, openings=closed), evidence, limit, nothing)
+    if surface.openings is None or surface.openings is closed:
         return whole
     part = _of_part(surface, whole)
     more = _size(part.largest.placed) > _size(whole.largest.placed)

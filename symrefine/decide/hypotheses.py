@@ -158,7 +158,7 @@ def _placed(surface: Surface, placed: Placed, history: tuple[Iterate, ...], befo
         partly, partial = _seen_judged(surface, parts, misses)
         # What is unseen under no element by more than a detail is rather that: a flag, on one side.
         most = max(e.coverage.unseen for e in partly)
-        if partial < need and (surface.openings.cameras or most > SHARES[1]):
+        if partial < need and (surface.openings.cameras or surface.openings.clumps or most > SHARES[1]):
             found, need = partly, partial
     return Hypothesis(placed=placed, elements=found, need=need, history=history, before=before)
 

@@ -157,6 +157,8 @@ def _belongs(found: Examined, clump: Array, tolerance: float) -> bool:
     """
     surface, moments = found.surface, found.measured.moments
     points, margin = (clump - moments.center) / moments.scale, surface.far * surface.diagonal
+    beside = disc_distances(surface.cloud, points) > margin
+    points = points[beside] if beside.any() else points  # what lies in the surface is carried with it
     own, carried = Tree(points), []
     for element in found.links[found.decided(tolerance).index].elements:
         moved = np.concatenate([m.apply(points) for m in element.operations.motions(element.center)])

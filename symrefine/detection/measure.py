@@ -21,6 +21,7 @@ from symrefine.surface.cameras import Camera, cameras
 from symrefine.surface.drift import Drift
 from symrefine.surface.misses import TOLERANCE, noise_distances
 from symrefine.surface.neighbourhoods import fills_volume
+from symrefine.surface.clumps import Clump
 from symrefine.surface.openings import NEIGHBOURS, openings
 from symrefine.surface.sampling import sampling
 from symrefine.surface.skin import FEW, LocalPlanes, Skin, drawn, isolated_points, make_skin
@@ -264,7 +265,9 @@ def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLE
     )
     if is_few(shape):
         return evidence, Surface(cloud=isolated_points(local, labels), diagonal=tight_diagonal(local))
-    return evidence, _surface(local, normals, weights, labels, shape.faces is not None, tolerance, measured.views, rng)
+    hiding = tuple(Clump.of((p - moments.center) / moments.scale) for _, p in measured.clumps)
+    exact = shape.faces is not None
+    return evidence, _surface(local, normals, weights, labels, exact, tolerance, measured.views, hiding, rng)
 
 
 def _surface(
@@ -275,6 +278,7 @@ def _surface(
     exact: bool,
     tolerance: float,
     views: tuple[Camera, ...],
+    hiding: tuple[Clump, ...],
     rng: np.random.Generator,
 ) -> Surface:
     """Local planes (points, where they fill a volume) with what noise alone shows."""
@@ -304,7 +308,7 @@ def _surface(
     surface = Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, tolerance=tolerance)
     # Where noise alone needs all that is allowed, nobody sees what is open.
     if tree is not None and (surface.floor < tolerance or views):
-        surface = replace(surface, openings=openings(cloud, local, tree, views, near))
+        surface = replace(surface, openings=openings(cloud, local, tree, views, near, clumps=hiding))
     # Where density differs, a window and its image hold more of chance than one window and itself.
     if surface.openings is None and whole.noisy and uneven is None:
         surface = replace(surface, drift=Drift.of(local, whole.tree, WINDOWS, rng))

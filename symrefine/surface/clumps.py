@@ -4,6 +4,8 @@ What is decided here depends on the surroundings of a point alone, and on how la
 symmetry: the parts of an object come in pairs, or on its axis.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from symrefine.geometry import Array, Mask
@@ -15,7 +17,11 @@ from symrefine.surface.tree import Tree
 
 # A clump holds at most this share of the points, so many that it counts, and has no counterpart: none of half its size.
 CLUMP, COUNTERPART = 0.1, 0.5
+# One that fills a volume beside a surface may hold more: the body is the larger half.
 HALF = 0.5
+# Standard deviations of a clump that all but 0.1 % of a Gaussian one lie within; and for each axis, over the longest,
+# what it counts as at least.
+RIM, FLATTEST = 4.0, 0.01
 # Neighbourhoods as thick as this, over that of points at random in a ball, fill a volume if they do at all these sizes
 # and at one where noise alone makes no surface look so: details of objects do at some sizes, hollow as they are, wires
 # at the smallest. At 0.8 to 0.9 as many of 114 whole objects hold such a part by mistake as by one size alone, and at
@@ -24,6 +30,25 @@ FILLED, SIZES = 0.85, (64, 32, 128)
 # Neighbourhoods that are asked of all: one of so many at first, as those of neighbours hold almost the same points.
 # That leaves nothing of most objects, and of 72 clumps it lost none that all of them find.
 SPARSE = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Clump:
+    """Where a clump is: its middle [3] and inverse square root of its covariance [3, 3]."""
+
+    middle: Array
+    whitening: Array
+
+    @classmethod
+    def of(cls, points: Array) -> "Clump":
+        """That of points [N, 3]; N > 1."""
+        variances, axes = np.linalg.eigh(np.cov(points.T))
+        least = max(FLATTEST**2 * variances[-1], np.finfo(float).tiny)
+        return cls(middle=points.mean(axis=0), whitening=axes.T / np.sqrt(np.maximum(variances, least))[:, None])
+
+    def covers(self, points: Array) -> Mask:
+        """Which of points [N, 3] lie as near as those of its rim."""
+        return np.asarray((((points - self.middle) @ self.whitening.T) ** 2).sum(axis=1) < RIM**2)
 
 
 def clumps(points: Array, around: Surroundings) -> list[Index]:

@@ -2,16 +2,18 @@
 
 A patch of the image that meets no surface begins somewhere. Where it begins at an open border nobody looked beyond, and
 it is unseen; where it begins in the middle of a surface, the surface says that there is nothing: it contradicts. Where
-cameras are known, they say it better: a patch in space that they saw to be free contradicts, any other is unseen.
+cameras are known, they say it better: a patch in space that they saw to be free contradicts, any other is unseen. A
+clump of strays hides what it covers, and its own rim is not told from the surface.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from symrefine.geometry import Array, Mask
 from symrefine.shape import Index
 from symrefine.surface.cameras import Camera, unclosed
+from symrefine.surface.clumps import Clump
 from symrefine.surface.neighbourhoods import WIDEST, Neighbourhoods, connected_parts, smallest_eigenvectors, spreads_of
 from symrefine.surface.skin import LocalPlanes
 from symrefine.surface.tree import Tree
@@ -42,13 +44,14 @@ MOST = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Openings:
-    """The open borders of a surface, and the cameras that saw it.
+    """The open borders of a surface, the cameras that saw it, and the clumps that hide parts of it.
 
     Attributes:
         line: [M] which local planes make one up.
         border: [M] which lie at one.
         evident: whether they are too long to be a whim of the sample.
         cameras: what saw it, in the frame of the surface; none if nothing is known of them.
+        clumps: what hides parts of it, in the frame of the surface.
         unclosed: how much surface they did not see at least, by what they saw; see `cameras.unclosed`.
         links: by stride, pairs [2, E] of every so many-th local planes that are neighbours, both ways.
     """
@@ -57,8 +60,16 @@ class Openings:
     border: Mask
     evident: bool
     cameras: tuple[Camera, ...] = ()
+    clumps: tuple[Clump, ...] = ()
     unclosed: float = 0.0
     links: dict[int, Index] = field(default_factory=dict)
+
+    @property
+    def closed(self) -> "Openings | None":
+        """What is left of it where the surface counts as closed: what hides it; None if nothing does."""
+        if not self.clumps or not (self.cameras or self.line.any()):
+            return self if self.clumps else None
+        return replace(self, line=np.zeros_like(self.line), border=np.zeros_like(self.border), evident=False, cameras=())
 
     def linked(self, cloud: LocalPlanes, stride: int) -> Index:
         """Pairs [2, E] of every `stride`-th local planes that are neighbours, both ways."""
@@ -91,8 +102,12 @@ class Openings:
             met: the surface that they were to meet and its openings, where that is another one.
             most: a patch is unseen if one in so many of the places where it begins is at a border.
         """
-        one, other = self.linked(cloud, stride)
         there_cloud, there_openings = (cloud, self) if met is None else met
+        covered = away.copy()
+        covered[away] = _covered(self.clumps, cloud.points[::stride][away])
+        covered[away] |= _covered(there_openings.clumps, moved[away])
+        away = away & ~covered
+        one, other = self.linked(cloud, stride)
         if there_openings.cameras:
             found = away.copy()
             for camera in there_openings.cameras:
@@ -100,11 +115,11 @@ class Openings:
             # What meets the surface next to it already reaches beyond what was seen.
             beyond = np.zeros_like(found)
             beyond[other[found[one]]] = True
-            return found | (beyond & ~away)
+            return covered | found | (beyond & ~away)
         leave = away[one]
         begins = leave & ~away[other]
         if not begins.any():
-            return np.zeros(len(moved), dtype=bool)
+            return covered
         patch = connected_parts(one[leave & ~begins], other[leave & ~begins], len(moved))
         rim, back = np.unique(other[begins], return_inverse=True)
         classes = cloud.classes(slice(None, None, stride))
@@ -119,7 +134,7 @@ class Openings:
         found = away & free[patch]
         # What lies next to such a patch already reaches beyond the border.
         found[other[begins][free[own] & at_border]] = True
-        return found
+        return found | covered
 
 
 def openings(
@@ -129,9 +144,10 @@ def openings(
     cameras: tuple[Camera, ...] = (),
     near: Index | None = None,
     *,
+    clumps: tuple[Clump, ...] = (),
     least: float = OPEN,
 ) -> Openings | None:
-    """What is open of a surface; None if it is closed, or known too coarsely to tell.
+    """What is open of a surface, or hidden; None if it is closed, or known too coarsely to tell.
 
     Args:
         cloud: its local planes.
@@ -139,18 +155,25 @@ def openings(
         tree: kd-tree over them.
         cameras: what saw it, where that is known.
         near: [M, NEIGHBOURS] of the points near each local plane, if they are known already.
+        clumps: what hides parts of it.
         least: share of the local planes that have to lie far aside, for each RMS radius that neighbourhoods are wide.
     """
+    none = np.zeros(len(cloud.points), dtype=bool)
     if cameras:
-        none = np.zeros(len(cloud.points), dtype=bool)
         missing = unclosed(cameras, cloud.points, cloud.normals, cloud.reach**2)
-        return Openings(line=none, border=none, evident=True, cameras=cameras, unclosed=missing)
+        return Openings(line=none, border=none, evident=True, cameras=cameras, clumps=clumps, unclosed=missing)
     aside, width = _aside(cloud, points, tree, near)
     far = _lines(cloud, aside > FAR_ASIDE)
     if width > WIDEST or far.mean() < least * width or not far.any():
-        return None
+        return Openings(line=none, border=none, evident=False, clumps=clumps) if clumps else None
     line = (aside > ASIDE) & _beside(cloud, far)
-    return Openings(line=line, border=_beside(cloud, line), evident=bool(far.mean() > EVIDENT * width))
+    evident = bool(far.mean() > EVIDENT * width)
+    return Openings(line=line, border=_beside(cloud, line), evident=evident, clumps=clumps)
+
+
+def _covered(clumps: tuple[Clump, ...], points: Array) -> Mask:
+    """Which of points [N, 3] lie where a clump is."""
+    return np.any([np.zeros(len(points), dtype=bool), *(clump.covers(points) for clump in clumps)], axis=0)
 
 
 def _beside(cloud: LocalPlanes, some: Mask) -> Mask:
