@@ -182,7 +182,7 @@ Damage = Callable[[Shape, float, Rng], Damaged]
 KINDS: dict[str, tuple[Damage, tuple[float, ...]]] = {
     "clean": (clean, (0.0,)),
     "outliers": (outliers, (0.01, 0.02, 0.1, 0.2, 0.4)),
-    "clump": (clump, (0.02, 0.05)),
+    "clump": (clump, (0.02, 0.05, 0.1)),
     "ground": (ground, (1.5,)),
     "uneven": (uneven, (3.0, 10.0, 100.0)),
     "hole": (hole, (0.05, 0.15, 0.3)),
