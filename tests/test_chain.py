@@ -9,7 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from experiments.objects.boundary import instance
 from experiments.objects.shapes import box, join, sample
+from experiments.studies.boundary import Case, look
 from symrefine.decide.chain import chain, explore
 from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted
 from symrefine.decide.pool import Pool
@@ -263,3 +265,13 @@ def test_of_what_has_no_symmetry_the_nearest_misses_are_fitted():
     assert links == (NOTHING,)
     assert pool.small
     assert all(h.need > 0.005 for h in pool.small)
+
+
+def test_a_chain_ends_where_directions_part_what_together_makes_the_same_group_again():
+    """A cloud of 48 blades, of which directions tell C48v and D48h apart though both together are D48h."""
+    made = instance("rotors", "impeller48", 21)
+    shape, _ = look(Case(family="rotors", name="impeller48", view=2, seed=21), made)
+    evidence, surface = gather(measure(shape), np.random.default_rng(0))
+    links = chain(surface, explore(surface, evidence, 0.02), 0.05)
+    names = [link.group.name for link in links]
+    assert len(set(names)) == len(names)

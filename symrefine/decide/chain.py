@@ -25,7 +25,16 @@ from symrefine.decide.hypotheses import (
 from symrefine.decide.pool import ALIKE, Pool, is_at
 from symrefine.decide.posterior import ALONE, certain
 from symrefine.fit.placed import Placed
-from symrefine.propose.candidates import Evidence, about, beside, prime_axes, proposals, voted_mirrors, voted_turns
+from symrefine.propose.candidates import (
+    Evidence,
+    about,
+    beside,
+    prime_axes,
+    proposals,
+    turned_over,
+    voted_mirrors,
+    voted_turns,
+)
 from symrefine.propose.votes import AGREE_RAD
 from symrefine.surface.misses import LIMITS
 from symrefine.surface.surface import Surface
@@ -110,6 +119,7 @@ def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float
     for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
         if glance < HOPELESS and not pool.has(axis):
             pool = _with(surface, pool, about(evidence, axis.group.frame[2]))
+    pool = _with(surface, pool, turned_over(evidence, pool.largest.placed))
     nearest = sorted((*pool.looked, *pool.hopeless), key=lambda k: k[1])[:TOLD] if not pool.small else []
     return replace(pool, small=(*pool.small, *(fitted(surface, start) for start, _ in nearest)))
 
@@ -247,7 +257,8 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
             tried = [h for h in (found, *singly) if h is not None]
             known += tried
             found = min(tried, key=_worst, default=None)
-        if found is None:
+        # Directions may part what together makes the same group again.
+        if found is None or found.group.name == here.group.name:
             rest = [h for h in rest if h not in batch]
             continue
         # What holds together holds in every part of it, though a part alone may not tell what was not seen.

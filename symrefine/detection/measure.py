@@ -18,10 +18,10 @@ from symrefine.ntuples.rank import FixedSubspace, fixed_subspace
 from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
 from symrefine.surface.cameras import Camera, cameras
+from symrefine.surface.clumps import Clump
 from symrefine.surface.drift import Drift
 from symrefine.surface.misses import TOLERANCE, noise_distances
 from symrefine.surface.neighbourhoods import fills_volume
-from symrefine.surface.clumps import Clump
 from symrefine.surface.openings import NEIGHBOURS, openings
 from symrefine.surface.sampling import sampling
 from symrefine.surface.skin import FEW, LocalPlanes, Skin, drawn, isolated_points, make_skin

@@ -18,7 +18,7 @@ from symrefine.groups import PointGroup
 from symrefine.moments.harmonics import harmonic_moments
 from symrefine.moments.moments import Moments
 from symrefine.ntuples.rank import FixedSubspace
-from symrefine.propose.folds import MAX_FOLD, fold_candidates
+from symrefine.propose.folds import MAX_FOLD, fold_candidates, frames_across
 from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candidates, whitened
 from symrefine.propose.votes import mirror_votes, revolution, turn_votes
 from symrefine.surface.skin import Planes
@@ -112,14 +112,25 @@ def _counted(points: Array, direction: Array) -> set[int]:
     return {n for count in counts for n in range(2, min(count, MAX_ORDER) + 1) if count % n == 0}
 
 
+def turned_over(evidence: Evidence, known: Placed) -> list[Placed]:
+    """What turns alone about an axis may belong to: Dn, about the centroid."""
+    symbol = known.group.symbol
+    if symbol.family != "C" or not 1 < symbol.fold <= MAX_FOLD:
+        return []
+    axis = known.group.frame[2]
+    beside_centroid = known.center - (known.center @ axis) * axis
+    frames = frames_across(evidence.points - beside_centroid, evidence.weights, axis, int(symbol.fold))
+    return [placed(f"D{symbol.fold:.0f}", frame, beside_centroid) for frame in frames]
+
+
 def beside(known: Placed) -> list[Placed]:
     """What may hold beside a group that holds: multiples of its order, revolution, what turns its axis over."""
     group, center = known.group, known.center
     main = [(u, k) for u, k in group.rotation_axes()[:1] if group.symbol.fold > 0]
     found = [Placed(group=PointGroup(name="Ci"), center=center)] if not group.has_inversion else []
     if not group.is_finite:
-        turned_over = [placed("Cs", group.frame, center)] if group.name == "Cinfv" else []
-        return [*turned_over, placed("Kh", group.frame, center)] if group.name != "Kh" else []
+        mirrored = [placed("Cs", group.frame, center)] if group.name == "Cinfv" else []
+        return [*mirrored, placed("Kh", group.frame, center)] if group.name != "Kh" else []
     for u, k in main:
         frame = frame_with_z(u)
         found.append(placed("Cinfv", frame, center))

@@ -66,6 +66,21 @@ def fold_candidates(points: Array, weights: Array, axis: Array, *, leak_max: flo
     return sorted(found, key=lambda f: (round(f.leak, 1), -f.fold))
 
 
+def frames_across(points: Array, weights: Array, axis: Array, fold: int) -> list[Array]:
+    """Frames (rows p0, p1, u) about an axis u of known fold, in which a half turn about p0 would turn it over.
+
+    Such a turn at azimuth a takes (rho, phi, h) to (rho, 2 a - phi, -h). So the phase of `c_k` is k a modulo pi where f
+    is even in h, as for a mirror through the axis, and k a + pi/2 where it is odd; one frame by each kind.
+    """
+    c, sigma = azimuthal_spectrum(points, weights, axis)
+    found: list[Array] = []
+    for columns, quarter in (((0, 2, 3), 0.0), ((1,), 0.5 * np.pi)):
+        told = c[fold, list(columns)] / sigma[list(columns)]
+        azimuth = (np.angle(told[np.argmax(np.abs(told))]) - quarter) / fold
+        found.append(rotation([0, 0, 1], -azimuth) @ frame_with_z(axis))
+    return found
+
+
 def _energy_over_noise(c: Array, sigma: Array) -> Array:
     """Energy by order beyond what the largest of so many coefficients of random azimuths shows in 99 % of draws."""
     sigma = np.where(sigma > 0, sigma, np.inf)  # a flat object has no height to weigh azimuths with

@@ -69,7 +69,9 @@ class Openings:
         """What is left of it where the surface counts as closed: what hides it; None if nothing does."""
         if not self.clumps or not (self.cameras or self.line.any()):
             return self if self.clumps else None
-        return replace(self, line=np.zeros_like(self.line), border=np.zeros_like(self.border), evident=False, cameras=())
+        return replace(
+            self, line=np.zeros_like(self.line), border=np.zeros_like(self.border), evident=False, cameras=()
+        )
 
     def linked(self, cloud: LocalPlanes, stride: int) -> Index:
         """Pairs [2, E] of every `stride`-th local planes that are neighbours, both ways."""
