@@ -126,12 +126,16 @@ def _picture(found: Detection, shape: Shape) -> bytes:
     return packed.getvalue()
 
 
-def choice_of(row: Row, point_group: str) -> Choice | None:
-    """The choice of that name, if the object has it."""
-    return next((c for c in row["choices"] if c["point_group"] == point_group), None)
+def choice_of(row: Row, point_group: str) -> int | None:
+    """Which of its choices has that name, if the object has it."""
+    return next((k for k, choice in enumerate(row["choices"]) if choice["point_group"] == point_group), None)
 
 
 def doubtful_first(rows: Mapping[int, Row]) -> list[int]:
-    """Numbers of the objects that something was found in, the most doubtful first."""
+    """Numbers of the objects that something was found in, the most doubtful first.
+
+    Args:
+        rows: are asked for once, one after the other.
+    """
     told = [(row["confidence"], number) for number, row in rows.items() if row["error"] is None]
     return [number for _, number in sorted(told)]
