@@ -3,6 +3,7 @@
 import json
 import math
 import shutil
+import tracemalloc
 from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
@@ -361,6 +362,48 @@ def test_a_page_has_room_for_so_many(run: Run, out: Path, monkeypatch: pytest.Mo
     assert page.count("<article") == 1
     assert "2 more come after these" in page
     assert "3 objects to look at" in page
+
+
+def test_rows_are_not_held(run: Run, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows of 30 MB in all, of which half is settled, take a tenth of that."""
+    monkeypatch.setattr(cards, "MOST", 3)
+    folder, to, row = tmp_path / "models", tmp_path / "many", rows(out)[12]
+    first = folder / row["file"]
+    folder.mkdir()
+    first.write_text(ply(wedge()))
+    shutil.copytree(out, to)
+    made = []
+    for number in range(100, 400):
+        (folder / f"obj_{number:06d}.ply").hardlink_to(first)
+        for k in range(len(row["choices"])):
+            shutil.copy(to / "pictures" / f"obj_000012_{k}.webp", to / "pictures" / f"obj_{number:06d}_{k}.webp")
+        made.append(row | {"object": number, "file": f"obj_{number:06d}.ply", "confidence": number % 2 / 2})
+        made[-1]["choices"] = [choice | {"limits": "x" * 30_000} for choice in row["choices"]]
+    first.unlink()
+    (to / "objects.jsonl").write_text("".join(json.dumps(row) + "\n" for row in made))
+    size = (to / "objects.jsonl").stat().st_size
+    tracemalloc.start()
+    status, _, _ = run("--accept", 0.5, "-q", folder=folder, to=to)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert status == 0
+    assert len(of(to, "models_info.json")) == len(of(to, "labels.json")["open"]) == 150
+    assert most < size / 10, (most, size)
+
+
+def test_of_very_many_failures_some_stand_on_the_page(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cards, "MOST", 2)
+    folder = tmp_path / "models"
+    folder.mkdir()
+    for number in range(5):
+        (folder / f"obj_{number:06d}.ply").write_text("ply\n")
+    assert run(folder=folder, to=tmp_path / "new")[0] == 1
+    page = (tmp_path / "new" / "review.html").read_text(encoding="utf-8")
+    assert page.count("<li>") == 2
+    assert "3 more stand in labels.json" in page
+    assert len(of(tmp_path / "new", "labels.json")["open"]) == 5
 
 
 def test_names_and_notes_do_not_act_on_the_page(run: Run, out: Path, tmp_path: Path) -> None:
