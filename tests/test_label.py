@@ -317,6 +317,54 @@ def test_rows_that_somebody_changed_are_told(run: Run, out: Path, changes: dict[
     assert f"objects.jsonl: is damaged: a row has a {next(iter(changes))} that is" in err
 
 
+DAMAGED: dict[str, tuple[Callable[[Any], Any], str]] = {
+    "no dictionary": (lambda row: row.update(choices=[7]), "choices[0].point_group is not what it is of such a row"),
+    "nan": (lambda row: row.update(confidence=math.nan), "a number of it is not finite"),
+    "deep": (lambda row: row["choices"][0]["entry"].update(diameter=math.inf), "a number of it is not finite"),
+    "no tolerances": (lambda row: row.pop("tolerances"), "its tolerances are no numbers"),
+    "tolerance": (lambda row: row.update(tolerance=0.3), "its tolerances are no numbers, or do not have the one"),
+    "answer": (lambda row: row.update(answer="C\x1b[31m7"), "its answer is none of its"),
+    "none": (lambda row: row.update(choices=[]), "its answer is none of its 0 choices"),
+    "likely": (lambda row: row["choices"][0].update(probabilities=[]), "choices[0].probabilities is not"),
+    "size": (lambda row: row["choices"][0].update(entry={"diameter": "x"}), "choices[0].entry is not"),
+    "sure": (lambda row: row.update(confidence=7), "its confidence is no probability"),
+}
+
+
+@pytest.mark.parametrize("case", DAMAGED)
+def test_rows_that_hold_what_no_row_holds_are_told(run: Run, out: Path, case: str) -> None:
+    change, said = DAMAGED[case]
+    made = rows(out)
+    change(made[4])
+    (out / "objects.jsonl").write_text("".join(json.dumps(row) + "\n" for row in made.values()))
+    before = {name: (out / name).read_bytes() for name in RESULTS}
+    status, _, err = run("--accept", 0.5)
+    assert (status, err.count("\n")) == (2, 1), err
+    assert f"objects.jsonl: is damaged: object 4: {said}" in err
+    assert {name: (out / name).read_bytes() for name in RESULTS} == before
+
+
+def test_what_cannot_be_written_is_told_before_any_work(run: Run, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(label, "examine_model", lambda _: pytest.fail("has begun"))
+    (out / "objects.jsonl").write_text("")
+    (out / "labels.json").unlink()
+    (out / "labels.json").mkdir()
+    status, _, err = run()
+    assert (status, err) == (2, f"symrefine: {out / 'labels.json'}: is a directory; expected a file to write\n")
+    shutil.rmtree(out / "labels.json")
+    shutil.rmtree(out / "pictures")
+    (out / "pictures").write_text("")
+    status, _, err = run()
+    assert (status, err) == (2, f"symrefine: {out / 'pictures'}: is a file; expected a folder\n")
+
+
+def test_a_picture_that_is_empty_is_made_again(run: Run, out: Path, first: Path) -> None:
+    name = "pictures/obj_000001_0.webp"
+    (out / name).write_bytes(b"")
+    assert run()[0] == 0
+    assert (out / name).read_bytes() == (first / name).read_bytes()
+
+
 def test_of_a_file_of_several_objects_one_is_chosen(run: Run, models: Path, tmp_path: Path) -> None:
     """A label is of one object; what is chosen counts for files that hold several, and not for the others."""
     folder, to = tmp_path / "models", tmp_path / "new"

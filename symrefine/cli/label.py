@@ -19,7 +19,7 @@ from symrefine.cli.values import (
     probability,
 )
 from symrefine.errors import InputError, about, one_line
-from symrefine.files import check_target, pieces_writer, text_writer, whole
+from symrefine.files import pieces_writer, text_writer, whole
 
 if TYPE_CHECKING:
     from symrefine.fleet.journal import Journal
@@ -201,8 +201,6 @@ def _write(args: argparse.Namespace, rows: "Rows", order: list[int], decisions: 
         LABELS: pieces_writer(labels_json(rows, labels, args.accept)),
         PAGE: text_writer(page_text(args.dir, out, rows, order, decisions, labels)),
     }
-    for name in writers:
-        check_target(out / name)
     write_all({str(out / name): writer for name, writer in writers.items()})
 
 
