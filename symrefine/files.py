@@ -77,6 +77,10 @@ def whole(path: Path) -> Iterator[Path]:
         yield draft
 
 
+class _Unwritten(InputError):
+    """A file that could not be written and is named: of several that are written together, this one."""
+
+
 @contextmanager
 def naming(name: str) -> Iterator[None]:
     """Name the file that could not be written: the system names none, or its draft.
@@ -86,13 +90,13 @@ def naming(name: str) -> Iterator[None]:
     """
     try:
         yield
-    except BrokenPipeError:
+    except (BrokenPipeError, _Unwritten):
         raise
     except (OSError, InputError) as error:
         reason = error if isinstance(error, OSError) else error.__cause__
         if not isinstance(reason, OSError):
             raise
-        raise InputError(f"{name}: cannot be written: {reason.strerror or reason}") from reason
+        raise _Unwritten(f"{name}: cannot be written: {reason.strerror or reason}") from reason
 
 
 def write_all(writers: Mapping[str, Writer]) -> None:

@@ -356,6 +356,11 @@ def test_what_cannot_be_written_is_told_before_any_work(run: Run, out: Path, mon
     (out / "pictures").write_text("")
     status, _, err = run()
     assert (status, err) == (2, f"symrefine: {out / 'pictures'}: is a file; expected a folder\n")
+    (out / "pictures").unlink()
+    monkeypatch.setattr("symrefine.files.os.access", lambda path, _: path.name != "pictures")
+    status, _, err = run()
+    assert (status, err.count("\n")) == (2, 1)
+    assert f"cannot be written: no permission in the directory {out / 'pictures'}" in err
 
 
 def test_a_picture_that_is_empty_is_made_again(run: Run, out: Path, first: Path) -> None:

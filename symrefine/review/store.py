@@ -52,6 +52,7 @@ def opened(out: Path) -> Iterator[journal.Journal]:
             raise InputError(f"{out / PICTURES}: is a file; expected a folder")
         with naming(str(out / PICTURES)):
             (out / PICTURES).mkdir(exist_ok=True)
+        check_target(out / PICTURES / ROWS)  # any name will do: it is the folder that pictures are written to
         for name in (DECISIONS, INFO, LABELS, PAGE):
             check_target(out / name)
         yield held
