@@ -77,7 +77,7 @@ def whole(path: Path) -> Iterator[Path]:
         yield draft
 
 
-class _Unwritten(InputError):
+class _UnwrittenError(InputError):
     """A file that could not be written and is named: of several that are written together, this one."""
 
 
@@ -90,13 +90,13 @@ def naming(name: str) -> Iterator[None]:
     """
     try:
         yield
-    except (BrokenPipeError, _Unwritten):
+    except (BrokenPipeError, _UnwrittenError):
         raise
     except (OSError, InputError) as error:
         reason = error if isinstance(error, OSError) else error.__cause__
         if not isinstance(reason, OSError):
             raise
-        raise _Unwritten(f"{name}: cannot be written: {reason.strerror or reason}") from reason
+        raise _UnwrittenError(f"{name}: cannot be written: {reason.strerror or reason}") from reason
 
 
 def write_all(writers: Mapping[str, Writer]) -> None:
