@@ -17,6 +17,8 @@ from symrefine.errors import InputError
 
 # What to say of what is not `is_regular`.
 ENDLESS = "is a pipe or a device; expected a file"
+# Before the first record of a list in JSON, and between one entry and the next.
+_FIRST, _BETWEEN = "[\n", ",\n"
 # A writer fills the file it is given.
 Writer = Callable[[Path], object]
 # The files that were asked for since somebody wants to know.
@@ -75,6 +77,10 @@ def whole(path: Path) -> Iterator[Path]:
         yield draft
 
 
+class _UnwrittenError(InputError):
+    """A file that could not be written and is named: of several that are written together, this one."""
+
+
 @contextmanager
 def naming(name: str) -> Iterator[None]:
     """Name the file that could not be written: the system names none, or its draft.
@@ -84,13 +90,13 @@ def naming(name: str) -> Iterator[None]:
     """
     try:
         yield
-    except BrokenPipeError:
+    except (BrokenPipeError, _UnwrittenError):
         raise
     except (OSError, InputError) as error:
         reason = error if isinstance(error, OSError) else error.__cause__
         if not isinstance(reason, OSError):
             raise
-        raise InputError(f"{name}: cannot be written: {reason.strerror or reason}") from reason
+        raise _UnwrittenError(f"{name}: cannot be written: {reason.strerror or reason}") from reason
 
 
 def write_all(writers: Mapping[str, Writer]) -> None:
@@ -106,6 +112,16 @@ def text_writer(text: str) -> Writer:
     return bytes_writer(text.encode("utf-8"))
 
 
+def pieces_writer(pieces: Iterable[str]) -> Writer:
+    """A writer of text that is made piece by piece while it is written, once; in UTF-8, lines ending as they are."""
+
+    def write(path: Path) -> None:
+        with path.open("w", encoding="utf-8", newline="") as stream:
+            stream.writelines(pieces)
+
+    return write
+
+
 def bytes_writer(data: bytes) -> Writer:
     """A writer of bytes."""
     return lambda path: path.write_bytes(data)
@@ -117,8 +133,20 @@ def json_text(data: Mapping[str, Any]) -> str:
     Raises:
         ValueError: NaN or infinity, which JSON does not know.
     """
-    entries = [f"  {json.dumps(key)}: {_entry(value)}" for key, value in data.items()]
-    return "{\n" + ",\n".join(entries) + "\n}\n"
+    return "".join(json_pieces(data.items()))
+
+
+def json_pieces(entries: Iterable[tuple[str, Any]]) -> Iterator[str]:
+    """What `json_text` has, piece by piece; an iterator of objects stands for a list of them that nobody holds.
+
+    Raises:
+        ValueError: NaN or infinity, which JSON does not know.
+    """
+    yield "{\n"
+    for number, (key, value) in enumerate(entries):
+        yield f"{_BETWEEN if number else ''}  {json.dumps(key)}: "
+        yield from _entry(value)
+    yield "\n}\n"
 
 
 def json_array_text(records: Iterable[Mapping[str, Any]]) -> str:
@@ -130,10 +158,15 @@ def json_array_text(records: Iterable[Mapping[str, Any]]) -> str:
     return "[\n" + ",\n".join(json_text(record).rstrip("\n") for record in records) + "\n]\n"
 
 
-def _entry(value: Any) -> str:
-    if isinstance(value, list) and value and isinstance(value[0], dict):
-        return "[\n" + ",\n".join(f"    {json.dumps(v, allow_nan=False)}" for v in value) + "\n  ]"
-    return json.dumps(value, allow_nan=False)
+def _entry(value: Any) -> Iterator[str]:
+    if not isinstance(value, Iterator) and not (isinstance(value, list) and value and isinstance(value[0], dict)):
+        yield json.dumps(value, allow_nan=False)
+        return
+    empty = True
+    for record in value:
+        yield f"{_FIRST if empty else _BETWEEN}    {json.dumps(record, allow_nan=False)}"
+        empty = False
+    yield "[]" if empty else "\n  ]"
 
 
 def is_only_writer(descriptor: int) -> bool:

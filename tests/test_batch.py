@@ -1,6 +1,7 @@
 """`batch`, `run` and `merge` on many objects: what they take, the same rows whoever does them, attacks."""
 
 import csv
+import errno
 import json
 import os
 import signal
@@ -533,6 +534,25 @@ def test_pipes_and_devices_are_no_objects(run: Run) -> None:
     for name in ("pipe.xyz", "device.xyz"):
         refused(run("detect", name), f"{name}: is a pipe or a device; expected a file")
         assert f"failed: {name}: is a pipe or a device" in run("batch", name, "objects/box000.xyz")[1]
+    refused(run("batch", "--manifest", "/dev/zero"), "/dev/zero: has more than 67,108,864 bytes, or no end")
+
+
+@pytest.mark.usefixtures("lab")
+def test_merge_writes_both_files_or_none(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    for number in (1, 2):
+        assert run("batch", "objects", "--shard", f"{number}/2", "--out", f"part{number}.jsonl")[0] == 0
+
+    def full(_: object, path: Path) -> None:
+        path.write_text("half of it")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    line = ("merge", "part1.jsonl", "part2.jsonl", "--out", "all.jsonl", "--table", "all.csv")
+    with monkeypatch.context() as patch:
+        patch.setattr("symrefine.fleet.table.write_table", full)
+        refused(run(*line), "all.csv: cannot be written: No space left on device")
+    assert not sorted(Path().glob("*all*"))
+    assert run(*line)[0] == 0
+    assert len(sorted(Path().glob("*all*"))) == 2
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems take names in UTF-8 only")
@@ -588,7 +608,7 @@ def test_a_disk_that_is_full_in_the_middle_of_a_row_loses_none_before_it(lab: Pa
     full = start(line.split(), preexec_fn=little_room)
     err = full.communicate()[1]
     assert (full.returncode, err.count("\n")) == (2, 1)
-    assert f"{file.partition('/')[0]}: cannot be written: " in err
+    assert f"{file}: cannot be written: " in err
     before = (lab / file).read_bytes()
     kept = before[: before.rfind(b"\n") + 1].splitlines()
     assert len(kept) in (3, 4, 5)

@@ -3,6 +3,7 @@
 import json
 import math
 import shutil
+import tracemalloc
 from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
@@ -316,6 +317,59 @@ def test_rows_that_somebody_changed_are_told(run: Run, out: Path, changes: dict[
     assert f"objects.jsonl: is damaged: a row has a {next(iter(changes))} that is" in err
 
 
+DAMAGED: dict[str, tuple[Callable[[Any], Any], str]] = {
+    "no dictionary": (lambda row: row.update(choices=[7]), "choices[0].point_group is not what it is of such a row"),
+    "nan": (lambda row: row.update(confidence=math.nan), "a number of it is not finite"),
+    "deep": (lambda row: row["choices"][0]["entry"].update(diameter=math.inf), "a number of it is not finite"),
+    "no tolerances": (lambda row: row.pop("tolerances"), "its tolerances are no numbers"),
+    "tolerance": (lambda row: row.update(tolerance=0.3), "its tolerances are no numbers, or do not have the one"),
+    "answer": (lambda row: row.update(answer="C\x1b[31m7"), "its answer is none of its"),
+    "none": (lambda row: row.update(choices=[]), "its answer is none of its 0 choices"),
+    "likely": (lambda row: row["choices"][0].update(probabilities=[]), "choices[0].probabilities is not"),
+    "size": (lambda row: row["choices"][0].update(entry={"diameter": "x"}), "choices[0].entry is not"),
+    "sure": (lambda row: row.update(confidence=7), "its confidence is no probability"),
+}
+
+
+@pytest.mark.parametrize("case", DAMAGED)
+def test_rows_that_hold_what_no_row_holds_are_told(run: Run, out: Path, case: str) -> None:
+    change, said = DAMAGED[case]
+    made = rows(out)
+    change(made[4])
+    (out / "objects.jsonl").write_text("".join(json.dumps(row) + "\n" for row in made.values()))
+    before = {name: (out / name).read_bytes() for name in RESULTS}
+    status, _, err = run("--accept", 0.5)
+    assert (status, err.count("\n")) == (2, 1), err
+    assert f"objects.jsonl: is damaged: object 4: {said}" in err
+    assert {name: (out / name).read_bytes() for name in RESULTS} == before
+
+
+def test_what_cannot_be_written_is_told_before_any_work(run: Run, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(label, "examine_model", lambda _: pytest.fail("has begun"))
+    (out / "objects.jsonl").write_text("")
+    (out / "labels.json").unlink()
+    (out / "labels.json").mkdir()
+    status, _, err = run()
+    assert (status, err) == (2, f"symrefine: {out / 'labels.json'}: is a directory; expected a file to write\n")
+    shutil.rmtree(out / "labels.json")
+    shutil.rmtree(out / "pictures")
+    (out / "pictures").write_text("")
+    status, _, err = run()
+    assert (status, err) == (2, f"symrefine: {out / 'pictures'}: is a file; expected a folder\n")
+    (out / "pictures").unlink()
+    monkeypatch.setattr("symrefine.files.os.access", lambda path, _: path.name != "pictures")
+    status, _, err = run()
+    assert (status, err.count("\n")) == (2, 1)
+    assert f"cannot be written: no permission in the directory {out / 'pictures'}" in err
+
+
+def test_a_picture_that_is_empty_is_made_again(run: Run, out: Path, first: Path) -> None:
+    name = "pictures/obj_000001_0.webp"
+    (out / name).write_bytes(b"")
+    assert run()[0] == 0
+    assert (out / name).read_bytes() == (first / name).read_bytes()
+
+
 def test_of_a_file_of_several_objects_one_is_chosen(run: Run, models: Path, tmp_path: Path) -> None:
     """A label is of one object; what is chosen counts for files that hold several, and not for the others."""
     folder, to = tmp_path / "models", tmp_path / "new"
@@ -361,6 +415,48 @@ def test_a_page_has_room_for_so_many(run: Run, out: Path, monkeypatch: pytest.Mo
     assert page.count("<article") == 1
     assert "2 more come after these" in page
     assert "3 objects to look at" in page
+
+
+def test_rows_are_not_held(run: Run, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows of 30 MB in all, of which half is settled, take a tenth of that."""
+    monkeypatch.setattr(cards, "MOST", 3)
+    folder, to, row = tmp_path / "models", tmp_path / "many", rows(out)[12]
+    first = folder / row["file"]
+    folder.mkdir()
+    first.write_text(ply(wedge()))
+    shutil.copytree(out, to)
+    made = []
+    for number in range(100, 400):
+        (folder / f"obj_{number:06d}.ply").hardlink_to(first)
+        for k in range(len(row["choices"])):
+            shutil.copy(to / "pictures" / f"obj_000012_{k}.webp", to / "pictures" / f"obj_{number:06d}_{k}.webp")
+        made.append(row | {"object": number, "file": f"obj_{number:06d}.ply", "confidence": number % 2 / 2})
+        made[-1]["choices"] = [choice | {"limits": "x" * 30_000} for choice in row["choices"]]
+    first.unlink()
+    (to / "objects.jsonl").write_text("".join(json.dumps(row) + "\n" for row in made))
+    size = (to / "objects.jsonl").stat().st_size
+    tracemalloc.start()
+    status, _, _ = run("--accept", 0.5, "-q", folder=folder, to=to)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert status == 0
+    assert len(of(to, "models_info.json")) == len(of(to, "labels.json")["open"]) == 150
+    assert most < size / 10, (most, size)
+
+
+def test_of_very_many_failures_some_stand_on_the_page(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cards, "MOST", 2)
+    folder = tmp_path / "models"
+    folder.mkdir()
+    for number in range(5):
+        (folder / f"obj_{number:06d}.ply").write_text("ply\n")
+    assert run(folder=folder, to=tmp_path / "new")[0] == 1
+    page = (tmp_path / "new" / "review.html").read_text(encoding="utf-8")
+    assert page.count("<li>") == 2
+    assert "3 more stand in labels.json" in page
+    assert len(of(tmp_path / "new", "labels.json")["open"]) == 5
 
 
 def test_names_and_notes_do_not_act_on_the_page(run: Run, out: Path, tmp_path: Path) -> None:

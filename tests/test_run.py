@@ -70,14 +70,25 @@ def test_run_prints_its_tables_and_tells_failures(config: Path, capsys: pytest.C
 
 
 def test_what_there_is_to_run_is_listed(config: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert invoke(["run", "--list"]) == 2
-    assert "configs: no configs there" in capsys.readouterr().err
+    (config.parent / "empty").mkdir()
+    assert invoke(["run", "--list", "empty"]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith(
+        f"symrefine: {config.parent / 'empty'}: no config in it, in configs there, or in configs above"
+    )
+    assert err.count("\n") == 1
+    assert "examples are in the directories configs and experiments/studies of symrefine's repository" in err
+    assert invoke(["run", "--list"]) == 0
+    assert capsys.readouterr().out == f"{config.name}  wait_and_divide\n"
     (config.parent / "configs").mkdir()
     (config.parent / "configs" / "b.yaml").write_text(CONFIG)
     (config.parent / "configs" / "a.yaml").write_text(f"title: By three\n{CONFIG}")
     (config.parent / "configs" / "other.yaml").write_text("seeds: 3\n")
     assert invoke(["run", "--list"]) == 0
     assert capsys.readouterr().out == "configs/a.yaml  By three\nconfigs/b.yaml  wait_and_divide\n"
+    assert invoke(["run", "--list", "empty"]) == 0
+    listed = config.parent / "configs"
+    assert capsys.readouterr().out.splitlines()[0].split() == [str(listed / "a.yaml"), "By", "three"]
     before = sorted(config.parent.iterdir())
     assert invoke(["run", str(config), "--list", "--limit", "2", "--set", "sweep.wait=[0.5, 1]"]) == 2
     assert "is in `sweep` too" in capsys.readouterr().err

@@ -259,7 +259,7 @@ def test_a_config_that_is_not_there_is_told_with_those_that_are(
     with pytest.raises(InputError, match=f"other.yaml:1: config: missing experiment, .*; {there}$"):
         make_plan(configs / "other.yaml")
     (configs / "toy.yaml").unlink()
-    with pytest.raises(InputError, match="in the directory configs of symrefine's repository"):
+    with pytest.raises(InputError, match="examples are in the directories configs and experiments"):
         make_plan(configs / "toy.yaml")
 
 

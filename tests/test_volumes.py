@@ -5,6 +5,7 @@ import gzip
 import io
 import logging
 import sys
+import tracemalloc
 import warnings
 from contextlib import suppress
 from pathlib import Path
@@ -220,6 +221,63 @@ def test_large_volumes_are_averaged_and_it_is_told(
         assert np.linalg.norm(shift) < (0.01 if coarse is few else 1e-9) * np.linalg.norm(np.ptp(fine.points, axis=0))
     assert blocks.weights.sum() == pytest.approx(solid.weights.sum())
     assert few.weights.sum() == pytest.approx(whole.weights.sum(), rel=0.05)
+
+
+@pytest.mark.parametrize("measure", ["surface", "solid"])
+@pytest.mark.parametrize("most", [10**6, 700])
+def test_slabs_change_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, measure: str, most: int) -> None:
+    """Volumes whose longest axis is any of the three, of numbers of any type and order, as one slab and as many.
+
+    To the last bit, but for means over blocks in single precision, which are summed in the order of the memory.
+    """
+    away = 1e-5 if measure == "surface" and most < 10**6 else 0.0
+    body = blobs(HEAD)
+    whole = {"a.nii": nii((1000 * body[:37, :, 5:]).astype(np.int16)), "b.nrrd": nrrd(body[:, 3:40, :41].astype(">f8"))}
+    whole |= {"c.mrc": saved_mrc(tmp_path, np.ascontiguousarray(body[:29, :31]), mapc=3, mapr=1, maps=2)}
+    whole |= {"d.nrrd": nrrd((200 * body[9:, 5:]).clip(0, 255).astype(np.uint8), encoding="gzip")}
+    monkeypatch.setattr(volume, "ENOUGH", most)
+    options = [{}, {"threshold": 0.4}] + [{"threshold": "otsu"}, {"invert": True}] * (measure == "solid")
+    for name, data in whole.items():
+        for given in options:
+            monkeypatch.setattr(volume, "_SLAB", 2**22)
+            one = loaded(tmp_path, data, name, measure=measure, **given)
+            monkeypatch.setattr(volume, "_SLAB", 5000)
+            many = load(tmp_path / name, measure=measure, **given)
+            for attribute in ("points", "weights", "normals")[: 2 + (measure == "surface")]:
+                expected = getattr(one, attribute)
+                atol = away * np.abs(expected).max()
+                np.testing.assert_allclose(getattr(many, attribute), expected, rtol=0.0, atol=atol, err_msg=name)
+
+
+@pytest.mark.parametrize("measure", ["surface", "solid"])
+@pytest.mark.parametrize("name", ["a.nii", "a.nii.gz", "a.nrrd", "a.mrc"])
+def test_of_a_volume_little_is_held_beside_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, measure: str, name: str
+) -> None:
+    monkeypatch.setattr(volume, "_SLAB", 2**14)
+    monkeypatch.setattr(volume, "ENOUGH", 4000)
+    values = np.pad(blobs(HEAD), 40)
+    made = {"nii": nii(values), "nrrd": nrrd(values, encoding="raw"), "mrc": saved_mrc(tmp_path, values)}
+    data = gzip.compress(made["nii"]) if name.endswith(".gz") else made[name.partition(".")[2]]
+    loaded(tmp_path, data, name, measure=measure)  # so that what is imported is not counted
+    tracemalloc.start()
+    load(tmp_path / name, measure=measure)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 1.5 * values.nbytes, most / values.nbytes
+
+
+def test_intensities_that_single_precision_cannot_tell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(volume, "_SLAB", 300)
+    wide = BALL.copy()
+    wide[0, 0, 0], wide[1, 1, 1] = -3e38, 3e38
+    assert "intensities run from -3e+38 to 3e+38, farther than single precision goes" in refusal(
+        tmp_path, nii(wide), "a.nii"
+    )
+    wide = BALL.astype(np.float64)
+    wide[9, 2, 15], wide[9, 3, 0], wide[11, 0, 0] = 1e300, np.nan, -np.inf
+    told = refusal(tmp_path, nrrd(wide), "a.nrrd")
+    assert "voxel [9, 2, 15] is inf (3 such of 4096); intensities must be finite" in told
 
 
 # Damage.

@@ -1,9 +1,10 @@
-"""How much memory `batch`, `merge` and `run` take by the number of rows, all of which were done before.
+"""How much memory `batch`, `merge`, `run` and `label` take by the number of rows, all of which were done before.
 
     python -m experiments.studies.memory --rows 200000 --page docs/fleets.md
 
 Nothing is detected: there are so many links to one small object with so many rows of it, as if a fleet had been killed
-when all but its table was written, the same rows in two parts, and a study with as many runs as one may have.
+when all but its table was written, the same rows in two parts, a study with as many runs as one may have, and a data
+set to be labelled, of which half is settled.
 """
 
 import argparse
@@ -26,6 +27,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # The most runs that a study may have.
 RUNS = 100_000
 BOX = "".join(f"{x} {y} {z}\n" for x in (0, 1) for y in (0, 2) for z in (0, 3))
+CUBE = "".join(f"{x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1))
 EXPERIMENT = """
 from dataclasses import dataclass
 
@@ -63,7 +65,7 @@ def peak(folder: Path, *arguments: str) -> tuple[int, float]:
 
 
 def lay_out(folder: Path, rows: int) -> None:
-    """The objects and rows of a batch, its parts, and a study of which all is done."""
+    """The objects and rows of a batch, its parts, a study of which all is done, and labels that nobody looked at."""
     (folder / "objects").mkdir()
     (folder / "box.xyz").write_text(BOX)
     names = [f"box{number:06d}.xyz" for number in range(rows)]
@@ -84,6 +86,25 @@ def lay_out(folder: Path, rows: int) -> None:
     row = json.loads((folder / "thirds" / "journal.jsonl").read_text())
     results = ({"third": i / 3, "odd": bool(i % 2), "name": f"run {i}"} for i in range(runs))
     _write(folder / "thirds" / "journal.jsonl", (row | {"index": i, "results": r} for i, r in enumerate(results)))
+    _lay_out_labels(folder, rows)
+
+
+def _lay_out_labels(folder: Path, objects: int) -> None:
+    (folder / "models").mkdir()
+    first = folder / "models" / "obj_000000.xyz"
+    first.write_text(CUBE)
+    peak(folder, "label", "models", "--out", "labels")
+    row = json.loads((folder / "labels" / "objects.jsonl").read_text())
+    names = [f"obj_{number:06d}" for number in range(objects)]
+    pictures = [path.name.removeprefix(names[0]) for path in (folder / "labels" / "pictures").iterdir()]
+    for name in names[1:]:
+        (folder / "models" / f"{name}.xyz").symlink_to(first.name)
+        for picture in pictures:
+            (folder / "labels" / "pictures" / f"{name}{picture}").hardlink_to(
+                folder / "labels" / "pictures" / f"{names[0]}{picture}"
+            )
+    own = ({"object": i, "file": f"{name}.xyz", "confidence": i % 10 / 10} for i, name in enumerate(names))
+    _write(folder / "labels" / "objects.jsonl", (row | told for told in own))
 
 
 def _write(path: Path, rows: Iterable[Row]) -> None:
@@ -96,6 +117,7 @@ COMMANDS = {
     "batch --table rows.csv": "batch objects --out rows.jsonl --table rows.csv",
     "merge --table all.parquet": "merge part1.jsonl part2.jsonl --out all.jsonl --table all.parquet",
     "run": "run thirds.yaml",
+    "label": "label models --out labels --accept 0.5",
 }
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from symrefine.cli.outputs import note, print_lines, write_all
 from symrefine.cli.values import count, positive
 from symrefine.errors import InputError
+from symrefine.files import Writer
 
 if TYPE_CHECKING:
     from symrefine.fleet.crew import Executor
@@ -119,9 +120,21 @@ def check_table_option(args: argparse.Namespace) -> None:
 
 
 def write_rows(name: str | None, rows: "Sequence[Row]") -> None:
-    """Write rows as a flat table if one is asked for, without their times, which differ from run to run."""
+    """Write rows as a flat table if one is asked for, and say so."""
+    write_all(table_writer(name, rows))
+    tell_table(name, rows)
+
+
+def tell_table(name: str | None, rows: "Sequence[Row]") -> None:
+    """Say that the table was written, if one was asked for."""
+    if name is not None:
+        print_lines([f"wrote {name}: {len(rows)} rows"])
+
+
+def table_writer(name: str | None, rows: "Sequence[Row]") -> dict[str, Writer]:
+    """The writer of rows as a flat table if one is asked for, without their times, which differ from run to run."""
     if name is None:
-        return
+        return {}
     from symrefine.fleet.rows import Rows
     from symrefine.fleet.shard import PART
     from symrefine.fleet.table import flat, write_table
@@ -129,6 +142,4 @@ def write_rows(name: str | None, rows: "Sequence[Row]") -> None:
     def told_of(number: int) -> "Row":
         return flat({key: value for key, value in rows[number].items() if key not in ("timings", PART)})
 
-    told = Rows(len(rows), told_of)
-    write_all({name: partial(write_table, told)})
-    print_lines([f"wrote {name}: {len(told)} rows"])
+    return {name: partial(write_table, Rows(len(rows), told_of))}

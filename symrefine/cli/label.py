@@ -19,7 +19,7 @@ from symrefine.cli.values import (
     probability,
 )
 from symrefine.errors import InputError, about, one_line
-from symrefine.files import check_target, json_text, text_writer, whole
+from symrefine.files import pieces_writer, text_writer, whole
 
 if TYPE_CHECKING:
     from symrefine.fleet.journal import Journal
@@ -76,6 +76,7 @@ def run(args: argparse.Namespace) -> int:
     from symrefine.export.bop import models_of
     from symrefine.review.decisions import read_decisions
     from symrefine.review.labels import labelled, merged
+    from symrefine.review.objects import doubtful_first
     from symrefine.review.store import DECISIONS, heads, opened
 
     models, out = models_of(Path(args.dir)), Path(args.out)
@@ -88,9 +89,11 @@ def run(args: argparse.Namespace) -> int:
         _check(args.decisions, given, rows)
         decisions = merged(_fitting(kept, rows, out / DECISIONS), given)
         labels = labelled(rows, decisions, args.accept)
-        _write(args, rows, decisions, labels)
-    _tell(args, rows, labels)
-    return int(any(row["error"] is not None for row in rows.values()))
+        order = doubtful_first(rows)
+        _write(args, rows, order, decisions, labels)
+    failed = len(rows) - len(order)
+    _tell(args, len(rows), failed, labels)
+    return int(failed > 0)
 
 
 def _check(name: str, given: "Decisions", rows: "Rows") -> None:
@@ -114,7 +117,7 @@ def _fitting(kept: "Decisions", rows: "Rows", place: Path) -> "Decisions":
 
 
 def _detected(args: argparse.Namespace, asked: "Rows", held: "Journal") -> "Rows":
-    """The rows of all objects; those that still tell of their files are not made again."""
+    """The rows of all objects, on disk; those that still tell of their files are not made again."""
     from symrefine.fleet.crew import on_this_machine
     from symrefine.fleet.tasks import finish
     from symrefine.review.store import ROWS, holds
@@ -122,20 +125,18 @@ def _detected(args: argparse.Namespace, asked: "Rows", held: "Journal") -> "Rows
     out = Path(args.out)
     if held.torn:
         note(f"{out / ROWS}: the last row is incomplete; it is removed and done again")
-    latest = {number: cast("Row | None", held.latest.get(number)) for number in asked}
-    rows: dict[int, Row] = {n: last for n, last in latest.items() if last and holds(out, last, asked[n])}
-    todo = [row for number, row in asked.items() if number not in rows]
-    jobs = [(row, args.dir, args.out) for row in todo]
-    print_lines(_line(row) for row in rows.values())
-    with progress("detecting", len(asked), len(rows)) as advance:
+    latest = held.latest
+    kept = {n: None for n, row in asked.items() if holds(out, cast("Row | None", latest.get(n)), row)}
+    jobs = [(row, args.dir, args.out) for number, row in asked.items() if number not in kept]
+    print_lines(_line(row) for row in cast("Rows", held.among(kept)).values())
+    with progress("detecting", len(asked), len(kept)) as advance:
         for made in finish(on_this_machine(args.workers, tell=note), examine_model, jobs, lost, held):
             row = cast("Row", made)
-            rows[row["object"]] = row
             if is_quiet() and row["error"] is not None:
                 complain(row["error"])
             print_lines([_line(row)])
             advance()
-    return dict(sorted(rows.items()))
+    return cast("Rows", held.among(sorted(asked)))
 
 
 def examine_model(job: Job) -> dict[str, Any]:
@@ -186,23 +187,21 @@ def lost(job: Job, why: "Lost") -> dict[str, Any]:
     return {**row, "error": one_line(f"{Path(folder, row['file'])}: {why.why}")}
 
 
-def _write(args: argparse.Namespace, rows: "Rows", decisions: "Decisions", labels: "Labels") -> None:
+def _write(args: argparse.Namespace, rows: "Rows", order: list[int], decisions: "Decisions", labels: "Labels") -> None:
     """All results, or none of them."""
     from symrefine.review.cards import page_text
     from symrefine.review.decisions import decisions_text
-    from symrefine.review.labels import labels_text, models_info
+    from symrefine.review.labels import info_json, labels_json
     from symrefine.review.store import DECISIONS, INFO, LABELS, PAGE
 
     out = Path(args.out)
-    texts = {
-        DECISIONS: decisions_text(decisions),
-        INFO: json_text(models_info(labels)),
-        LABELS: labels_text(rows, labels, args.accept),
-        PAGE: page_text(args.dir, out, rows, decisions, labels),
+    writers = {
+        DECISIONS: text_writer(decisions_text(decisions)),
+        INFO: pieces_writer(info_json(rows, labels)),
+        LABELS: pieces_writer(labels_json(rows, labels, args.accept)),
+        PAGE: text_writer(page_text(args.dir, out, rows, order, decisions, labels)),
     }
-    for name in texts:
-        check_target(out / name)
-    write_all({str(out / name): text_writer(text) for name, text in texts.items()})
+    write_all({str(out / name): writer for name, writer in writers.items()})
 
 
 def _line(row: "Row") -> str:
@@ -216,21 +215,20 @@ def _line(row: "Row") -> str:
     return f"{row['answer'] or 'undetermined':<13}{row['confidence']:<7.3f}{one_line(row['file'])}{told}"
 
 
-def _tell(args: argparse.Namespace, rows: "Rows", labels: "Labels") -> None:
+def _tell(args: argparse.Namespace, objects: int, failed: int, labels: "Labels") -> None:
     """How many are settled, by whom, and what is to be done with the others."""
     from symrefine.export.bop import metres_doubt
     from symrefine.review.store import INFO, LABELS, PAGE
 
     by = [label.by for label in labels.values()]
-    failed = sum(row["error"] is not None for row in rows.values())
-    left = len(rows) - len(labels) - failed
+    left = objects - len(labels) - failed
     settled = f"{len(labels)} settled ({by.count('confidence')} by confidence, {by.count('person')} by a person)"
-    parts = [f"{len(rows)} objects: {settled}", f"{left} to look at", f"{failed} failed" if failed else ""]
+    parts = [f"{objects} objects: {settled}", f"{left} to look at", f"{failed} failed" if failed else ""]
     print_lines([", ".join(part for part in parts if part)])
     print_lines(f"wrote {Path(args.out, name)}" for name in (INFO, LABELS, PAGE))
     if left:
         print_lines([f"open {Path(args.out, PAGE)}, choose, save, and run this again with --decisions"])
     if labels and args.scale is None:
-        size, number = min((label.choice["entry"]["diameter"], number) for number, label in labels.items())
+        size, number = min((label.diameter, number) for number, label in labels.items())
         if doubt := metres_doubt(f"object {number}", size, "--scale"):
             note(doubt)

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from symrefine.cli.fleet import add_table_option, check_table_option, write_rows
-from symrefine.cli.outputs import check_outputs, print_lines
+from symrefine.cli.fleet import add_table_option, check_table_option, table_writer, tell_table
+from symrefine.cli.outputs import check_outputs, print_lines, write_all
 from symrefine.errors import InputError
-from symrefine.files import naming, whole
+from symrefine.files import check_target, naming, pieces_writer
 
 if TYPE_CHECKING:
     from symrefine.fleet.rows import Row
@@ -49,8 +49,12 @@ def run(args: argparse.Namespace) -> int:
     check_table_option(args)
     check_outputs({"--table": args.table} | ({} if studies else {"--out": args.out}), files)
     rows = merged({str(path): _rows(path, is_study=bool(studies)) for path in files})
-    _write(out, rows)
-    write_rows(args.table, rows)
+    with naming(str(out)):
+        out.parent.mkdir(exist_ok=True)
+    check_target(out)
+    lines = (f"{json.dumps(row)}\n" for row in rows)
+    write_all({str(out): pieces_writer(lines)} | table_writer(args.table, rows))
+    tell_table(args.table, rows)
     print_lines([f"wrote {args.out}: {len(rows)} rows of {len(parts)} parts"])
     return 0
 
@@ -62,10 +66,3 @@ def _rows(path: Path, *, is_study: bool) -> Sequence["Row"]:
 
     kinds, rows_of = (KINDS, "a study") if is_study else (BATCH, "`symrefine batch`")
     return read_rows(path, kinds, rows_of=rows_of)
-
-
-def _write(out: Path, rows: Sequence["Row"]) -> None:
-    with naming(str(out)):
-        out.parent.mkdir(exist_ok=True)
-    with whole(out) as draft, draft.open("w", encoding="ascii", newline="") as stream:
-        stream.writelines(json.dumps(row) + "\n" for row in rows)

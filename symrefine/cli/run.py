@@ -10,7 +10,6 @@ from symrefine.cli.fleet import add_fleet_options, check_table_option, executor,
 from symrefine.cli.outputs import check_outputs, complain, is_quiet, note, print_lines, say_lines
 from symrefine.cli.signs import progress
 from symrefine.cli.values import count
-from symrefine.errors import InputError
 from symrefine.files import naming
 
 HELP = "run the experiment of a YAML config and write its rows, tables and figures"
@@ -25,7 +24,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("config", metavar="CONFIG.yaml", nargs="?", help="experiment, sweep, tables, figures")
     parser.add_argument(
-        "--list", action="store_true", help="print the configs in ./configs, or the runs of CONFIG.yaml, and do nothing"
+        "--list",
+        action="store_true",
+        help="do nothing but print the runs of CONFIG.yaml; without it, the configs in ./configs, else in this "
+        "directory, else in configs of one above; a directory may stand in its place",
     )
     parser.add_argument(
         "--set",
@@ -46,15 +48,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the study, print its tables, tell whether all went well."""
     if args.config is None and not args.list:
-        args.parser.error("CONFIG.yaml is missing; `symrefine run --list` names those in ./configs")
+        args.parser.error("CONFIG.yaml is missing; `symrefine run --list` names those that are here")
     from symrefine.fleet.limits import one_thread_each
 
     one_thread_each()  # before anything heavy is imported
     from symrefine.study.plan import make_plan
     from symrefine.study.runner import run_study
 
-    if args.config is None:
-        say_lines(_configs(Path("configs")))
+    if args.config is None or (args.list and Path(args.config).is_dir()):
+        say_lines(_configs(Path(args.config or ".")))
         return 0
     plan = make_plan(Path(args.config), args.set, quick=args.quick)
     if args.list:
@@ -84,13 +86,15 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _configs(folder: Path) -> Iterator[str]:
-    """A line for each config of a directory: its path and title."""
-    from symrefine.study.document import read_document
-    from symrefine.study.plan import configs
+    """A line for each config of a directory, or of the nearest one that has some: its path and title.
 
-    found = configs(folder)
-    if not found:
-        raise InputError(f"{folder}: no configs there; name one: symrefine run CONFIG.yaml --list")
+    Raises:
+        InputError: there are none.
+    """
+    from symrefine.study.document import read_document
+    from symrefine.study.plan import configs_near
+
+    found = configs_near(folder)
     width = max(len(str(path)) for path in found)
     for path in found:
         root = read_document(path)

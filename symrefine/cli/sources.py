@@ -1,6 +1,7 @@
 """Many objects: files, patterns, directories, addresses, or a manifest that says more of each."""
 
 import csv
+import io
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -94,6 +95,10 @@ _OPTIONS: Mapping[str, Callable[[str], Any]] = {
 }
 
 
+# Bytes of a manifest: half a million lines, ten times what the largest data sets have.
+_LARGEST = 64 * 2**20
+
+
 def manifest(path: Path) -> list[Source]:
     """The objects of a manifest: CSV with a column `path`, relative to it, and any of `id`, `scale` and the options.
 
@@ -125,12 +130,16 @@ def manifest(path: Path) -> list[Source]:
 def _lines(path: Path) -> Iterator[tuple[int, Mapping[str, str]]]:
     """The lines of a manifest with their number, as text by column; a column that is not there is empty."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        with path.open("rb") as stream:
+            data = stream.read(_LARGEST + 1)
+        text = data.decode("utf-8-sig") if len(data) <= _LARGEST else ""
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or 'no text in UTF-8'}") from None
-    reader = csv.reader(text.splitlines(keepends=True), strict=True)
+    if len(data) > _LARGEST:
+        raise InputError(f"{path}: has more than {_LARGEST:,} bytes, or no end; split it into several manifests")
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
         titles = [title.strip() for title in next(reader, [])]
         _check_titles(path, titles)

@@ -9,7 +9,7 @@ import json
 import os
 import tempfile
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,6 +61,14 @@ class Journal:
     def latest(self) -> Latest:
         """The last row of each value of the key, those to come included."""
         return Latest(self.path, self.places)
+
+    def among(self, keys: Iterable[str | int]) -> Latest:
+        """The last row of each of some values of the key, in their order.
+
+        Raises:
+            KeyError: a value has no row.
+        """
+        return Latest(self.path, {key: self.places[key] for key in keys})
 
     def append(self, row: Row) -> None:
         """Append a row in one write, so that nobody ever sees half of one, and wait until it is on disk.

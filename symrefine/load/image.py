@@ -8,6 +8,7 @@ smoothed away, unless the picture is binary.
 
 import io
 import warnings
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +27,8 @@ FORMATS = {".bmp": "BMP", ".jpeg": "JPEG", ".jpg": "JPEG", ".png": "PNG"}
 LARGEST = 2**24
 _LUMA = (0.299, 0.587, 0.114)
 _DEEP = {"I;16": 65535.0, "I;16B": 65535.0, "I;16L": 65535.0, "I": 65535.0}
+# Of a histogram: as many as a byte has grey values.
+BINS = 256
 # Standard deviations of the border that a pixel must differ by from the background to weigh anything.
 _NOISE = 5.0
 # What smoothing leaves of the grain, as a fraction of the contrast; the narrowest Gaussian in pixels that is worth it,
@@ -74,20 +77,43 @@ def pixel_weights(grey: Array, *, threshold: Threshold | None = None, invert: bo
         invert: exchange object and background; in a grey picture, weights become their largest value minus them.
     """
     if threshold is not None:
-        grey = (grey >= (otsu(grey) if threshold == "otsu" else threshold)).astype(grey.dtype)
+        grey = parted(grey, otsu(grey) if threshold == "otsu" else threshold)
     inside = np.zeros(grey.shape, dtype=bool)
     inside[(slice(1, -1),) * grey.ndim] = True
-    border = grey[~inside]
-    levels = np.array([grey.min(), grey.max()])
-    if ((grey == levels[0]) | (grey == levels[1])).all():
+    return weighing(grey[~inside], lambda: [grey], invert=invert)(grey)
+
+
+def parted(grey: Array, level: float) -> Array:
+    """A binary picture: light is what reaches the level."""
+    return (grey >= level).astype(grey.dtype)
+
+
+def weighing(border: Array, pieces: Callable[[], Iterable[Array]], *, invert: bool) -> Callable[[Array], Array]:
+    """What grey values weigh in a picture of which no more than pieces are at hand, as `pixel_weights` has it.
+
+    Args:
+        border: [N] grey values there.
+        pieces: all grey values, piece by piece; asked for a few times.
+    """
+    levels = np.array([min(piece.min() for piece in pieces()), max(piece.max() for piece in pieces())])
+    if all(((piece == levels[0]) | (piece == levels[1])).all() for piece in pieces()):
         # The level that most of the border has; of the whole picture if that is a tie; then the lightest.
-        votes = [(int((border == level).sum()), int((grey == level).sum()), k) for k, level in enumerate(levels)]
-        return ((grey != levels[max(votes)[-1]]) != invert).astype(grey.dtype)
+        counts = [sum(int((piece == level).sum()) for piece in pieces()) for level in levels]
+        votes = [(int((border == level).sum()), counts[k], k) for k, level in enumerate(levels)]
+        background = levels[max(votes)[-1]]
+        return lambda grey: ((grey != background) != invert).astype(grey.dtype)
     level = float(np.median(border))
     scatter = 1.4826 * float(np.median(np.abs(border - level)))
-    contrast = np.abs(grey - level)
-    contrast[contrast <= _NOISE * scatter] = 0.0
-    return contrast.max() - contrast if invert else contrast
+
+    def contrast(grey: Array) -> Array:
+        apart = np.abs(grey - level)
+        apart[apart <= _NOISE * scatter] = 0.0
+        return apart
+
+    if not invert:
+        return contrast
+    most = max(contrast(piece).max() for piece in pieces())
+    return lambda grey: np.asarray(most - contrast(grey))
 
 
 def without_grain(grey: Array) -> Array:
@@ -111,7 +137,11 @@ def without_grain(grey: Array) -> Array:
 
 def otsu(grey: Array) -> float:
     """The grey value that parts a picture into the two most uniform classes."""
-    counts, edges = np.histogram(grey, bins=256)
+    return otsu_of(*np.histogram(grey, bins=BINS))
+
+
+def otsu_of(counts: NDArray[np.int64], edges: Array) -> float:
+    """The same from a histogram: how many grey values lie between each two edges."""
     middles = 0.5 * (edges[1:] + edges[:-1])
     below = np.cumsum(counts)[:-1]
     above = below[-1] + counts[-1] - below

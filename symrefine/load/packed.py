@@ -46,17 +46,18 @@ def unpacked(data: bytes, most: int | None = None) -> bytes:
         InputError: not gzip, cut off, damaged, nothing in it, or more in it than it may hold.
     """
     limit = allowance(len(data)) if most is None else most
-    whole = bytearray()
+    made = io.BytesIO()  # gives away what it holds, where an array of bytes would be copied
     try:
         with GzipFile(fileobj=io.BytesIO(data)) as stream:
-            while len(whole) <= limit and (chunk := stream.read(_CHUNK)):
-                whole += chunk
+            while made.tell() <= limit and (chunk := stream.read(_CHUNK)):
+                made.write(chunk)
     except BadGzipFile as error:
         raise InputError(f"not gzip, or damaged: {shorten(str(error), 80)}") from None
     except EOFError:
-        raise InputError(f"the gzip data are cut off after {len(data)} bytes, {len(whole)} unpacked") from None
+        raise InputError(f"the gzip data are cut off after {len(data)} bytes, {made.tell()} unpacked") from None
     except zlib.error as error:
         raise InputError(f"the gzip data are damaged: {shorten(str(error), 80)}") from None
+    whole = made.getvalue()
     crowded = most is None and whole.count(b"\n") > max(ROOM // 2, len(data))
     if len(whole) > limit or crowded:
         what = f"{max(ROOM // 2, len(data)):,} lines" if crowded else f"{limit:,} bytes"
@@ -65,7 +66,7 @@ def unpacked(data: bytes, most: int | None = None) -> bytes:
         )
     if not whole:
         raise InputError("unpacks to nothing (0 bytes)")
-    return bytes(whole)
+    return whole
 
 
 def archive(data: bytes, kind: str, check: Callable[[Collection[str]], object] | None = None) -> dict[str, bytes]:

@@ -53,6 +53,7 @@ def read_nifti(data: bytes, wanted: Wanted) -> Frames[Content]:
             image = kind.from_bytes(data)
             shape, dtype = image.shape, np.dtype(image.get_data_dtype())
             start = int(image.dataobj.offset)
+            slope, shift = np.asanyarray(image.dataobj.slope), np.asanyarray(image.dataobj.inter)
             affine = np.array(image.affine, dtype=np.float64)
             unit = _NIFTI_UNITS.get(image.header.get_xyzt_units()[0])
     except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
@@ -63,14 +64,17 @@ def read_nifti(data: bytes, wanted: Wanted) -> Frames[Content]:
     check_size(shape[:3])
     series = [(0,) * (len(shape) - 3)] if len(shape) == 3 else list(np.ndindex(*shape[3:]))
 
-    def made(k: int) -> Content:
+    def scaled(values: Any) -> Any:
         try:
             with np.errstate(all="ignore"):
-                values = np.asarray(image.dataobj[(..., *series[k])], dtype=np.float32)
+                return nibabel.volumeutils.apply_read_scaling(values, slope, shift)
         except Exception as error:  # noqa: BLE001 (as above)
             raise InputError(f"not a whole NIfTI file: {shorten(str(error), 80)}") from None
-        content = volume_content(Volume(values=values, axes=affine[:3, :3], origin=affine[:3, 3]), wanted)
-        return replace(content, unit=unit)
+
+    def made(k: int) -> Content:
+        values = np.frombuffer(data, dtype, offset=start).reshape(shape, order="F")[(..., *series[k])]
+        volume = Volume(values=values, axes=affine[:3, :3], origin=affine[:3, 3], scaled=scaled)
+        return replace(volume_content(volume, wanted), unit=unit)
 
     return Frames("volumes", len(series), made)
 
@@ -98,7 +102,7 @@ def read_mrc(data: bytes, wanted: Wanted) -> Frames[Content]:
         InputError: damaged, pictures instead of volumes, complex numbers, mrcfile is not installed; of a volume, when
             it is asked for: a cell without right angles, and as `volume_content`.
     """
-    interpreter = library("mrcfile.mrcinterpreter", "volumes")
+    interpreter, known = library("mrcfile.mrcinterpreter", "volumes"), library("mrcfile.utils", "volumes")
     sizes = [
         [abs(int.from_bytes(data[k : k + 4], order, signed=True)) for k in (0, 4, 8)] for order in ("little", "big")
     ]
@@ -107,25 +111,27 @@ def read_mrc(data: bytes, wanted: Wanted) -> Frames[Content]:
         raise InputError(
             f"has {' x '.join(map(str, sizes[0]))} voxels, which {len(data)} bytes cannot hold; not a MRC file?"
         )
-    extended = min(abs(int.from_bytes(data[92:96], order, signed=True)) for order in ("little", "big"))
-    if extended > len(data):
-        raise InputError(f"has an extended header of {extended} bytes, which {len(data)} cannot hold; not a MRC file?")
+    extended = [abs(int.from_bytes(data[92:96], order, signed=True)) for order in ("little", "big")]
+    if min(extended) > len(data):
+        raise InputError(
+            f"has an extended header of {min(extended)} bytes, which {len(data)} cannot hold; not a MRC file?"
+        )
+    head = data[: 1024 + max(size for size in extended if size <= len(data))]  # of all it would make a copy
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            opened = interpreter.MrcInterpreter(iostream=io.BytesIO(data))
-            header, values = opened.header.copy(), opened.data
-            stack = opened.is_image_stack(), opened.is_volume_stack()
+            header = interpreter.MrcInterpreter(iostream=io.BytesIO(head), header_only=True).header.copy()
+            dtype, shape = known.data_dtype_from_header(header), known.data_shape_from_header(header)
     except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
         raise InputError(f"not a whole MRC file: {shorten(str(error), 80)}") from None
-    if values is None or values.dtype.kind not in "iuf":
-        raise InputError(f"holds values of {'no type' if values is None else values.dtype}; expected real numbers")
-    _check_length(values.shape, values.dtype, len(data) - 1024 - int(header.nsymbt))
-    if stack[0] or values.ndim == 2:
-        raise InputError(
-            f"holds {count(1 if values.ndim == 2 else len(values), 'picture')}, no volume (mode of its grid)"
-        )
-    parts = values if stack[1] else values[None]
+    if dtype.kind not in "iuf":
+        raise InputError(f"holds values of {dtype}; expected real numbers")
+    start = 1024 + int(header.nsymbt)
+    _check_length(shape, dtype, len(data) - start)
+    if len(shape) == 2 or (len(shape) == 3 and header.ispg == known.IMAGE_STACK_SPACEGROUP):
+        raise InputError(f"holds {count(1 if len(shape) == 2 else shape[0], 'picture')}, no volume (mode of its grid)")
+    values = np.frombuffer(data, dtype, offset=start).reshape(shape)
+    parts = values if len(shape) == 4 else values[None]
     return Frames("volumes", len(parts), lambda k: volume_content(_map(parts[k], header), wanted))
 
 
@@ -140,7 +146,7 @@ def _map(values: Any, header: Any) -> Volume:
         raise InputError(f"angles of the cell are {angles}; expected right angles: resample it")
     places = [order.index(axis) for axis in (1, 2, 3)] if any(order) else [0, 1, 2]
     # Columns are the last axis of the array; transposed, they are the first.
-    turned = np.transpose(values.T, places).astype(np.float32)
+    turned = np.transpose(values.T, places)
     samples = np.array([int(header[name]) for name in ("mx", "my", "mz")], dtype=np.float64)
     cell = np.array([float(header.cella[name]) for name in "xyz"])
     steps = cell / np.maximum(samples, 1.0) if cell.any() else np.ones(3)
@@ -172,7 +178,7 @@ def read_nrrd(data: bytes, wanted: Wanted) -> Frames[Content]:
     dtype = _nrrd_type(header)
     body = _unpacked(memoryview(data)[stream.tell() :], str(header.get("encoding")), math.prod(shape) * dtype.itemsize)
     _check_length(shape, dtype, len(body))
-    values = np.frombuffer(body, dtype).reshape(shape, order="F").astype(np.float32)
+    values = np.frombuffer(body, dtype).reshape(shape, order="F")
     axes, origin = _nrrd_frame(header)
     return one(volume_content(Volume(values=values, axes=axes, origin=origin), wanted), "volumes")
 

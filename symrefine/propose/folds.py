@@ -59,7 +59,8 @@ def fold_candidates(points: Array, weights: Array, axis: Array, *, leak_max: flo
     for b in range(2, len(energy) // 2 + 1):
         leak = 1.0 - energy[(k % b == 0)].sum() / total
         if leak < leak_max and energy[b] > 0.0:
-            best = int(np.argmax(np.abs(c[b]) / sigma))
+            # A ring that nothing is on has neither coefficients nor noise.
+            best = int(np.argmax(np.divide(np.abs(c[b]), sigma, out=np.zeros_like(sigma), where=sigma > 0.0)))
             phase = rotation([0, 0, 1], -np.angle(c[b, best]) / b)
             found.append(FoldCandidate(fold=b, frame=phase @ frame_with_z(axis), leak=float(leak)))
     # A divisor of the true fold leaks no more than it: prefer the largest fold among equals.

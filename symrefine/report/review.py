@@ -63,7 +63,9 @@ _TITLES: dict[State, str] = {
 }
 
 
-def review_page(cards: Sequence[Card], *, folder: str, out: str, more: int, failed: Sequence[str], schema: str) -> str:
+def review_page(
+    cards: Sequence[Card], *, folder: str, out: str, more: int, failed: Sequence[str], more_failed: int, schema: str
+) -> str:
     """The whole page; equal input gives equal pages.
 
     Args:
@@ -72,6 +74,7 @@ def review_page(cards: Sequence[Card], *, folder: str, out: str, more: int, fail
         out: where the labels go.
         more: objects that are to be looked at after these.
         failed: what was wrong with files that could not be used.
+        more_failed: such files beside those.
         schema: of the file that the page saves.
     """
     waiting = sum(card.state == "open" for card in cards) + more
@@ -82,7 +85,7 @@ def review_page(cards: Sequence[Card], *, folder: str, out: str, more: int, fail
     parts += [_section(state, [card for card in cards if card.state == state], more) for state in _TITLES]
     page = Page(
         title=f"{plain(told)} · {plain(folder)}",
-        sections=(*parts, _failed(failed), _save()),
+        sections=(*parts, _failed(failed, more_failed), _save()),
         data={"schema": schema, "key": key, "objects": [_island(card) for card in cards]},
         style="review.css",
         script="review.js",
@@ -102,11 +105,12 @@ def _head(told: str, folder: str, out: str) -> str:
     )
 
 
-def _failed(failed: Sequence[str]) -> str:
+def _failed(failed: Sequence[str], more: int) -> str:
     if not failed:
         return ""
     rows = "".join(f"<li>{plain(text)}</li>" for text in failed)
-    return f'<section class="failed"><h2>Could not be used</h2><ul>{rows}</ul></section>'
+    left = f'<p class="quiet">{more:,} more stand in labels.json.</p>' * (more > 0)
+    return f'<section class="failed"><h2>Could not be used</h2><ul>{rows}</ul>{left}</section>'
 
 
 def _section(state: State, cards: Sequence[Card], more: int) -> str:

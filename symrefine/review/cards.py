@@ -1,6 +1,6 @@
 """The page of a review from what is kept: those that are open first, as many as one page takes."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
@@ -10,7 +10,7 @@ from symrefine.picture.words import symbol
 from symrefine.report.review import Card, Option, review_page
 from symrefine.review.decisions import SCHEMA, Decision, Decisions
 from symrefine.review.labels import Label, Labels
-from symrefine.review.objects import Row, doubtful_first
+from symrefine.review.objects import Row
 from symrefine.review.store import place_of_picture
 
 # Objects on one page: an evening of looking, and a few megabytes.
@@ -18,20 +18,31 @@ MOST = 200
 _OF_CHOICE = ("point_group", "meaning", "rotations", "count", "forgiven", "limits")
 
 
-def page_text(folder: str, out: Path, rows: Mapping[int, Row], decisions: Decisions, labels: Labels) -> str:
+def page_text(
+    folder: str, out: Path, rows: Mapping[int, Row], order: Sequence[int], decisions: Decisions, labels: Labels
+) -> str:
     """The page, with the pictures in the folder of the labels inside it.
 
     Args:
         folder: where the models are.
         out: where the labels go.
+        rows: are asked for one by one, as many as one page takes.
+        order: numbers of the objects that something was found in, the most doubtful first.
     """
-    order = doubtful_first(rows)
     waiting = [number for number in order if number not in labels]
     shown = [*waiting, *(number for number in order if number in labels)][:MOST]
     cards = [_card(out, rows[number], decisions.get(number), labels.get(number)) for number in shown]
-    failed = [one_line(row["error"]) for row in rows.values() if row["error"] is not None]
-    more = max(0, len(waiting) - MOST)
-    return review_page(cards, folder=folder, out=str(out), more=more, failed=failed, schema=SCHEMA)
+    used = set(order)
+    failed = [number for number in rows if number not in used]
+    return review_page(
+        cards,
+        folder=folder,
+        out=str(out),
+        more=max(0, len(waiting) - MOST),
+        failed=[one_line(str(rows[number]["error"])) for number in failed[:MOST]],
+        more_failed=max(0, len(failed) - MOST),
+        schema=SCHEMA,
+    )
 
 
 def _card(out: Path, row: Row, decision: Decision | None, label: Label | None) -> Card:

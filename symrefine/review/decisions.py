@@ -12,8 +12,9 @@ from symrefine.files import file_bytes, json_text
 from symrefine.units import LARGEST_TOLERANCE
 
 SCHEMA = "symrefine.decisions/1"
-# A decision takes a few hundred bytes: so much holds that of a hundred thousand objects, with a note each.
-LARGEST = 64 * 2**20
+# A decision takes some 300 bytes: so much holds those of a hundred thousand objects. JSON of so many bytes, which in
+# Python is 25 times as large at worst (empty lists), stays below a gigabyte.
+LARGEST = 32 * 2**20
 # Characters of a note: a paragraph.
 LONGEST_NOTE = 2000
 
@@ -95,10 +96,11 @@ def _document(path: Path) -> Any:
 
 
 def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    made = dict(pairs)
-    if len(made) < len(pairs):
-        twice = next(key for k, (key, _) in enumerate(pairs) if key in dict(pairs[:k]))
-        raise InputError(f"{_shown(twice)}: stands there twice; expected each key once")
+    made: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in made:
+            raise InputError(f"{_shown(key)}: stands there twice; expected each key once")
+        made[key] = value
     return made
 
 

@@ -1,23 +1,27 @@
 """What follows from what was found and what a person decided: the labels of a data set, and what is still open."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from symrefine.export.bop import Entry
-from symrefine.files import json_text
+from symrefine.files import json_pieces
 from symrefine.review.decisions import Decision, Decisions
-from symrefine.review.objects import Choice, Row, choice_of
+from symrefine.review.objects import Row, choice_of
 
 SCHEMA = "symrefine.labels/1"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Label:
-    """The symmetry of an object, and who says so: a person, or a confidence that is high enough."""
+    """The symmetry of an object, and who says so: a person, or a confidence that is high enough.
 
-    row: Row
-    choice: Choice
+    Attributes:
+        choice: which of those of its row.
+        diameter: of the object, millimetres.
+    """
+
+    choice: int
+    diameter: float
     by: Literal["person", "confidence"]
     decision: Decision | None = None
 
@@ -58,47 +62,46 @@ def labelled(rows: Mapping[int, Row], decisions: Decisions, accept: float | None
     """The objects whose symmetry is settled; a person has the last word.
 
     Args:
+        rows: are asked for once, one after the other.
         accept: confidence from which an object needs no look; None if all do.
     """
     labels: Labels = {}
-    for number, row in sorted(rows.items()):
-        decision = decisions.get(number)
+    for number in sorted(rows):
+        row, decision = rows[number], decisions.get(number)
         said = row["answer"] if decision is None else decision.point_group
         sure = decision is not None or (accept is not None and row["confidence"] >= accept)
-        if sure and said is not None and (choice := choice_of(row, said)):
+        if sure and said is not None and (choice := choice_of(row, said)) is not None:
             labels[number] = Label(
-                row=row, choice=choice, by="confidence" if decision is None else "person", decision=decision
+                choice=choice,
+                diameter=row["choices"][choice]["entry"]["diameter"],
+                by="confidence" if decision is None else "person",
+                decision=decision,
             )
     return labels
 
 
-def models_info(labels: Labels) -> dict[str, Entry]:
-    """The entries of BOP: of objects that are settled, and of no other.
+def info_json(rows: Mapping[int, Row], labels: Labels) -> Iterator[str]:
+    """`models_info.json` of BOP, piece by piece: of objects that are settled, and of no other.
 
     An entry without symmetries would say that an object has none; without an entry a program stops there.
     """
-    return {str(number): label.choice["entry"] for number, label in labels.items()}
+    return json_pieces((str(k), rows[k]["choices"][label.choice]["entry"]) for k, label in labels.items())
 
 
-def labels_text(rows: Mapping[int, Row], labels: Labels, accept: float | None) -> str:
-    """`labels.json`: each label with who says so, and what is still open with the reason."""
-    left = {number: row for number, row in sorted(rows.items()) if number not in labels}
-    return json_text(
-        {
-            "schema": SCHEMA,
-            "version": next((row["version"] for row in rows.values()), None),
-            "accept": accept,
-            "objects": [_told(number, label) for number, label in labels.items()],
-            "open": [
-                {"object": number, "file": row["file"], "point_group": row["answer"], "why": why_open(row, accept)}
-                for number, row in left.items()
-            ],
-        }
-    )
+def labels_json(rows: Mapping[int, Row], labels: Labels, accept: float | None) -> Iterator[str]:
+    """`labels.json`, piece by piece: each label with who says so, and what is still open with the reason."""
+    entries = {
+        "schema": SCHEMA,
+        "version": next((row["version"] for row in rows.values()), None),
+        "accept": accept,
+        "objects": (_told(number, rows[number], label) for number, label in labels.items()),
+        "open": (_open(number, rows[number], accept) for number in rows if number not in labels),
+    }
+    return json_pieces(entries.items())
 
 
-def _told(number: int, label: Label) -> dict[str, Any]:
-    row, choice, decision = label.row, label.choice, label.decision
+def _told(number: int, row: Row, label: Label) -> dict[str, Any]:
+    choice, decision = row["choices"][label.choice], label.decision
     return {
         "object": number,
         "file": row["file"],
@@ -112,6 +115,10 @@ def _told(number: int, label: Label) -> dict[str, Any]:
         "tolerance": decision.tolerance if decision else row["tolerance"],
         "note": decision.note if decision else "",
     }
+
+
+def _open(number: int, row: Row, accept: float | None) -> dict[str, Any]:
+    return {"object": number, "file": row["file"], "point_group": row["answer"], "why": why_open(row, accept)}
 
 
 def why_open(row: Row, accept: float | None) -> str:

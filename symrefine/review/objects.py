@@ -1,6 +1,7 @@
 """What is kept of each object of a data set: the groups to choose from, each with what BOP says of it."""
 
-from collections.abc import Mapping
+import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypedDict
 
@@ -126,12 +127,51 @@ def _picture(found: Detection, shape: Shape) -> bytes:
     return packed.getvalue()
 
 
-def choice_of(row: Row, point_group: str) -> Choice | None:
-    """The choice of that name, if the object has it."""
-    return next((c for c in row["choices"] if c["point_group"] == point_group), None)
+def flaw(row: Mapping[str, Any]) -> str:
+    """What of a row without error is not as `examined` tells it, as of one that somebody changed; empty if all is."""
+    try:
+        json.dumps(row, allow_nan=False)
+    except ValueError:
+        return "a number of it is not finite"
+    steps, choices = row.get("tolerances"), row["choices"]
+    if not (isinstance(steps, list) and all(map(_is_real, steps)) and row.get("tolerance") in steps):
+        return "its tolerances are no numbers, or do not have the one that was asked for"
+    for k, choice in enumerate(choices):
+        wrong = [key for key, fits in _OF_CHOICE.items() if not (isinstance(choice, dict) and fits(choice.get(key)))]
+        if wrong or len(choice["probabilities"]) != len(steps):
+            return f"choices[{k}].{wrong[0] if wrong else 'probabilities'} is not what it is of such a row"
+    if row["answer"] not in (None, *(choice["point_group"] for choice in choices)) or not choices:
+        return f"its answer is none of its {len(choices)} choices"
+    return "" if 0.0 <= row["confidence"] <= 1.0 else "its confidence is no probability"
+
+
+def _is_real(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+# What each key of a choice must be.
+_OF_CHOICE: dict[str, Callable[[Any], bool]] = {
+    "point_group": lambda v: isinstance(v, str),
+    "meaning": lambda v: isinstance(v, str),
+    "rotations": lambda v: isinstance(v, str),
+    "count": lambda v: v is None or isinstance(v, int),
+    "forgiven": _is_real,
+    "probabilities": lambda v: isinstance(v, list) and all(p is None or _is_real(p) for p in v),
+    "entry": lambda v: isinstance(v, dict) and _is_real(v.get("diameter")),
+    "limits": lambda v: isinstance(v, str),
+}
+
+
+def choice_of(row: Row, point_group: str) -> int | None:
+    """Which of its choices has that name, if the object has it."""
+    return next((k for k, choice in enumerate(row["choices"]) if choice["point_group"] == point_group), None)
 
 
 def doubtful_first(rows: Mapping[int, Row]) -> list[int]:
-    """Numbers of the objects that something was found in, the most doubtful first."""
+    """Numbers of the objects that something was found in, the most doubtful first.
+
+    Args:
+        rows: are asked for once, one after the other.
+    """
     told = [(row["confidence"], number) for number, row in rows.items() if row["error"] is None]
     return [number for _, number in sorted(told)]

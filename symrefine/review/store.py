@@ -8,11 +8,11 @@ from types import NoneType
 from typing import Any, cast
 
 from symrefine.errors import InputError
-from symrefine.files import check_target
+from symrefine.files import check_target, naming
 from symrefine.fleet import journal
 from symrefine.fleet.tasks import our_version
 from symrefine.load import IMAGES
-from symrefine.review.objects import Row
+from symrefine.review.objects import Row, flaw
 
 # Rows that nothing is done twice for, what a person decided, the results, and pictures.
 ROWS, DECISIONS, INFO, LABELS, PAGE, PICTURES = (
@@ -48,7 +48,13 @@ def opened(out: Path) -> Iterator[journal.Journal]:
         raise InputError(f"{out}: has a {taken[0]} that `symrefine label` did not write there; name another folder")
     check_target(rows)
     with journal.opened(rows, _KINDS, "object", busy=busy, rows_of="`symrefine label`", other="another folder") as held:
-        (out / PICTURES).mkdir(exist_ok=True)
+        if (out / PICTURES).exists() and not (out / PICTURES).is_dir():
+            raise InputError(f"{out / PICTURES}: is a file; expected a folder")
+        with naming(str(out / PICTURES)):
+            (out / PICTURES).mkdir(exist_ok=True)
+        check_target(out / PICTURES / ROWS)  # any name will do: it is the folder that pictures are written to
+        for name in (DECISIONS, INFO, LABELS, PAGE):
+            check_target(out / name)
         yield held
 
 
@@ -93,11 +99,24 @@ def _head(number: int, path: Path, options: dict[str, Any], scale: float, looks:
 
 
 def holds(out: Path, row: Row | None, now: Row) -> bool:
-    """Whether a row made before still tells of its object, and its pictures are there."""
+    """Whether a row made before still tells of its object, and its pictures are there.
+
+    Raises:
+        InputError: it would, but somebody changed it.
+    """
     if row is None or now["sha256"] is None or row.get("lost") is not None:
         return False
     same = all(row.get(key) == now.get(key) for key in ("file", "sha256", "version", "options", "scale"))
-    return same and all(place_of_picture(out, row, k).is_file() for k in range(len(row["choices"])))
+    if not same or not all(_is_there(place_of_picture(out, row, k)) for k in range(len(row["choices"]))):
+        return False
+    if row["error"] is None and (told := flaw(row)):
+        raise InputError(f"{out / ROWS}: is damaged: object {row['object']}: {told}; name another folder")
+    return True
+
+
+def _is_there(picture: Path) -> bool:
+    """Whether a picture is there; one that a power cut left empty is not."""
+    return picture.is_file() and picture.stat().st_size > 0
 
 
 def place_of_picture(out: Path, row: Row, k: int) -> Path:

@@ -17,6 +17,11 @@ from symrefine.study.typed import mapping, scalar, typed
 
 _MANY = 100_000
 _EXPERIMENT = re.compile(rb"^experiment:", re.MULTILINE)
+# For those who have none.
+_WHAT = (
+    "configs are YAML files with a key `experiment`, the name of a module with `Case` and `run`; examples are in the "
+    "directories configs and experiments/studies of symrefine's repository"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,6 +88,19 @@ def configs(folder: Path) -> list[Path]:
     return sorted(f for f in folder.glob("*.yaml") if f.is_file() and _EXPERIMENT.search(f.read_bytes()))
 
 
+def configs_near(folder: Path) -> list[Path]:
+    """The configs in `configs` of a directory, else in the directory, else in `configs` of the nearest one above.
+
+    Raises:
+        InputError: there are none, with what a config is.
+    """
+    above = [parent / "configs" for parent in folder.resolve().parents]
+    for place in (folder / "configs", folder, *above):
+        if found := configs(place):
+            return found
+    raise InputError(f"{folder.resolve()}: no config in it, in configs there, or in configs above; {_WHAT}")
+
+
 def varying(cases: Sequence[Any]) -> list[str]:
     """The fields in which cases differ."""
     rows = [asdict(case) for case in cases]
@@ -95,7 +113,7 @@ def _elsewhere(path: Path) -> str:
     for folder in (path.parent, *(above / "configs" for above in (here, *here.parents))):
         if names := [file.name for file in configs(folder)]:
             return f"in {folder} there are {' '.join(names)}"
-    return "configs are YAML files with a key `experiment`, as in the directory configs of symrefine's repository"
+    return _WHAT
 
 
 def _cases(study: Study, experiment: Experiment) -> Iterator[Any]:
