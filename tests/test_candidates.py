@@ -13,12 +13,22 @@ from experiments.objects.parts import assembled
 from experiments.objects.shapes import bottle, box, join, sample, table
 from symrefine.decide.hypotheses import joined
 from symrefine.fit.placed import Placed
-from symrefine.geometry import line_angle_rad, random_orthogonal, unit
+from symrefine.geometry import line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.groups import is_subgroup, point_group
 from symrefine.moments.moments import central_moments
 from symrefine.ntuples.contract import ntuples
 from symrefine.ntuples.rank import fixed_subspace
-from symrefine.propose.candidates import APART_RAD, Evidence, about, apart, beside, placed, prime_axes, proposals
+from symrefine.propose.candidates import (
+    APART_RAD,
+    Evidence,
+    about,
+    apart,
+    beside,
+    placed,
+    prime_axes,
+    proposals,
+    turned_over,
+)
 
 # Half of what order 8 resolves: a start may be off by so much.
 NEAR_RAD = np.radians(5.5)
@@ -222,3 +232,27 @@ def test_what_is_placed_is_about_the_centroid_unless_told():
     np.testing.assert_array_equal(found.center, CENTER)
     np.testing.assert_allclose(found.group.frame, frame, atol=1e-12)
     assert math.isinf(found.group.symbol.fold)
+
+
+@pytest.mark.parametrize("fold", [3, 11, 48])
+def test_turns_are_turned_over_at_the_phases_that_their_fold_allows(fold):
+    """The half turns across the axis of points with Dn, whose phase only they tell."""
+    rng = np.random.default_rng(fold)
+    some = rng.normal(size=(40, 3)) + [3.0, 0.0, 0.4]
+    turn = random_orthogonal(rng)
+    whole = point_group(f"D{fold}").operations()
+    points = np.concatenate([some @ m.T for m in whole]) @ turn.T
+    evidence = Evidence(
+        moments=central_moments(points, np.ones(len(points)), 8),
+        tuples=fixed_subspace(ntuples(central_moments(points, np.ones(len(points)), 8))),
+        points=points,
+        weights=np.full(len(points), 1.0 / len(points)),
+    )
+    known = placed(f"C{fold}", rotation([0.0, 0.0, 1.0], 1.0) @ turn.T)  # its phase is not known
+    best = min(
+        np.linalg.norm((points @ m.T)[:, None, :] - points[None, :200], axis=2).min(axis=0).max()
+        for start in turned_over(evidence, known)
+        for m in start.group.operations()[fold : fold + 1]
+    )
+    assert best < 1e-4 * np.linalg.norm(points, axis=1).max()
+    assert turned_over(evidence, placed(f"D{fold}", turn.T)) == []

@@ -26,6 +26,7 @@ from symrefine.picture.words import scanned
 from symrefine.propose.votes import mirror_votes, revolution, turn_votes
 from symrefine.shape import CAMERAS, Shape
 from symrefine.surface.cameras import cameras, unclosed
+from symrefine.surface.clumps import Clump
 from symrefine.surface.sampling import sampling
 from symrefine.surface.surroundings import Surroundings
 
@@ -149,13 +150,36 @@ def test_a_clump_apart_is_told_and_a_part_apart_is_not():
 
 @pytest.mark.parametrize(
     ("name", "kind", "strength", "seed"),
-    [("stool3", "outliers", 0.01, 101), ("hollow_ball", "clump", 0.05, 101), ("crate", "clump", 0.05, 103)],
-    ids=["a stray where few points are looked at", "the rim of a clump in a ball", "a clump between boards"],
+    [
+        ("stool3", "outliers", 0.01, 101),
+        ("hollow_ball", "clump", 0.05, 101),
+        ("crate", "clump", 0.05, 103),
+        ("wheel5", "clump", 0.2, 201),
+        ("rotor4", "clump", 0.05, 201),
+    ],
+    ids=[
+        "a stray where few points are looked at",
+        "the rim of a clump in a ball",
+        "a clump between boards",
+        "a clump of a fifth of the points",
+        "a clump of which a part is not told from the surface",
+    ],
 )
 def test_a_few_strays_hide_no_group(name, kind, strength, seed):
     case = damaged.Case(family="shape", name=name, kind=kind, strength=strength, seed=seed)
     made, truth = damaged.damaged(case)
     assert detect(made.points).point_group == truth.group.name
+
+
+def test_a_clump_covers_its_rim_wherever_it_is_and_no_more():
+    rng = np.random.default_rng(5)
+    own = rng.normal(size=(4000, 3)) * [1.0, 0.3, 2.0]
+    turn, shift = random_orthogonal(rng), 100.0 * rng.normal(size=3)
+    clump = Clump.of(own @ turn.T + shift)
+    assert clump.covers(own @ turn.T + shift).mean() > 0.998
+    assert not clump.covers((own / np.linalg.norm(own / [1.0, 0.3, 2.0], axis=1)[:, None] * 4.5) @ turn.T + shift).any()
+    flat = Clump.of(own * [1.0, 1.0, 0.0])
+    assert np.isfinite(flat.whitening).all()
 
 
 # Open borders

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 import symrefine
+from experiments.objects.boundary import instance
 from experiments.objects.group_shapes import DESIGNS
 from experiments.objects.group_shapes import shape as mesh_of
 from experiments.objects.parts import placed_group
 from experiments.objects.shapes import bottle, sample, table
+from experiments.studies import boundary
 from symrefine.cli.tables import record_lines
 from symrefine.export.bop import decided
 from symrefine.fit.vertices import NEAR, ROUNDED, on_vertices
@@ -177,3 +179,14 @@ def test_noisy_meshes_and_clouds_are_not_exact():
     noisy = Shape(mesh.points + 1e-3 * mesh.diagonal * rng.standard_normal(mesh.points.shape), mesh.faces)
     assert symrefine.detect(noisy).exact is None
     assert symrefine.detect(sample(mesh, 3000, 0.0, rng)).exact is None
+
+
+@pytest.mark.parametrize(("family", "name"), [("rotors", "impeller30"), ("rotors", "helical48")])
+def test_an_exact_mesh_has_its_group_though_samples_doubt_it(family, name):
+    """At a tolerance that is hardly above what samples of so many blades miss one another by."""
+    case = boundary.Case(family=family, name=name, view=1, seed=22)
+    made = instance(family, name, case.seed)
+    mesh, _ = boundary.look(case, made)
+    found = symrefine.detect(mesh, tolerance=0.004)
+    assert found.point_group == made.truth.group.name
+    assert found.exact is not None

@@ -56,7 +56,7 @@ KIND_OF = {
         "plane.raster": "FEWEST JOINED",
         "propose.consensus": "COMMON FACING SAME",
         "surface.cameras": "WITHIN",
-        "surface.clumps": "CLUMP COUNTERPART FILLED SIZES",
+        "surface.clumps": "CLUMP COUNTERPART FILLED RIM SIZES",
         "surface.misses": "LIMITS SHARES ATOM_LIMITS SURE",
         "surface.neighbourhoods": "WIDEST FLAT VOLUME WIDEST_BLOB",
         "surface.openings": "ASIDE OPEN FAR_ASIDE BENDS WIRE EVIDENT MOST",

@@ -1,7 +1,7 @@
 """What a decision is made from: a shape measured, its candidates fitted and judged, and joined to a chain of groups."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -13,6 +13,7 @@ from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, known_links
 from symrefine.detection.measure import Measured, Outliers, doubt, gather, measure
 from symrefine.detection.sketch import Sample, Sketch, is_large, set_apart, sketched
+from symrefine.fit.vertices import ROUNDED, on_vertices
 from symrefine.geometry import Array, check_tolerance
 from symrefine.shape import Index, Shape
 from symrefine.surface.misses import TOLERANCE, disc_distances
@@ -138,6 +139,7 @@ def _examined(
         steps = [t for t in sorted({tolerance, *ladder}) if t >= tolerance and not doubt(measured, surface, t)]
         pool = explore(surface, evidence, steps[0], min(tolerance, *ladder, 1.0)) if steps else Pool()
         links = chain(surface, pool, BEYOND * max((tolerance, *ladder)))
+        links = _by_vertices(links, measured, surface.diagonal)
     return Examined(
         measured=measured,
         surface=surface,
@@ -147,6 +149,21 @@ def _examined(
         outlier_share=share,
         sample=None if sketch is None else Sample(points=len(sketch.picked), of=sketch.count),
     )
+
+
+def _by_vertices(links: tuple[Hypothesis, ...], measured: Measured, diagonal: float) -> tuple[Hypothesis, ...]:
+    """The chain, where a group needs nothing that maps a mesh onto itself exactly, whatever its samples told."""
+    if measured.shape.faces is None:
+        return links
+    origin, scale = measured.moments.center, measured.moments.scale
+    for k in reversed(range(len(links))):
+        if links[k].need <= ROUNDED:
+            break  # and those below
+        center = origin + scale * links[k].placed.center
+        on = on_vertices(measured.shape, links[k].group, center, diagonal=scale * diagonal)
+        if on is not None and on.faces and links[k].group.is_finite:
+            return (*(replace(link, need=0.0) for link in links[: k + 1]), *links[k + 1 :])
+    return links
 
 
 def _belongs(found: Examined, clump: Array, tolerance: float) -> bool:

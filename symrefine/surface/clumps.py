@@ -17,11 +17,8 @@ from symrefine.surface.tree import Tree
 
 # A clump holds at most this share of the points, so many that it counts, and has no counterpart: none of half its size.
 CLUMP, COUNTERPART = 0.1, 0.5
-# One that fills a volume beside a surface may hold more: the body is the larger half.
-HALF = 0.5
-# Standard deviations of a clump that all but 0.1 % of a Gaussian one lie within; and for each axis, over the longest,
-# what it counts as at least.
-RIM, FLATTEST = 4.0, 0.01
+# Standard deviations of a clump that all but 0.1 % of a Gaussian one lie within.
+RIM = 4.0
 # Neighbourhoods as thick as this, over that of points at random in a ball, fill a volume if they do at all these sizes
 # and at one where noise alone makes no surface look so: details of objects do at some sizes, hollow as they are, wires
 # at the smallest. At 0.8 to 0.9 as many of 114 whole objects hold such a part by mistake as by one size alone, and at
@@ -43,7 +40,7 @@ class Clump:
     def of(cls, points: Array) -> "Clump":
         """That of points [N, 3]; N > 1."""
         variances, axes = np.linalg.eigh(np.cov(points.T))
-        least = max(FLATTEST**2 * variances[-1], np.finfo(float).tiny)
+        least = max(np.finfo(float).eps * variances[-1], np.finfo(float).tiny)
         return cls(middle=points.mean(axis=0), whitening=axes.T / np.sqrt(np.maximum(variances, least))[:, None])
 
     def covers(self, points: Array) -> Mask:
@@ -99,7 +96,8 @@ def filled(points: Array, around: Surroundings, rng: np.random.Generator) -> lis
                 return []
             part = _parts_of(_filled_at(size, part >= 0, points, tree, around, step), around, enough)
         within &= _beside(_beside(part >= 0, around), around)
-    return _members(points, around, [_grown(m, around) for m in _lone(part, HALF)])
+    # One that fills a volume may hold more than one of surface, as long as the rest is no counterpart of it.
+    return _members(points, around, [_grown(m, around) for m in _lone(part, COUNTERPART / (1.0 + COUNTERPART))])
 
 
 def _parts_of(within: Mask, around: Surroundings, enough: float) -> Index:
