@@ -17,6 +17,7 @@ from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import Link, decide
 from symrefine.detection.measure import gather, measure
+from symrefine.detection.story import detect
 from symrefine.fit.placed import Placed
 from symrefine.geometry import frame_with_z, random_orthogonal, rotation
 from symrefine.groups import is_subgroup, point_group
@@ -275,3 +276,10 @@ def test_a_chain_ends_where_directions_part_what_together_makes_the_same_group_a
     links = chain(surface, explore(surface, evidence, 0.02), 0.05)
     names = [link.group.name for link in links]
     assert len(set(names)) == len(names)
+
+
+def test_an_exact_group_stays_where_a_larger_one_that_it_is_no_part_of_is_found_first():
+    """A ring of 100 atoms, which is D10h exactly and D100h nearly, at a tolerance between those."""
+    made = instance("tolerances", "ring100 to D10h", 21)
+    shape, _ = look(Case(family="tolerances", name="ring100 to D10h", seed=21), made)
+    assert [detect(shape, tolerance=t).point_group for t in (0.001, 0.0025)] == ["D10h", "D10h"]

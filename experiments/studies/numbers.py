@@ -135,6 +135,7 @@ KIND_OF = {
         "poses.mean": "_SETTLED",
         "poses.minimax": "_MET",
         "poses.symmetry": "_WRITTEN",
+        "propose.folds": "ROUNDING",
         "surface.neighbourhoods": "ROUNDING",
         "surface.openings": "ROUNDING",
         "survey": "COARSE",

@@ -119,7 +119,10 @@ def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float
     for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
         if glance < HOPELESS and not pool.has(axis):
             pool = _with(surface, pool, about(evidence, axis.group.frame[2]))
-    pool = _with(surface, pool, turned_over(evidence, pool.largest.placed))
+    # Turns that hold better than the largest group may have half turns across them which that has not.
+    better = [h for h in pool.small if ALIKE * h.need < pool.largest.need]
+    for known in {h.group.name: h for h in (*better, pool.largest)}.values():
+        pool = _with(surface, pool, turned_over(evidence, known.placed))
     nearest = sorted((*pool.looked, *pool.hopeless), key=lambda k: k[1])[:TOLD] if not pool.small else []
     return replace(pool, small=(*pool.small, *(fitted(surface, start) for start, _ in nearest)))
 

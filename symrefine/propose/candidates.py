@@ -113,9 +113,9 @@ def _counted(points: Array, direction: Array) -> set[int]:
 
 
 def turned_over(evidence: Evidence, known: Placed) -> list[Placed]:
-    """What turns alone about an axis may belong to: Dn, about the centroid."""
+    """What turns about an axis with no mirror through it may belong to: Dn, about the centroid."""
     symbol = known.group.symbol
-    if symbol.family != "C" or not 1 < symbol.fold <= MAX_FOLD:
+    if symbol.family not in ("C", "Ch") or not 1 < symbol.fold <= MAX_FOLD:
         return []
     axis = known.group.frame[2]
     beside_centroid = known.center - (known.center @ axis) * axis

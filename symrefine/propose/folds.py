@@ -12,6 +12,8 @@ MAX_FOLD = 128
 BINS_PER_ORDER = 16
 # Share of surfaces of revolution that may show a fold by chance: the squares are exponential, so their largest is told.
 CHANCE = 0.01
+# Of coordinates of size 1: what differences of them are known to.
+ROUNDING = 1e-12
 
 
 def azimuthal_spectrum(points: Array, weights: Array, axis: Array, max_fold: int = MAX_FOLD) -> tuple[Array, Array]:
@@ -22,15 +24,28 @@ def azimuthal_spectrum(points: Array, weights: Array, axis: Array, max_fold: int
 
     Returns: c [max_fold + 1, 4] complex, and the standard deviation [4] of each if the azimuths were random.
     """
-    x, y, h = frame_with_z(axis) @ points.T
-    rho = np.hypot(x, y)
-    radial = weights * rho * np.stack([np.ones_like(h), h, h * h, rho])
+    radial, azimuths, sigma = _around(points, weights, axis)
     bins = BINS_PER_ORDER * max_fold
-    place = np.floor(np.arctan2(y, x) * (bins / (2.0 * np.pi))).astype(np.int64) % bins
+    place = np.floor(azimuths * (bins / (2.0 * np.pi))).astype(np.int64) % bins
     binned = np.stack([np.bincount(place, weights=r, minlength=bins) for r in radial])
     k = np.arange(max_fold + 1)
     middle = np.exp(1j * np.pi * k / bins) / np.sinc(k / bins)
-    return (np.conj(np.fft.rfft(binned))[:, : max_fold + 1] * middle).T, np.sqrt((radial**2).sum(axis=1))
+    return (np.conj(np.fft.rfft(binned))[:, : max_fold + 1] * middle).T, sigma
+
+
+def _around(points: Array, weights: Array, axis: Array) -> tuple[Array, Array, Array]:
+    """The weighted f_q [4, N] of points [N, 3], their azimuths [N], and the norms [4] of f_q; 0 for mere rounding."""
+    x, y, h = frame_with_z(axis) @ points.T
+    rho = np.hypot(x, y)
+    radial = weights * rho * np.stack([np.ones_like(h), h, h * h, rho])
+    norms = np.sqrt((radial**2).sum(axis=1))
+    # A flat object has no height to weigh azimuths with, but for what rounding leaves of it.
+    return radial, np.arctan2(y, x), np.where(norms > ROUNDING * norms.max(), norms, 0.0)
+
+
+def _over(c: Array, sigma: Array) -> Array:
+    """How far coefficients [4] stand out of chance; 0 of a ring that nothing is on, which has neither."""
+    return np.divide(np.abs(c), sigma, out=np.zeros_like(sigma), where=sigma > 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,9 +74,7 @@ def fold_candidates(points: Array, weights: Array, axis: Array, *, leak_max: flo
     for b in range(2, len(energy) // 2 + 1):
         leak = 1.0 - energy[(k % b == 0)].sum() / total
         if leak < leak_max and energy[b] > 0.0:
-            # A ring that nothing is on has neither coefficients nor noise.
-            best = int(np.argmax(np.divide(np.abs(c[b]), sigma, out=np.zeros_like(sigma), where=sigma > 0.0)))
-            phase = rotation([0, 0, 1], -np.angle(c[b, best]) / b)
+            phase = rotation([0, 0, 1], -np.angle(c[b, np.argmax(_over(c[b], sigma))]) / b)
             found.append(FoldCandidate(fold=b, frame=phase @ frame_with_z(axis), leak=float(leak)))
     # A divisor of the true fold leaks no more than it: prefer the largest fold among equals.
     return sorted(found, key=lambda f: (round(f.leak, 1), -f.fold))
@@ -73,16 +86,14 @@ def frames_across(points: Array, weights: Array, axis: Array, fold: int) -> list
     Such a turn at azimuth a takes (rho, phi, h) to (rho, 2 a - phi, -h). So the phase of `c_k` is k a modulo pi where f
     is even in h, as for a mirror through the axis, and k a + pi/2 where it is odd; one frame by each kind.
     """
-    c, sigma = azimuthal_spectrum(points, weights, axis)
-    found: list[Array] = []
-    for columns, quarter in (((0, 2, 3), 0.0), ((1,), 0.5 * np.pi)):
-        told = c[fold, list(columns)] / sigma[list(columns)]
-        azimuth = (np.angle(told[np.argmax(np.abs(told))]) - quarter) / fold
-        found.append(rotation([0, 0, 1], -azimuth) @ frame_with_z(axis))
-    return found
+    radial, azimuths, sigma = _around(points, weights, axis)
+    c = radial @ np.exp(1j * fold * azimuths)
+    even = np.argmax(_over(c, sigma) * [1.0, 0.0, 1.0, 1.0])
+    phases = (np.angle(c[even]), np.angle(c[1]) - 0.5 * np.pi)
+    return [rotation([0, 0, 1], -phase / fold) @ frame_with_z(axis) for phase in phases]
 
 
 def _energy_over_noise(c: Array, sigma: Array) -> Array:
     """Energy by order beyond what the largest of so many coefficients of random azimuths shows in 99 % of draws."""
-    sigma = np.where(sigma > 0, sigma, np.inf)  # a flat object has no height to weigh azimuths with
+    sigma = np.where(sigma > 0, sigma, np.inf)
     return np.clip(np.abs(c) ** 2 / sigma**2 - np.log(c.size / CHANCE), 0.0, None).sum(axis=1)
