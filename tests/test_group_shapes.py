@@ -168,7 +168,7 @@ def test_impossible_cases(field, value, message):
 
 
 def test_cases_cover_all_noises_and_both_tolerances():
-    made = cases(["table", "gear12"], 2)
+    made = cases(["table", "gear12"], range(2))
     assert len(made) == len(set(made)) == 2 * 2 * (4 + 2 * 3)
     assert {c.tolerance for c in made if not c.sibling} == {0.02}
     assert {c.tolerance for c in made if c.sibling} == {0.01, 0.02}

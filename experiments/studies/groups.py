@@ -1,6 +1,6 @@
 """Every point group, and shapes that miss one in a detail.
 
-    python -m experiments.studies.groups [--quick] [--only SHAPE ...] [--seeds N] [--jobs N]
+    python -m experiments.studies.groups [--quick] [--only SHAPE ...] [--seeds N] [--first N] [--jobs N]
 
 The shapes of `group_shapes` in random poses, units and scales, without normals: as meshes, and as points with Gaussian
 noise in fractions of the bounding-box diagonal. Right means that the point group is right and no plane is false. The
@@ -123,9 +123,9 @@ def is_mirror(group: PointGroup, normal: Array) -> bool:
     return group.name == "Kh" or along or (group.name == "Dinfh" and bool(across))
 
 
-def cases(names: Sequence[str], seeds: int) -> list[Case]:
+def cases(names: Sequence[str], seeds: Sequence[int]) -> list[Case]:
     """Shapes at every noise, then siblings at two tolerances."""
-    plain = [Case(shape=name, seed=seed) for name in names for seed in range(seeds)]
+    plain = [Case(shape=name, seed=seed) for name in names for seed in seeds]
     noisy = [replace(c, noise_rel=noise) for c in plain for noise in NOISES]
     meshes = [replace(c, form="mesh") for c in plain]
     siblings = [replace(c, sibling=True, tolerance=t) for t in (TOLERANCE, STRICT) for c in noisy]
@@ -144,11 +144,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="a shape of each kind only")
     parser.add_argument("--seeds", type=int, default=1, help="random poses of each")
+    parser.add_argument("--first", type=int, default=0, help="seed of the first of these (default: %(default)s)")
     parser.add_argument("--only", nargs="*", default=[], help="names of shapes")
     add_jobs(parser)
     options = parser.parse_args()
     names = options.only or (QUICK if options.quick else list(group_shapes.DESIGNS))
-    chosen = cases(names, options.seeds)
+    chosen = cases(names, range(options.first, options.first + options.seeds))
     rows = []
     for case, row in zip(chosen, in_order(run, chosen, options.jobs), strict=True):
         rows.append((label(case), row))
