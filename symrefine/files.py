@@ -58,9 +58,10 @@ def replacing(path: Path) -> Iterator[Path]:
     draft = place.with_name(f".{place.stem}.{secrets.token_hex(4)}{place.suffix}")
     try:
         yield draft
-        if place.exists():
-            draft.chmod(place.stat().st_mode)
-        draft.replace(place)
+        with naming(str(path)):
+            if place.exists():
+                draft.chmod(place.stat().st_mode)
+            draft.replace(place)
     finally:
         draft.unlink(missing_ok=True)
 
@@ -73,38 +74,43 @@ def whole(path: Path) -> Iterator[Path]:
         InputError: the file cannot be written, before or while it is.
     """
     check_target(path)
-    with naming(str(path)), replacing(path) as draft:
+    with replacing(path) as draft, naming(str(path), draft):
         yield draft
 
 
 class _UnwrittenError(InputError):
-    """A file that could not be written and is named: of several that are written together, this one."""
+    """A file that could not be written, by its name."""
+
+    def __init__(self, name: str, reason: OSError) -> None:
+        super().__init__(f"{name}: cannot be written: {reason.strerror or reason}")
+        self.name = name
 
 
 @contextmanager
-def naming(name: str) -> Iterator[None]:
-    """Name the file that could not be written: the system names none, or its draft.
+def naming(name: str, draft: Path | None = None) -> Iterator[None]:
+    """Name the file that could not be written: the system names none, and whoever fills a draft names that.
 
     Raises:
         InputError: the disk is full, or the like.
     """
     try:
         yield
-    except (BrokenPipeError, _UnwrittenError):
+    except BrokenPipeError:
         raise
     except (OSError, InputError) as error:
         reason = error if isinstance(error, OSError) else error.__cause__
-        if not isinstance(reason, OSError):
+        if not isinstance(reason, OSError) or (isinstance(error, _UnwrittenError) and error.name != str(draft)):
             raise
-        raise _UnwrittenError(f"{name}: cannot be written: {reason.strerror or reason}") from reason
+        raise _UnwrittenError(name, reason) from reason
 
 
 def write_all(writers: Mapping[str, Writer]) -> None:
     """Write every file under another name first; only when all are complete does each take its place."""
     with ExitStack() as stack:
         for name, write in writers.items():
-            stack.enter_context(naming(name))
-            write(stack.enter_context(replacing(Path(name))))
+            draft = stack.enter_context(replacing(Path(name)))
+            with naming(name, draft):  # and not around what is written later
+                write(draft)
 
 
 def text_writer(text: str) -> Writer:

@@ -133,7 +133,7 @@ def rows_done(path: Path) -> int:
 @pytest.mark.skipif(os.name != "posix", reason="kills a process")
 @pytest.mark.parametrize(("kill", "workers"), [(signal.SIGKILL, "1"), (signal.SIGKILL, "2"), (signal.SIGINT, "2")])
 def test_killed_runs_lose_nothing_and_end_with_the_same_bytes(config: Path, kill: signal.Signals, workers: str) -> None:
-    slow = ("--set", "fixed.wait=0.15", "--workers", workers)
+    slow = ("--set", "fixed.wait=0.3", "--workers", workers)
     whole = start(config, "whole", *slow)
     cut = start(config, "cut", *slow)
     journal = config.parent / "cut" / "journal.jsonl"

@@ -35,7 +35,7 @@ KIND_OF = {
         "align.rivals": "GOOD",
         "align.span": "SHARED",
         "align.sides": "RADII",
-        "decide.chain": "SUPPORTED KEPT PLACES",
+        "decide.chain": "SUPPORTED KEPT PLACES ENCLOSED",
         "decide.doubts": "STRAY",
         "decide.hypotheses": "DIRECTION_ERROR SAME_RAD",
         "decide.maps": "WELL LESS_WELL NOTHING LEAD SHARE UNLIKE DENIED SURE",

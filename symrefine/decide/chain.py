@@ -49,6 +49,9 @@ SUPPORTED = 0.15
 KEPT = 2.0 / 3.0
 # Mirrors or axes of a group from which on a hole often lies on one of them by chance, and its border is kept by that.
 PLACES = 3
+# Share of a surface that a border encloses at most which is too short to be evident: of a ball that is 3 %, by the
+# isoperimetric inequality, and four times that where half of the border was seen.
+ENCLOSED = 0.12
 # A fit that is not settled may need so many times what it does then.
 COARSE = 3.5
 # Candidates of a surface with openings that are looked at: where little was seen many seem possible at a glance.
@@ -76,8 +79,11 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
         return whole
     part = _of_part(surface, whole)
     more = _size(part.largest.placed) > _size(whole.largest.placed)
-    # What may not be open at all is missing a part only where that explains more.
-    missing = (more or surface.openings.evident) and not _ends_there(surface, whole.largest)
+    # What may not be open at all is missing a part only where that explains more, and no more than so short a border
+    # may enclose.
+    hidden = max((e.coverage.unseen for e in part.largest.elements), default=0.0)
+    missing = surface.openings.evident or (more and hidden <= ENCLOSED)
+    missing = missing and not _ends_there(surface, whole.largest)
     if missing or _places(whole.largest, part.largest) >= PLACES:
         return replace(part, at_least=True)
     whole = replace(whole, at_least=surface.openings.evident)
