@@ -5,6 +5,7 @@ with the size of the file before anything is read.
 """
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -165,13 +166,18 @@ def _las(file: Path) -> tuple[int, _Chunks] | None:
     return points, chunks
 
 
-def _las_opened(laspy: Any, file: Path) -> Any:
-    try:
-        return laspy.open(file, laz_backend=laspy.LazBackend.Lazrs)
-    except OSError:
-        raise
-    except BaseException as error:  # noqa: BLE001 (raised again, as one of ours where it is no other)
-        raise _las_fault(error) from None
+@contextmanager
+def _las_opened(laspy: Any, file: Path) -> Iterator[Any]:
+    # laspy leaves a file open that it refuses.
+    with file.open("rb") as stream:
+        try:
+            reader = laspy.open(stream, laz_backend=laspy.LazBackend.Lazrs, closefd=False)
+        except OSError:
+            raise
+        except BaseException as error:  # noqa: BLE001 (raised again, as one of ours where it is no other)
+            raise _las_fault(error) from None
+        with reader:
+            yield reader
 
 
 def _las_fault(error: BaseException) -> BaseException:
