@@ -14,7 +14,7 @@ from experiments.objects import damage
 from experiments.objects.built_symmetry import specimen
 from experiments.objects.poses import Pose
 from experiments.objects.shapes import bottle, box, join, mug, sample, stool, table
-from experiments.studies import damaged, single_views
+from experiments.studies import damaged, groups, single_views
 from symrefine.cli import invoke
 from symrefine.complete import complete
 from symrefine.detection.measure import HIDDEN, gather, measure
@@ -169,6 +169,15 @@ def test_a_few_strays_hide_no_group(name, kind, strength, seed):
     case = damaged.Case(family="shape", name=name, kind=kind, strength=strength, seed=seed)
     made, truth = damaged.damaged(case)
     assert detect(made.points).point_group == truth.group.name
+
+
+@pytest.mark.parametrize("name", ["rotor4", "swirl6", "crossed4"])
+def test_a_part_out_of_place_is_no_clump_that_hides_where_it_belongs(name):
+    """A blade that fills its neighbourhoods, 3 % of the diagonal out of place, at a tolerance of 1 %."""
+    case = groups.Case(shape=name, sibling=True, tolerance=0.01)
+    shape, _ = groups.posed(case)
+    found = detect(shape, tolerance=case.tolerance)
+    assert (found.point_group, found.clumps) == (groups.true_group(name, True).name, 0)
 
 
 def test_a_clump_covers_its_rim_wherever_it_is_and_no_more():

@@ -16,6 +16,7 @@ from symrefine.detection.sketch import Sample, Sketch, is_large, set_apart, sket
 from symrefine.fit.vertices import ROUNDED, on_vertices
 from symrefine.geometry import Array, check_tolerance
 from symrefine.shape import Index, Shape
+from symrefine.surface.clumps import COUNTERPART, Clump
 from symrefine.surface.misses import TOLERANCE, disc_distances
 from symrefine.surface.surface import Surface
 from symrefine.surface.tree import Tree
@@ -112,7 +113,8 @@ def examined(
 
 def _has_parts_apart(found: Examined, tolerance: float) -> bool:
     """Whether something that was set apart is a part of the object."""
-    return any(_belongs(found, points, tolerance) for _, points in found.measured.clumps)
+    clumps = [points for _, points in found.measured.clumps]
+    return any(_belongs(found, c, tolerance) or _replaces(found, c, tolerance) for c in clumps)
 
 
 def _examined(
@@ -149,6 +151,19 @@ def _examined(
         outlier_share=share,
         sample=None if sketch is None else Sample(points=len(sketch.picked), of=sketch.count),
     )
+
+
+def _replaces(found: Examined, clump: Array, tolerance: float) -> bool:
+    """Whether about as much of the surface has its image under points set apart as these are: a part out of place."""
+    surface, moments = found.surface, found.measured.moments
+    there, margin = Clump.of((clump - moments.center) / moments.scale), surface.far * surface.diagonal
+    own, hidden = surface.cloud.points, [0.0]
+    for element in found.links[found.decided(tolerance).index].elements:
+        for motion in element.operations.motions(element.center):
+            moved = motion.apply(own)
+            under = moved[there.covers(moved)]
+            hidden.append(float((disc_distances(surface.cloud, under) > margin).sum()) if len(under) else 0.0)
+    return max(hidden) * found.measured.count >= COUNTERPART * len(clump) * len(own)
 
 
 def _by_vertices(links: tuple[Hypothesis, ...], measured: Measured, diagonal: float) -> tuple[Hypothesis, ...]:
