@@ -13,7 +13,7 @@ from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, known_links
 from symrefine.detection.measure import Measured, Outliers, doubt, gather, measure
 from symrefine.detection.sketch import Sample, Sketch, is_large, set_apart, sketched
-from symrefine.fit.vertices import ROUNDED, on_vertices
+from symrefine.fit.vertices import ROUNDED, OnVertices, on_vertices
 from symrefine.geometry import Array, check_tolerance
 from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import COUNTERPART, Clump
@@ -170,15 +170,20 @@ def _by_vertices(links: tuple[Hypothesis, ...], measured: Measured, diagonal: fl
     """The chain, where a group needs nothing that maps a mesh onto itself exactly, whatever its samples told."""
     if measured.shape.faces is None:
         return links
-    origin, scale = measured.moments.center, measured.moments.scale
     for k in reversed(range(len(links))):
         if links[k].need <= ROUNDED:
             break  # and those below
-        center = origin + scale * links[k].placed.center
-        on = on_vertices(measured.shape, links[k].group, center, diagonal=scale * diagonal)
+        on = carried_vertices(measured, links[k], diagonal)
         if on is not None and on.faces and links[k].group.is_finite:
             return (*(replace(link, need=0.0) for link in links[: k + 1]), *links[k + 1 :])
     return links
+
+
+def carried_vertices(measured: Measured, found: Hypothesis, diagonal: float) -> OnVertices | None:
+    """Where the vertices of a mesh put a group, if it maps them onto one another; `diagonal` in normalised units."""
+    origin, scale = measured.moments.center, measured.moments.scale
+    center = origin + scale * found.placed.center
+    return on_vertices(measured.shape, found.group, center, diagonal=scale * diagonal)
 
 
 def _belongs(found: Examined, clump: Array, tolerance: float) -> bool:

@@ -11,14 +11,14 @@ from symrefine.clock import Clock
 from symrefine.decide.chain import COARSE
 from symrefine.decide.hypotheses import Element, Hypothesis, judged
 from symrefine.decide.posterior import NEAR, Decision, alternatives
-from symrefine.detection.examination import Examined, examined
+from symrefine.detection.examination import Examined, carried_vertices, examined
 from symrefine.detection.measure import Measured, Outliers
 from symrefine.detection.result import Candidate, Detection, Exact, FoundAxis, FoundPlane, NearMiss, Step
 from symrefine.detection.sketch import Sketch
 from symrefine.errors import InputError
 from symrefine.fit.placed import Placed
 from symrefine.fit.refine import Iterate
-from symrefine.fit.vertices import OnVertices, on_vertices
+from symrefine.fit.vertices import OnVertices
 from symrefine.geometry import Array, Axis, Plane, cross_matrix, positive
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
@@ -153,7 +153,10 @@ def _report(
     names, needs = [h.group.name for h in links], [h.need for h in links]
     told = alternatives(names, needs, decision, -1 if reason else index)
     history = chosen.history
-    on = _on_vertices(measured, chosen, surface.diagonal, clock)
+    on = None
+    if measured.shape.faces is not None:
+        with clock("vertices"):
+            on = carried_vertices(measured, chosen, surface.diagonal)
     chosen = chosen if on is None else _polished(chosen, on, measured)
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
     planes = [e for e in chosen.elements if e.operations.kind == "plane"]
@@ -225,16 +228,6 @@ def _report(
         timings=clock.seconds,
         examined=found,
     )
-
-
-def _on_vertices(measured: Measured, chosen: Hypothesis, diagonal: float, clock: Clock) -> OnVertices | None:
-    """Where the vertices of a mesh put the group that was decided, if it maps them onto one another."""
-    if measured.shape.faces is None:
-        return None
-    origin, scale = measured.moments.center, measured.moments.scale
-    with clock("vertices"):
-        center = origin + scale * chosen.placed.center
-        return on_vertices(measured.shape, chosen.group, center, diagonal=scale * diagonal)
 
 
 def _polished(chosen: Hypothesis, on: OnVertices, measured: Measured) -> Hypothesis:

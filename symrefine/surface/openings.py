@@ -67,8 +67,10 @@ class Openings:
     @property
     def closed(self) -> "Openings | None":
         """What is left of it where the surface counts as closed: what hides it; None if nothing does."""
-        if not self.clumps or not (self.cameras or self.line.any()):
-            return self if self.clumps else None
+        if not self.clumps:
+            return None
+        if not (self.cameras or self.line.any()):
+            return self
         return replace(
             self, line=np.zeros_like(self.line), border=np.zeros_like(self.border), evident=False, cameras=()
         )
