@@ -18,6 +18,7 @@ from symrefine.decide.hypotheses import (
     exact_need,
     fitted,
     glances,
+    has_all,
     joined,
     looked_at,
     single,
@@ -171,12 +172,13 @@ def _size(placed: Placed) -> float:
 def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
     """The pool with candidates fitted, but for those that the group so far has anyway."""
     for start, glance in _glanced(surface, pool, starts):
-        if pool.has(start) or pool.shows(start, glance):
+        if pool.has(start) or pool.shows(start, glance) or pool.started(start):
             continue
         if glance >= _hopeless(surface):
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
             continue
         moved, needs = looked_at(surface, start, COARSE * pool.limit)
+        pool = replace(pool, starts=(*pool.starts, start))
         if needs > ALIKE * pool.limit:
             pool = replace(pool, looked=(*pool.looked, (moved, needs)))
         elif not pool.has(moved, needs) and not pool.met(moved):
@@ -190,7 +192,7 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
 
 def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
     """The pool where a candidate and the largest group hold together as far as noise tells: no need to part them."""
-    if pool.largest.holds(start):
+    if pool.largest.holds(start) or has_all(start, pool.largest.placed):
         return pool
     parts, before = [pool.largest.placed, start], pool.largest.iterations
     both = _generated(surface, parts, pool.failed, before, ALIKE * pool.nothing)

@@ -77,11 +77,16 @@ class Hypothesis:
         return self.before + max(0, len(self.history) - 1)
 
     def holds(self, other: Placed) -> bool:
-        """Whether it has all operations of another group, as far as directions tell."""
-        # By a quarter of a turn of the other's own, lest turns of many folds pass for those of fewer.
-        fold = other.group.symbol.fold
-        turn = 2.0 * math.pi / fold if 0 < fold < math.inf else math.inf
-        return is_subgroup(other.group, self.group, min(2.0 * SAME_RAD, 0.25 * turn))
+        """Whether it has all operations of another group; see `has_all`."""
+        return has_all(self.placed, other)
+
+
+def has_all(placed: Placed, other: Placed) -> bool:
+    """Whether a group has all operations of another one, as far as directions tell."""
+    # By a quarter of a turn of the other's own, lest turns of many folds pass for those of fewer.
+    fold = other.group.symbol.fold
+    turn = 2.0 * math.pi / fold if 0 < fold < math.inf else math.inf
+    return is_subgroup(other.group, placed.group, min(2.0 * SAME_RAD, 0.25 * turn))
 
 
 NOTHING = Hypothesis(placed=Placed(group=PointGroup(name="C1"), center=np.zeros(3)), elements=(), need=0.0)
@@ -108,13 +113,15 @@ def _few_motions(placed: Placed) -> list[Isometry]:
 
 
 def looked_at(surface: Surface, start: Placed, most: float) -> tuple[Placed, float]:
-    """A fit on a few points, and what it needs by them; one that needs more than `most` after `SHORT` steps ends."""
+    """A fit on a few points, and what it needs by them; by fewer after `SHORT` steps, if that is more than `most`."""
     state = start.roughly_framed()
     stride = surface.stride(max(GLANCE, LOOK // len(state.standard)))
     for iterate in refine(surface.cloud, state, start_error_rad=start_error(surface), stride=stride):
         state = iterate.state
-        if iterate.index == SHORT and not iterate.converged and _seems(surface, start.moved(state), GLANCE) > most:
-            break
+        if iterate.index == SHORT and not iterate.converged:
+            needs = _seems(surface, start.moved(state), GLANCE)
+            if needs > most:
+                return start.moved(state), needs
     moved = start.moved(state)
     return moved, _seems(surface, moved, LOOK)
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.decide.hypotheses import DIRECTION_ERROR, NOTHING, SAME_RAD, Hypothesis
+from symrefine.decide.hypotheses import DIRECTION_ERROR, NOTHING, SAME_RAD, Hypothesis, has_all
 from symrefine.fit.placed import Placed
+from symrefine.fit.refine import SETTLED
 from symrefine.groups import PointGroup, is_subgroup
 
 # Needs within this factor are the same, as the elements of a true group miss alike.
@@ -21,6 +22,7 @@ class Pool:
         small: groups fitted and judged.
         largest: the largest that holds within the limit.
         failed: groups that the largest and another one generate, which do not hold.
+        starts: where candidates that were looked at stood before.
         looked: candidates turned down after a look, where a coarse fit put them, with what they seem to need.
         hopeless: the same of those turned down at a glance.
         at_least: whether there may be more that was not seen.
@@ -31,6 +33,7 @@ class Pool:
     small: tuple[Hypothesis, ...] = ()
     largest: Hypothesis = NOTHING
     failed: tuple[Hypothesis, ...] = ()
+    starts: tuple[Placed, ...] = ()
     looked: tuple[tuple[Placed, float], ...] = ()
     hopeless: tuple[tuple[Placed, float], ...] = ()
     at_least: bool = False
@@ -55,6 +58,15 @@ class Pool:
         """Whether a group was fitted at this very place."""
         return any(is_at(h.placed, placed) for h in self.small)
 
+    def started(self, start: Placed) -> bool:
+        """Whether a group was looked at from this very start, as far as fits settle."""
+        return any(
+            s.group.name == start.group.name
+            and np.abs(s.center - start.center).max() < SETTLED
+            and is_subgroup(start.group, s.group, SETTLED)
+            for s in self.starts
+        )
+
     def shows(self, start: Placed, glance: float) -> bool:
         """Whether the largest group carries a group that was seen onto this one, which looks no better at a glance.
 
@@ -77,7 +89,7 @@ def is_at(a: Placed, b: Placed) -> bool:
 
 def is_same(a: Placed, b: Placed) -> bool:
     """Whether two groups are one, as far as directions tell."""
-    return a.group.name == b.group.name and Hypothesis(placed=a, elements=(), need=0.0).holds(b)
+    return a.group.name == b.group.name and has_all(a, b)
 
 
 def _images(known: Placed, group: PointGroup, wanted: Placed) -> Iterator[Placed]:

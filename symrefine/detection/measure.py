@@ -20,7 +20,7 @@ from symrefine.shape import Index, Shape
 from symrefine.surface.cameras import Camera, cameras
 from symrefine.surface.clumps import Clump
 from symrefine.surface.drift import Drift
-from symrefine.surface.misses import TOLERANCE, noise_distances
+from symrefine.surface.misses import TOLERANCE, noise_distances, sampling_distances
 from symrefine.surface.neighbourhoods import fills_volume
 from symrefine.surface.openings import NEIGHBOURS, openings
 from symrefine.surface.sampling import sampling
@@ -288,14 +288,10 @@ def _surface(
     uneven = None if exact or np.ptp(weights) == 0.0 else weights
     whole = make_skin(local, rng, normals=normals, exact=exact, tree=tree)
 
-    def as_they_are(some: Index) -> tuple[Array, Index | None]:
-        return local[some], None if labels is None else labels[some]
-
     def half(some: Index) -> LocalPlanes:
-        # As many neighbours as in the whole, so that noise is the same; exact normals need none.
-        own = normals[some] if exact and normals is not None else None
-        skin = Skin(points=local[some], normals=own, neighbours=whole.neighbours, given=None)
-        pick = drawn(len(some), SAMPLES if exact else PLANES // 2, rng, None if uneven is None else uneven[some])
+        # As many neighbours as in the whole, so that noise is the same.
+        skin = Skin(points=local[some], normals=None, neighbours=whole.neighbours, given=None)
+        pick = drawn(len(some), PLANES // 2, rng, None if uneven is None else uneven[some])
         return skin.local_planes(pick, None if labels is None else labels[some])
 
     pick = drawn(len(local), SAMPLES if exact else PLANES, rng, uneven)
@@ -304,7 +300,11 @@ def _surface(
     near = whole.near(pick, NEIGHBOURS) if len(local) >= NEIGHBOURS else None
     cloud = whole.local_planes(pick, labels, near)
     diagonal = tight_diagonal(cloud.points)
-    noise = noise_distances(len(local), half, rng, exact=as_they_are if exact else None)
+    if exact:
+        others = np.delete(np.arange(len(local)), pick)
+        noise = sampling_distances(cloud, local[others], None if labels is None else labels[others])
+    else:
+        noise = noise_distances(len(local), half, rng)
     surface = Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, tolerance=tolerance)
     # Where noise alone needs all that is allowed, nobody sees what is open.
     if tree is not None and (surface.floor < tolerance or views):

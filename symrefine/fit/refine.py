@@ -4,6 +4,7 @@ One skeleton for every case: operations that share one frame and one centre. The
 unknowns, a lone plane three, a full group up to six. Everything is in normalised units (RMS radius 1).
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -207,9 +208,9 @@ def _solve(grams: Array, state: Framed, basis: Array, theta: float) -> Solution:
         full = frame_model(grams, state.standard, state.frame, state.center, basis @ y)
         return replace(full, gradient=basis.T @ full.gradient, hessian=basis.T @ full.hessian @ basis)
 
-    # What a last step leaves is quadratically smaller than the step, and the next iterate takes it.
+    # What a step leaves is about its square (radians, RMS radii), and the next iterate takes it.
     start = basis.T @ np.array([0.0, 0.0, theta, 0.0, 0.0, 0.0])
-    solution = minimise(linearise, start, tolerance=0.1 * SETTLED)
+    solution = minimise(linearise, start, tolerance=math.sqrt(0.1 * SETTLED))
     return replace(solution, x=basis @ solution.x, hessian=basis @ solution.hessian @ basis.T)
 
 

@@ -150,12 +150,19 @@ def spread_distance(one: Array, other: Array) -> float:
     return float(np.sqrt(max(np.trace(one) + np.trace(other) - 2.0 * common, 0.0)))
 
 
+def sampling_distances(cloud: LocalPlanes, points: Array, classes: Index | None) -> Array:
+    """Distances [M] of samples [N, 3] of a surface, of the classes [N], from the surface that others of them make.
+
+    Where samples are free of noise, an object with an exact symmetry differs from its image by no more.
+    """
+    some = slice(None, None, max(1, len(points) // (2 * ASKED)))
+    return disc_distances(cloud, points[some], None if classes is None else classes[some])
+
+
 def noise_distances(
     count: int,
     planes: Callable[[Index], LocalPlanes],
     rng: np.random.Generator,
-    *,
-    exact: Callable[[Index], tuple[Array, Index | None]] | None = None,
 ) -> Array:
     """Distances [M] between the surfaces that two halves of a cloud make.
 
@@ -165,15 +172,9 @@ def noise_distances(
     Args:
         count: points of the cloud.
         planes: the surface that some of them make, given their indices.
-        exact: some of them as they are, with their classes, if they lie on the surface without noise: of these one half
-            is enough for a surface, as either half tells the same.
     """
     order = rng.permutation(count)
     halves = [np.sort(order[k::2]) for k in (0, 1)]
-    if exact is not None:
-        points, classes = exact(halves[1])
-        some = slice(None, None, max(1, len(points) // (2 * ASKED)))
-        return disc_distances(planes(halves[0]), points[some], None if classes is None else classes[some])
     one, other = (planes(half) for half in halves)
     across = []
     for here, there in ((one, other), (other, one)):
