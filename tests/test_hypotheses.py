@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from experiments.objects.shapes import bottle, box, join, mug, sample, stool, table
 from symrefine.decide.hypotheses import (
+    START_ERROR,
     NOTHING,
     Element,
     Hypothesis,
@@ -231,11 +232,23 @@ def test_a_true_group_is_found_from_a_start_three_degrees_off(name):
 def test_a_look_brings_a_start_nearer(name):
     surface, truth = scene(name)
     start = start_of(truth, 5)
-    moved, needs = looked_at(surface, start, math.inf)
-    before, after = (truth.group.distance_rad(p.group.operations()).max() for p in (start, moved))
+    look = looked_at(surface, start, math.inf)
+    before, after = (truth.group.distance_rad(p.group.operations()).max() for p in (start, look.placed))
     assert after < 0.5 * before
-    assert needs < glances(surface, [start])[0]
-    assert moved.group.name == start.group.name
+    assert look.needs < glances(surface, [start])[0]
+    assert look.placed.group.name == start.group.name
+
+
+@pytest.mark.parametrize("name", ["table", "brick", "mug", "stool"])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_look_knows_how_far_off_it_stands(name, seed):
+    surface, truth = scene(name)
+    look = looked_at(surface, start_of(truth, seed), math.inf)
+    best = fitted(surface, truth).placed
+    # A turn of the frame by d moves an operation by up to 2 d, and each of the three unknowns of a turn may be off.
+    off = best.group.distance_rad(look.placed.group.operations()).max()
+    assert off < 2.0 * math.sqrt(3.0) * look.error_rad <= 2.0 * math.sqrt(3.0) * START_ERROR
+    assert fitted(surface, look.placed, error_rad=look.error_rad).need <= 1.1 * fitted(surface, look.placed).need
 
 
 @pytest.mark.parametrize(
@@ -275,9 +288,9 @@ def test_of_exact_atoms_a_true_group_needs_nothing(name, seed):
     surface = atoms_of(points / np.sqrt((points**2).sum(axis=1).mean()))
     found = fitted(surface, Placed(group=group, center=ORIGIN))
     assert found.need < 1e-9
-    moved, needs = looked_at(surface, Placed(group=group, center=ORIGIN), math.inf)
-    assert needs < 1e-9
-    assert line_angle_rad(moved.group.frame[2], group.frame[2]) < 1e-6
+    look = looked_at(surface, Placed(group=group, center=ORIGIN), math.inf)
+    assert look.needs < 1e-9
+    assert line_angle_rad(look.placed.group.frame[2], group.frame[2]) < 1e-6
 
 
 @pytest.mark.parametrize("det", [1, -1])

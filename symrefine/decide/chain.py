@@ -120,9 +120,7 @@ def _places(seen: Hypothesis, found: Hypothesis) -> float:
 
 
 def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float) -> Pool:
-    pool = Pool(nothing=nothing, limit=limit)
-    for starts in proposals(evidence):
-        pool = _with(surface, pool, starts)
+    pool = _with(surface, Pool(nothing=nothing, limit=limit), proposals(evidence))
     for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
         if glance < HOPELESS and not pool.has(axis):
             pool = _with(surface, pool, about(evidence, axis.group.frame[2]))
@@ -161,7 +159,7 @@ def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tup
     """The starts that are new with what they seem to need at a glance, large groups that look good first."""
     new = [s for s in starts if not pool.has(s)]
     seen = zip(new, glances(surface, new, _hopeless(surface)), strict=True)
-    best = sorted(seen, key=lambda k: k[1] / math.log2(1.0 + _size(k[0])))
+    best = sorted(seen, key=lambda k: max(k[1], pool.nothing) / math.log2(1.0 + _size(k[0])))
     return best if surface.openings is None else best[:LOOKED]
 
 
@@ -177,14 +175,15 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
         if glance >= _hopeless(surface):
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
             continue
-        moved, needs = looked_at(surface, start, COARSE * pool.limit)
+        look = looked_at(surface, start, COARSE * pool.limit)
+        moved, needs = look.placed, look.needs
         pool = replace(pool, starts=(*pool.starts, start))
         if needs > ALIKE * pool.limit:
             pool = replace(pool, looked=(*pool.looked, (moved, needs)))
         elif not pool.has(moved, needs) and not pool.met(moved):
             pool = _joined_at_once(surface, pool, moved) if needs <= pool.limit and pool.largest.elements else pool
             if not pool.has(moved, needs):
-                found = fitted(surface, moved)
+                found = fitted(surface, moved, error_rad=look.error_rad)
                 if surface.openings is None or found.supported >= SUPPORTED:
                     pool = _grown(surface, pool, found)
     return pool
@@ -220,26 +219,28 @@ def _grown(surface: Surface, pool: Pool, found: Hypothesis) -> Pool:
 def _join(surface: Surface, parts: list[Hypothesis], known: Iterable[Hypothesis], most: float) -> Hypothesis | None:
     """The group that hypotheses generate, fitted unless it is one of them or known; None if they generate none.
 
-    Nor is one told that seems to need more than `most`.
+    One that seems to need more than `most` is told without elements.
     """
     placed = [h.placed for h in parts if h is not NOTHING]
     return _generated(surface, placed, (*parts, *known), max(h.iterations for h in parts), most)
 
 
 def _generated(
-    surface: Surface, parts: Sequence[Placed], known: Iterable[Hypothesis], before: int, most: float
+    surface: Surface, parts: Sequence[Placed], known: Sequence[Hypothesis], before: int, most: float
 ) -> Hypothesis | None:
     placed = joined(parts)
     if placed is None:
         return None
-    same = next((h for h in known if h.history and is_at(h.placed, placed)), None)
+    hopeless = (h for h in known if not h.elements and h.need > most)
+    same = next((h for h in (*(h for h in known if h.history), *hopeless) if is_at(h.placed, placed)), None)
     if same is not None:
         return same
-    if surface.openings is None:
-        placed, needs = looked_at(surface, placed, COARSE * most)
-        if needs > most:
-            return None
-    return fitted(surface, placed, before=before)
+    if surface.openings is not None:
+        return fitted(surface, placed, before=before)
+    look = looked_at(surface, placed, COARSE * most)
+    if look.needs > most:
+        return Hypothesis(placed=placed, elements=(), need=look.needs)
+    return fitted(surface, look.placed, error_rad=look.error_rad, before=before)
 
 
 def _worst(found: Hypothesis) -> tuple[float, float]:
@@ -263,17 +264,17 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
         level = max(ALIKE * rest[0].need, here.need, exact_need(surface.floor), pool.nothing / ALIKE)
         batch = [h for h in rest if h.need <= level]
         found = _join(surface, [here, *batch], known, most)
-        if found is None or found.need > ALIKE * level:
+        if found is None or not found.elements or found.need > ALIKE * level:
             singly = [_join(surface, [here, h], known, most) for h in batch[:SINGLY]]
             tried = [h for h in (found, *singly) if h is not None]
             known += tried
-            found = min(tried, key=_worst, default=None)
+            found = min((h for h in tried if h.elements), key=_worst, default=None)
         # Directions may part what together makes the same group again.
         if found is None or found.group.name == here.group.name:
             rest = [h for h in rest if h not in batch]
             continue
         # What holds together holds in every part of it, though a part alone may not tell what was not seen.
-        need = min([found.need, *(h.need for h in known if h.holds(found.placed))])
+        need = min([found.need, *(h.need for h in known if h.elements and h.holds(found.placed))])
         links.append(replace(found, need=max(need, here.need)))
         if need > limit:
             break

@@ -14,7 +14,7 @@ import numpy as np
 from symrefine.decide.posterior import EVEN, EVEN_MIRROR
 from symrefine.errors import DegenerateShapeError
 from symrefine.fit.placed import Operations, Placed, common_center, elements
-from symrefine.fit.refine import Iterate, refine
+from symrefine.fit.refine import SPREAD, Iterate, refine
 from symrefine.fit.vertices import ROUNDED
 from symrefine.geometry import Array, Isometry, frame_with_z
 from symrefine.groups import PointGroup, from_elements, is_subgroup
@@ -112,18 +112,28 @@ def _few_motions(placed: Placed) -> list[Isometry]:
     return [m for part in parts[:: max(1, len(parts) // GLANCED)] for m in part.motions(placed.center)]
 
 
-def looked_at(surface: Surface, start: Placed, most: float) -> tuple[Placed, float]:
-    """A fit on a few points, and what it needs by them; by fewer after `SHORT` steps, if that is more than `most`."""
-    state = start.roughly_framed()
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Look:
+    """A group where a fit on a few points put it, what it needs by them, and how far off it may stand (radians)."""
+
+    placed: Placed
+    needs: float
+    error_rad: float
+
+
+def looked_at(surface: Surface, start: Placed, most: float) -> Look:
+    """A fit on a few points; one that needs more than `most` after `SHORT` steps ends, and is judged by fewer."""
+    state, error = start.roughly_framed(), start_error(surface)
     stride = surface.stride(max(GLANCE, LOOK // len(state.standard)))
-    for iterate in refine(surface.cloud, state, start_error_rad=start_error(surface), stride=stride):
+    for iterate in refine(surface.cloud, state, start_error_rad=error, stride=stride):
         state = iterate.state
+        off = max(iterate.step, math.sqrt(max(float(np.diag(iterate.covariance).max()), 0.0)))
         if iterate.index == SHORT and not iterate.converged:
             needs = _seems(surface, start.moved(state), GLANCE)
             if needs > most:
-                return start.moved(state), needs
+                return Look(placed=start.moved(state), needs=needs, error_rad=min(error, SPREAD * off))
     moved = start.moved(state)
-    return moved, _seems(surface, moved, LOOK)
+    return Look(placed=moved, needs=_seems(surface, moved, LOOK), error_rad=min(error, SPREAD * off))
 
 
 def _seems(surface: Surface, placed: Placed, sources: int) -> float:
@@ -136,14 +146,14 @@ def start_error(surface: Surface) -> float:
     return START_ERROR if surface.openings is None else AGREE_RAD
 
 
-def fitted(surface: Surface, start: Placed, *, before: int = 0) -> Hypothesis:
-    """The group fitted as a whole from where it stands, and judged.
+def fitted(surface: Surface, start: Placed, *, error_rad: float = START_ERROR, before: int = 0) -> Hypothesis:
+    """The group fitted as a whole from where it stands, which may be off by `error_rad`, and judged.
 
     Of a surface with openings it may stay where it stands: what lies behind them is matched with what does not.
     """
     state = start.framed()
-    stride = surface.stride(_moved_each(len(state.standard)))
-    history = tuple(refine(surface.cloud, state, start_error_rad=START_ERROR, stride=stride))
+    stride = surface.stride(min(max(GLANCE, MOVED // len(state.standard)), MOVED // 4))
+    history = tuple(refine(surface.cloud, state, start_error_rad=error_rad, stride=stride))
     found = _placed(surface, start.moved(history[-1].state), history, before)
     if surface.openings is None or found.need <= exact_need(surface.floor):
         return found

@@ -30,6 +30,8 @@ MAX_OUTER = 10
 SETTLED = 2e-4
 # ... and so does one that moves everything by less than this share of what the noise leaves uncertain.
 WITHIN_NOISE = 0.22
+# What a state is off by at most, in lengths of the last step or standard deviations.
+SPREAD = 4.0
 # Largest ratio of successive steps that is extrapolated.
 LONGEST = 0.7
 
@@ -142,7 +144,7 @@ def refine(
         pairs=(), inner_steps=0, converged=False,
     )  # fmt: skip
     for index in range(1, max_outer + 1):
-        uncertainty = min(start_error_rad, 4.0 * step)
+        uncertainty = min(start_error_rad, SPREAD * step)
         pairs = tuple(match(cloud, motion, uncertainty, stride=stride, robust=robust) for motion in state.motions)
         grams = np.stack([_pair_gram(cloud, p) for p in pairs])
         theta = _thetas(grams, state) if state.bundle else np.zeros(0)

@@ -4,7 +4,7 @@ The n-tuples give an axis or a plane where they do not vanish, the directional s
 azimuthal spectrum the folds about an axis with their phases. Everything is in normalised units (RMS radius 1).
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -54,13 +54,12 @@ class Evidence:
         return harmonic_moments(self.moments)
 
 
-def proposals(evidence: Evidence) -> Iterator[list[Placed]]:
-    """What the moments propose first, in rounds: about the likeliest axes, then mirrors and inversion."""
-    for direction in _likely(evidence):
-        yield about(evidence, direction)
+def proposals(evidence: Evidence) -> list[Placed]:
+    """What the moments propose first: what may stand about the likeliest axes, mirrors and inversion."""
     spectral = mirror_candidates(evidence.moments).directions
     normals = np.concatenate([evidence.tuples.directions[::-1], _principal(evidence), spectral])
-    yield [placed("Ci", np.eye(3)), *(placed("Cs", frame_with_z(n)) for n in apart(normals))]
+    around = [start for direction in _likely(evidence) for start in about(evidence, direction)]
+    return [*around, placed("Ci", np.eye(3)), *(placed("Cs", frame_with_z(n)) for n in apart(normals))]
 
 
 def voted_mirrors(planes: Planes) -> list[Placed]:
