@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from experiments.objects.shapes import bottle, box, join, mug, sample, stool, table
 from symrefine.decide.hypotheses import (
-    START_ERROR,
     NOTHING,
+    START_ERROR,
     Element,
     Hypothesis,
     fitted,
