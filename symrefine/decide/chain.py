@@ -177,7 +177,7 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
             continue
         look = looked_at(surface, start, COARSE * pool.limit)
         moved, needs = look.placed, look.needs
-        pool = replace(pool, starts=(*pool.starts, start))
+        pool = replace(pool, starts=(*pool.starts, (start, glance)), ends=(*pool.ends, moved))
         if needs > ALIKE * pool.limit:
             pool = replace(pool, looked=(*pool.looked, (moved, needs)))
         elif not pool.has(moved, needs) and not pool.met(moved):

@@ -81,12 +81,12 @@ class Hypothesis:
         return has_all(self.placed, other)
 
 
-def has_all(placed: Placed, other: Placed) -> bool:
-    """Whether a group has all operations of another one, as far as directions tell."""
+def has_all(placed: Placed, other: Placed, within_rad: float = SAME_RAD) -> bool:
+    """Whether a group has all operations of another one, as far as directions tell that may be so far apart."""
     # By a quarter of a turn of the other's own, lest turns of many folds pass for those of fewer.
     fold = other.group.symbol.fold
     turn = 2.0 * math.pi / fold if 0 < fold < math.inf else math.inf
-    return is_subgroup(other.group, placed.group, min(2.0 * SAME_RAD, 0.25 * turn))
+    return is_subgroup(other.group, placed.group, min(2.0 * within_rad, 0.25 * turn))
 
 
 NOTHING = Hypothesis(placed=Placed(group=PointGroup(name="C1"), center=np.zeros(3)), elements=(), need=0.0)

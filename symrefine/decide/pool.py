@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.decide.hypotheses import DIRECTION_ERROR, NOTHING, SAME_RAD, Hypothesis, has_all
+from symrefine.decide.hypotheses import DIRECTION_ERROR, NOTHING, SAME_RAD, START_ERROR, Hypothesis, has_all
 from symrefine.fit.placed import Placed
 from symrefine.fit.refine import SETTLED
 from symrefine.groups import PointGroup, is_subgroup
@@ -22,7 +22,8 @@ class Pool:
         small: groups fitted and judged.
         largest: the largest that holds within the limit.
         failed: groups that the largest and another one generate, which do not hold.
-        starts: where candidates that were looked at stood before.
+        starts: where candidates that were looked at stood before, and what they seemed to need at a glance.
+        ends: where their looks ended.
         looked: candidates turned down after a look, where a coarse fit put them, with what they seem to need.
         hopeless: the same of those turned down at a glance.
         at_least: whether there may be more that was not seen.
@@ -33,7 +34,8 @@ class Pool:
     small: tuple[Hypothesis, ...] = ()
     largest: Hypothesis = NOTHING
     failed: tuple[Hypothesis, ...] = ()
-    starts: tuple[Placed, ...] = ()
+    starts: tuple[tuple[Placed, float], ...] = ()
+    ends: tuple[Placed, ...] = ()
     looked: tuple[tuple[Placed, float], ...] = ()
     hopeless: tuple[tuple[Placed, float], ...] = ()
     at_least: bool = False
@@ -64,7 +66,7 @@ class Pool:
             s.group.name == start.group.name
             and np.abs(s.center - start.center).max() < SETTLED
             and is_subgroup(start.group, s.group, SETTLED)
-            for s in self.starts
+            for s, _ in self.starts
         )
 
     def shows(self, start: Placed, glance: float) -> bool:
@@ -74,8 +76,17 @@ class Pool:
         """
         if not self.largest.group.is_finite and self.largest.holds(start):
             return False
-        alike = [p for p, need in self.seen if p.group.name == start.group.name and need < ALIKE * glance]
-        return any(is_same(image, start) for p in alike for image in _images(p, self.largest.group, start))
+        name = start.group.name
+        alike = [(p, SAME_RAD) for p, need in self.seen if p.group.name == name and need < ALIKE * glance]
+        # From another start, no worse than this one, a look came to where this one stands.
+        alike += [
+            (end, START_ERROR)
+            for (_, seemed), end in zip(self.starts, self.ends, strict=True)
+            if end.group.name == name and seemed <= glance and np.linalg.norm(end.center - start.center) < START_ERROR
+        ]
+        return any(
+            is_same(image, start, within) for p, within in alike for image in _images(p, self.largest.group, start)
+        )
 
     def with_failed(self, failed: Hypothesis | None) -> "Pool":
         """The pool that knows of a group, if there is one, that it does not hold."""
@@ -87,9 +98,9 @@ def is_at(a: Placed, b: Placed) -> bool:
     return a.group.name == b.group.name and is_subgroup(b.group, a.group, DIRECTION_ERROR)
 
 
-def is_same(a: Placed, b: Placed) -> bool:
-    """Whether two groups are one, as far as directions tell."""
-    return a.group.name == b.group.name and has_all(a, b)
+def is_same(a: Placed, b: Placed, within_rad: float = SAME_RAD) -> bool:
+    """Whether two groups are one, as far as directions tell that may be so far apart."""
+    return a.group.name == b.group.name and has_all(a, b, within_rad)
 
 
 def _images(known: Placed, group: PointGroup, wanted: Placed) -> Iterator[Placed]:

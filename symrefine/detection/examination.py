@@ -1,6 +1,6 @@
 """What a decision is made from: a shape measured, its candidates fitted and judged, and joined to a chain of groups."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -34,6 +34,7 @@ class Examined:
         outliers: indices of the points that are no part of the object, ascending.
         outlier_share: of all points.
         sample: how many points stand for how many, if they stand for more than themselves.
+        carried: by the groups of a mesh that were asked for, where its vertices put them.
     """
 
     measured: Measured
@@ -43,6 +44,13 @@ class Examined:
     outliers: Index
     outlier_share: float
     sample: Sample | None
+    carried: Mapping[str, OnVertices | None]
+
+    def vertices_of(self, found: Hypothesis) -> OnVertices | None:
+        """Where the vertices of a mesh put a group of the chain, if it maps them onto one another."""
+        if found.group.name in self.carried:
+            return self.carried[found.group.name]
+        return carried_vertices(self.measured, found, self.surface.diagonal)
 
     def decided(self, tolerance: float, *, shown: bool = False) -> Decision:
         """The likeliest group of the chain at a tolerance; with `shown` as if what no camera saw kept to the rest."""
@@ -141,7 +149,7 @@ def _examined(
         steps = [t for t in sorted({tolerance, *ladder}) if t >= tolerance and not doubt(measured, surface, t)]
         pool = explore(surface, evidence, steps[0], min(tolerance, *ladder, 1.0)) if steps else Pool()
         links = chain(surface, pool, BEYOND * max((tolerance, *ladder)))
-        links = _by_vertices(links, measured, surface.diagonal)
+        links, carried = _by_vertices(links, measured, surface.diagonal)
     return Examined(
         measured=measured,
         surface=surface,
@@ -150,6 +158,7 @@ def _examined(
         outliers=out,
         outlier_share=share,
         sample=None if sketch is None else Sample(points=len(sketch.picked), of=sketch.count),
+        carried=carried,
     )
 
 
@@ -166,17 +175,21 @@ def _replaces(found: Examined, clump: Array, tolerance: float) -> bool:
     return max(hidden) * found.measured.count >= COUNTERPART * len(clump) * len(own)
 
 
-def _by_vertices(links: tuple[Hypothesis, ...], measured: Measured, diagonal: float) -> tuple[Hypothesis, ...]:
-    """The chain, where a group needs nothing that maps a mesh onto itself exactly, whatever its samples told."""
-    if measured.shape.faces is None:
-        return links
+def _by_vertices(
+    links: tuple[Hypothesis, ...], measured: Measured, diagonal: float
+) -> tuple[tuple[Hypothesis, ...], dict[str, OnVertices | None]]:
+    """The chain, where a group needs nothing that maps a mesh onto itself exactly, whatever its samples told.
+
+    And what the vertices said of those groups that were asked for.
+    """
+    asked: dict[str, OnVertices | None] = {}
     for k in reversed(range(len(links))):
-        if links[k].need <= ROUNDED:
+        if measured.shape.faces is None or links[k].need <= ROUNDED:
             break  # and those below
-        on = carried_vertices(measured, links[k], diagonal)
+        on = asked[links[k].group.name] = carried_vertices(measured, links[k], diagonal)
         if on is not None and on.faces and links[k].group.is_finite:
-            return (*(replace(link, need=0.0) for link in links[: k + 1]), *links[k + 1 :])
-    return links
+            return (*(replace(link, need=0.0) for link in links[: k + 1]), *links[k + 1 :]), asked
+    return links, asked
 
 
 def carried_vertices(measured: Measured, found: Hypothesis, diagonal: float) -> OnVertices | None:

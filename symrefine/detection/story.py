@@ -11,7 +11,7 @@ from symrefine.clock import Clock
 from symrefine.decide.chain import COARSE
 from symrefine.decide.hypotheses import Element, Hypothesis, judged
 from symrefine.decide.posterior import NEAR, Decision, alternatives
-from symrefine.detection.examination import Examined, carried_vertices, examined
+from symrefine.detection.examination import Examined, examined
 from symrefine.detection.measure import Measured, Outliers
 from symrefine.detection.result import Candidate, Detection, Exact, FoundAxis, FoundPlane, NearMiss, Step
 from symrefine.detection.sketch import Sketch
@@ -156,7 +156,7 @@ def _report(
     on = None
     if measured.shape.faces is not None:
         with clock("vertices"):
-            on = carried_vertices(measured, chosen, surface.diagonal)
+            on = found.vertices_of(chosen)
     chosen = chosen if on is None else _polished(chosen, on, measured)
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
     planes = [e for e in chosen.elements if e.operations.kind == "plane"]
