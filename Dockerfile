@@ -13,7 +13,7 @@ WORKDIR /symrefine
 # The packages first: they are 2 GB, and change less often than the code.
 COPY requirements.lock ./
 RUN python -m venv .venv && .venv/bin/python -m pip install --no-cache-dir -r requirements.lock
-COPY pyproject.toml Makefile README.md LICENSE ./
+COPY pyproject.toml hatch_build.py Makefile README.md LICENSE ./
 COPY symrefine ./symrefine
 RUN make setup
 COPY experiments ./experiments
