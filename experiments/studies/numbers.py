@@ -57,7 +57,7 @@ KIND_OF = {
         "propose.consensus": "COMMON FACING SAME",
         "surface.cameras": "WITHIN",
         "surface.clumps": "CLUMP COUNTERPART COUNTS FILLED RIM SIZES",
-        "surface.misses": "MEAN MOST POWER SHARES ATOM_LIMITS SURE",
+        "surface.misses": "LIMITS SHARES ATOM_LIMITS SURE",
         "surface.neighbourhoods": "WIDEST FLAT VOLUME WIDEST_BLOB",
         "surface.openings": "ASIDE OPEN FAR_ASIDE BENDS WIRE EVIDENT MOST",
         "surface.sampling": "FAR CROWDED UNEVEN DENSER LONELY",

@@ -53,7 +53,7 @@ def detect(
         outliers: "auto": points of a cloud that belong to no surface are set apart and told as `Detection.outliers`;
             "none": all points count.
         tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal: 95 % of the
-            surface must come within 0.75 of it, 99 % within 1.5, the mean within 0.22 (see `surface.misses`). How sure
+            surface must come within 0.75 of it, 99 % within 1.6, the mean within 0.22 (see `surface.misses`). How sure
             the answer is says how close the object comes to these limits.
         ladder: other tolerances to tell the group at, from the same table of misses; see `Detection.staircase`.
         seed: of the random choices (samples of a mesh, subsets of a cloud).

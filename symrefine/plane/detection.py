@@ -108,7 +108,7 @@ def detect_planar(
         weights: [N] masses of the points; not with a `Shape`, which carries its own. Weights count: where they differ,
             the outlines of three levels of weight must agree.
         tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal: 95 % of the
-            outline must come within 0.75 of it, 99 % within 1.5, the mean within 0.22 (see `surface.misses`).
+            outline must come within 0.75 of it, 99 % within 1.6, the mean within 0.22 (see `surface.misses`).
         seed: of the random choices (subsets of large clouds).
 
     Raises:
