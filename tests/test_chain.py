@@ -13,7 +13,7 @@ from experiments.objects.boundary import instance
 from experiments.objects.shapes import box, join, sample
 from experiments.studies.boundary import Case, look
 from symrefine.decide.chain import chain, explore
-from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted
+from symrefine.decide.hypotheses import NOTHING, SAME_RAD, START_ERROR, Hypothesis, fitted
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import Link, decide
 from symrefine.detection.measure import gather, measure
@@ -243,6 +243,17 @@ def test_a_round_group_shows_what_was_seen_across_its_axis_all_around_it(name):
     assert not pool.shows(turned("C3", 2.0, 0.7), 0.03)
     assert not pool.shows(turned("C5", 2.0, tilt), 0.03)
     assert not pool.shows(turned("Cs", 2.0), 0.03)
+
+
+def test_a_start_that_looks_no_better_is_not_looked_at_where_a_look_has_been():
+    def mirror(angle):
+        return Placed(group=point_group("Cs", frame_with_z([np.cos(angle), np.sin(angle), 0.0])), center=ORIGIN)
+
+    pool = Pool(looks=((0.02, mirror(0.0)),))
+    assert pool.shows(mirror(0.02), 0.02)
+    assert not pool.shows(mirror(0.02), 0.019)
+    assert not pool.shows(mirror(2.1 * START_ERROR), 0.02)
+    assert not pool.shows(Placed(group=mirror(0.02).group, center=np.array([0.2, 0.0, 0.0])), 0.02)
 
 
 # What is explored

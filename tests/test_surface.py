@@ -15,6 +15,8 @@ from symrefine.surface.misses import (
     ATOM_LIMITS,
     LIMITS,
     SHARES,
+    SPECK,
+    SPECK_LIMIT,
     TOLERANCE,
     Deviation,
     disc_distances,
@@ -223,6 +225,7 @@ def test_what_is_needed_is_the_smallest_tolerance_that_mean_and_shares_keep(seed
 
     def kept(tolerance):
         shares = [np.mean(miss > limit * tolerance) <= share for limit, share in zip(LIMITS[1:], SHARES, strict=True)]
+        shares.append(np.mean(miss > SPECK_LIMIT * tolerance) <= SPECK)
         return miss.mean() <= LIMITS[0] * tolerance and all(shares)
 
     assert kept(needed * (1 + 1e-9))
@@ -301,13 +304,22 @@ def test_needs_of_many_operations_are_those_of_each():
         assert surface.need(motions, sources=500) == pytest.approx(max(each))
 
 
-@pytest.mark.parametrize(("limit", "share"), [(1, 0.06), (2, 0.04), (3, 0.014), (4, 0.008), (5, 0.0045)])
+@pytest.mark.parametrize(("limit", "share"), [(1, 0.08), (2, 0.04), (3, 0.02), (4, 0.008)])
 def test_every_limit_decides_alone_about_what_it_is_there_for(limit, share):
     """A share between two percentiles that misses by a little more, or less, than the limit of the upper one."""
     flat = about(householder(Z))
     for factor in (0.95, 1.05):
         needed = lifted(share, factor * LIMITS[limit] * TOLERANCE).need([flat])
         assert needed == pytest.approx(factor * TOLERANCE, rel=1e-2)
+
+
+def test_a_speck_counts_beyond_all_noise_and_not_within_it():
+    """0.45 % of the surface: less than any share that is asked under noise."""
+    size = 1.05 * SPECK_LIMIT * TOLERANCE
+    out = np.where(np.arange(4000) < 0.0045 * 4000, size, 0.0)
+    assert needs(out, NO_NOISE) == pytest.approx(1.05 * TOLERANCE)
+    assert needs(out, np.linspace(0.0, 0.5 * size, 4000)) == pytest.approx(1.05 * TOLERANCE)
+    assert needs(out, np.append(np.zeros(3999), 1.1 * size)) < 0.1 * TOLERANCE  # the mean sees it
 
 
 @pytest.mark.parametrize("shift", [0.002, 0.006])

@@ -170,14 +170,14 @@ def _size(placed: Placed) -> float:
 def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
     """The pool with candidates fitted, but for those that the group so far has anyway."""
     for start, glance in _glanced(surface, pool, starts):
-        if pool.has(start) or pool.shows(start, glance) or pool.started(start):
+        if pool.has(start) or pool.shows(start, glance):
             continue
         if glance >= _hopeless(surface):
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
             continue
         look = looked_at(surface, start, COARSE * pool.limit)
         moved, needs = look.placed, look.needs
-        pool = replace(pool, starts=(*pool.starts, (start, glance)), ends=(*pool.ends, moved))
+        pool = replace(pool, looks=(*pool.looks, (glance, moved)))
         if needs > ALIKE * pool.limit:
             pool = replace(pool, looked=(*pool.looked, (moved, needs)))
         elif not pool.has(moved, needs) and not pool.met(moved):
@@ -231,8 +231,8 @@ def _generated(
     placed = joined(parts)
     if placed is None:
         return None
-    hopeless = (h for h in known if not h.elements and h.need > most)
-    same = next((h for h in (*(h for h in known if h.history), *hopeless) if is_at(h.placed, placed)), None)
+    told = [h for h in known if h.history] + [h for h in known if not h.elements and h.need > most]
+    same = next((h for h in told if is_at(h.placed, placed)), None)
     if same is not None:
         return same
     if surface.openings is not None:

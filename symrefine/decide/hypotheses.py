@@ -22,8 +22,9 @@ from symrefine.propose.votes import AGREE_RAD
 from symrefine.surface.misses import LIMITS, SHARES, Deviation
 from symrefine.surface.surface import Coverage, Surface
 
-# Local planes that are moved: at a glance by each operation; in a look by all together; in a fit and when judged by all
-# together (a quarter of that by each at most) and by each at least, as 0.6 % of fewer are no sample.
+# Local planes that are moved: at a glance by each operation, in a fit at least; in a look by all together; in a fit and
+# when judged by all together (a quarter of that by each at most), and when judged by each at least: 0.6 % of fewer are
+# no sample.
 GLANCE, LOOK, MOVED, MOVED_EACH = 120, 600, 12000, 1200
 # Steps of a look after which those that will not come near end.
 SHORT = 3
@@ -126,14 +127,14 @@ def looked_at(surface: Surface, start: Placed, most: float) -> Look:
     state, error = start.roughly_framed(), start_error(surface)
     stride = surface.stride(max(GLANCE, LOOK // len(state.standard)))
     for iterate in refine(surface.cloud, state, start_error_rad=error, stride=stride):
-        state = iterate.state
-        off = max(iterate.step, math.sqrt(max(float(np.diag(iterate.covariance).max()), 0.0)))
         if iterate.index == SHORT and not iterate.converged:
-            needs = _seems(surface, start.moved(state), GLANCE)
+            needs = _seems(surface, start.moved(iterate.state), GLANCE)
             if needs > most:
-                return Look(placed=start.moved(state), needs=needs, error_rad=min(error, SPREAD * off))
-    moved = start.moved(state)
-    return Look(placed=moved, needs=_seems(surface, moved, LOOK), error_rad=min(error, SPREAD * off))
+                break
+    else:
+        needs = _seems(surface, start.moved(iterate.state), LOOK)
+    off = max(iterate.step, math.sqrt(max(float(np.diag(iterate.covariance).max()), 0.0)))
+    return Look(placed=start.moved(iterate.state), needs=needs, error_rad=min(error, SPREAD * off))
 
 
 def _seems(surface: Surface, placed: Placed, sources: int) -> float:
@@ -152,7 +153,7 @@ def fitted(surface: Surface, start: Placed, *, error_rad: float = START_ERROR, b
     Of a surface with openings it may stay where it stands: what lies behind them is matched with what does not.
     """
     state = start.framed()
-    stride = surface.stride(min(max(GLANCE, MOVED // len(state.standard)), MOVED // 4))
+    stride = surface.stride(_moved_each(len(state.standard), GLANCE))
     history = tuple(refine(surface.cloud, state, start_error_rad=error_rad, stride=stride))
     found = _placed(surface, start.moved(history[-1].state), history, before)
     if surface.openings is None or found.need <= exact_need(surface.floor):
@@ -232,8 +233,8 @@ def _belief(found: Element) -> float:
     return math.sqrt(found.coverage.unseen / max(found.coverage.supported, 1e-9))
 
 
-def _moved_each(operations: int) -> int:
-    return min(max(MOVED_EACH, MOVED // operations), MOVED // 4)
+def _moved_each(operations: int, least: int = MOVED_EACH) -> int:
+    return min(max(least, MOVED // operations), MOVED // 4)
 
 
 def _judged(surface: Surface, parts: _Parts, misses: Array) -> tuple[tuple[Element, ...], float]:

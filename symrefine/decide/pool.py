@@ -7,7 +7,6 @@ import numpy as np
 
 from symrefine.decide.hypotheses import DIRECTION_ERROR, NOTHING, SAME_RAD, START_ERROR, Hypothesis, has_all
 from symrefine.fit.placed import Placed
-from symrefine.fit.refine import SETTLED
 from symrefine.groups import PointGroup, is_subgroup
 
 # Needs within this factor are the same, as the elements of a true group miss alike.
@@ -22,8 +21,7 @@ class Pool:
         small: groups fitted and judged.
         largest: the largest that holds within the limit.
         failed: groups that the largest and another one generate, which do not hold.
-        starts: where candidates that were looked at stood before, and what they seemed to need at a glance.
-        ends: where their looks ended.
+        looks: what candidates that were looked at seemed to need at a glance, and where the look put them.
         looked: candidates turned down after a look, where a coarse fit put them, with what they seem to need.
         hopeless: the same of those turned down at a glance.
         at_least: whether there may be more that was not seen.
@@ -34,8 +32,7 @@ class Pool:
     small: tuple[Hypothesis, ...] = ()
     largest: Hypothesis = NOTHING
     failed: tuple[Hypothesis, ...] = ()
-    starts: tuple[tuple[Placed, float], ...] = ()
-    ends: tuple[Placed, ...] = ()
+    looks: tuple[tuple[float, Placed], ...] = ()
     looked: tuple[tuple[Placed, float], ...] = ()
     hopeless: tuple[tuple[Placed, float], ...] = ()
     at_least: bool = False
@@ -60,15 +57,6 @@ class Pool:
         """Whether a group was fitted at this very place."""
         return any(is_at(h.placed, placed) for h in self.small)
 
-    def started(self, start: Placed) -> bool:
-        """Whether a group was looked at from this very start, as far as fits settle."""
-        return any(
-            s.group.name == start.group.name
-            and np.abs(s.center - start.center).max() < SETTLED
-            and is_subgroup(start.group, s.group, SETTLED)
-            for s, _ in self.starts
-        )
-
     def shows(self, start: Placed, glance: float) -> bool:
         """Whether the largest group carries a group that was seen onto this one, which looks no better at a glance.
 
@@ -81,7 +69,7 @@ class Pool:
         # From another start, no worse than this one, a look came to where this one stands.
         alike += [
             (end, START_ERROR)
-            for (_, seemed), end in zip(self.starts, self.ends, strict=True)
+            for seemed, end in self.looks
             if end.group.name == name and seemed <= glance and np.linalg.norm(end.center - start.center) < START_ERROR
         ]
         return any(

@@ -106,7 +106,7 @@ class Verified:
     Attributes:
         points: how many.
         residual: the largest of every statistic over all elements; misses end at 5.55 tolerances.
-        beyond: how many points, of that element of which most, miss by more than 2.5 tolerances.
+        beyond: how many points, of that element of which most, miss by more than 1.85 tolerances.
     """
 
     points: int

@@ -16,7 +16,7 @@ from symrefine.surface.surroundings import AROUND, Surroundings, around_some
 from symrefine.surface.tree import Tree
 
 # A clump holds at most this share of the points, so many that it counts, and has no counterpart: none of half its size.
-CLUMP, COUNTERPART, COUNTS = 0.1, 0.5, SHARES[3]
+CLUMP, COUNTERPART = 0.1, 0.5
 # Standard deviations of a clump that all but 0.1 % of a Gaussian one lie within.
 RIM = 4.0
 # Neighbourhoods as thick as this, over that of points at random in a ball, fill a volume if they do at all these sizes
@@ -63,7 +63,7 @@ def count_parts(points: Array, rng: np.random.Generator) -> int:
     if len(points) <= AROUND:
         return 1
     sizes = np.bincount(_parts(around_some(points, rng)))
-    return max(int((sizes > max(COUNTS * sizes.sum(), AROUND)).sum()), 1)
+    return max(int((sizes > max(SHARES[-1] * sizes.sum(), AROUND)).sum()), 1)
 
 
 def _parts(around: Surroundings) -> Index:
@@ -81,7 +81,7 @@ def filled(points: Array, around: Surroundings, rng: np.random.Generator) -> lis
     to one so large that noise does not make the surface look so too. `around` tells of some of the points.
     """
     thick = blobness(around.planes[2], AROUND)
-    within, least = _smooth(thick, around) > FILLED, COUNTS * len(thick)
+    within, least = _smooth(thick, around) > FILLED, SHARES[-1] * len(thick)
     if within.sum() <= least:
         return []
     tree = Tree(points)
@@ -146,7 +146,7 @@ def _lone(part: Index, most: float) -> list[Mask]:
     None holds more than a share `most` of the points.
     """
     sizes = np.bincount(part + 1)[1:]
-    small = np.flatnonzero((sizes <= most * len(part)) & (sizes > COUNTS * len(part)))
+    small = np.flatnonzero((sizes <= most * len(part)) & (sizes > SHARES[-1] * len(part)))
     own = sizes[small, None]
     alike = (sizes >= COUNTERPART * own) & (sizes <= own / COUNTERPART)
     return [part == k for k in small[alike.sum(axis=1) == 1]]
