@@ -32,6 +32,8 @@ ATOM_LIMITS = (0.9, 1.3, 1.6)
 SURE = 2.0
 # Discs around a point that are looked at: at edges the nearest centre need not be that of the nearest disc.
 DISCS = 4
+# Queries whose discs are measured at once: what they need stays in the cache of a core.
+AT_ONCE = 4096
 # Spacing in the halves of a volume over that of the whole.
 HALVES_OF_VOLUME = 2.0 ** (1.0 / 3.0)
 # Points of each half that are asked.
@@ -134,18 +136,27 @@ def disc_distances(
     skip = int(skip_self)
     count = min(DISCS + skip, len(cloud.points))
     away, near = cloud.around(queries, classes, count - skip, skip=skip, bound=bound)
+    rows = [slice(first, first + AT_ONCE) for first in range(0, len(queries), AT_ONCE)]
+    apart = [_to_discs(cloud, queries[r], away[r], near[r], None if classes is None else classes[r]) for r in rows]
+    return np.minimum(np.concatenate(apart) if apart else np.zeros(0), bound)
+
+
+def _to_discs(cloud: LocalPlanes, queries: Array, away: Array, near: Index, classes: Index | None) -> Array:
+    """Distance [Q] to the nearest of the discs `near` [Q, k], whose centres are so far `away` [Q, k], if any."""
     seen = np.isfinite(away)
-    near = np.where(seen, near, 0)
-    delta = queries[:, None] - cloud.points[near]
-    across = np.abs(np.einsum("nki,nki->nk", delta, cloud.normals[near]))
-    along = np.sqrt(np.maximum(np.einsum("nki,nki->nk", delta, delta) - across**2, 0.0))
+    if not (all_seen := bool(seen.all())):
+        away, near = np.where(seen, away, 0.0), np.where(seen, near, 0)
+    across = np.einsum("ni,nki->nk", queries, cloud.normals[near])
+    across -= cloud.offsets[near]
+    across *= across
+    along = np.sqrt(np.maximum(away * away - across, 0.0))
     # Inside a disc only the distance across counts; from twice its reach on, the whole distance to its centre does.
     beyond = np.minimum(2.0 * np.maximum(along - cloud.reach[near], 0.0), along)
-    distance = np.hypot(across, beyond)
+    distance = np.sqrt(across + beyond * beyond)
     if cloud.labels is not None and classes is not None:
         distance = np.where(cloud.labels[near] == classes[:, None], distance, np.inf)
         distance[~np.isfinite(distance).any(axis=1)] = 0.0  # the only one of its class has no other to be compared with
-    return np.asarray(np.where(seen, distance, bound).min(axis=1).clip(max=bound))
+    return np.asarray((distance if all_seen else np.where(seen, distance, np.inf)).min(axis=1))
 
 
 def spread_distance(one: Array, other: Array) -> float:

@@ -55,7 +55,7 @@ class Planes(ReadOnly):
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class LocalPlanes(Planes):
     """Points projected on the planes fitted to their neighbours.
 
@@ -79,6 +79,11 @@ class LocalPlanes(Planes):
     def isolated(self) -> bool:
         """Whether points meet points: there are no normals and no discs."""
         return self.body != "surface"
+
+    @cached_property
+    def offsets(self) -> Array:
+        """[M] where each plane lies along its normal."""
+        return np.einsum("ij,ij->i", self.points, self.normals)
 
     def classes(self, chosen: Index | slice) -> Index | None:
         """Classes of some of the points."""
