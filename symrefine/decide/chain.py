@@ -190,14 +190,18 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
 
 
 def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
-    """The pool where a candidate and the largest group hold together as far as noise tells: no need to part them."""
-    if pool.largest.holds(start) or has_all(start, pool.largest.placed):
+    """The pool where a candidate and the largest group hold together as far as noise tells: no need to part them.
+
+    Where the largest has it already and holds worse, that is the largest of those in it that need nothing.
+    """
+    exact = [h for h in pool.small if h.need <= pool.nothing and h.elements] if pool.largest.holds(start) else []
+    known = max([pool.largest] if not exact else exact, key=lambda h: _size(h.placed))
+    if known.holds(start) or has_all(start, known.placed):
         return pool
-    parts, before = [pool.largest.placed, start], pool.largest.iterations
-    both = _generated(surface, parts, pool.failed, before, ALIKE * pool.nothing)
-    if both is not None and both.need <= pool.nothing:
-        return replace(pool, largest=both)
-    return pool.with_failed(both)
+    both = _generated(surface, [known.placed, start], pool.failed, known.iterations, ALIKE * pool.nothing)
+    if both is None or both.need > pool.nothing:
+        return pool.with_failed(both)
+    return replace(pool, small=(*pool.small, both)) if exact else replace(pool, largest=both)
 
 
 def _grown(surface: Surface, pool: Pool, found: Hypothesis) -> Pool:
