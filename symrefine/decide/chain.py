@@ -21,6 +21,7 @@ from symrefine.decide.hypotheses import (
     has_all,
     joined,
     looked_at,
+    roughly_judged,
     single,
 )
 from symrefine.decide.pool import ALIKE, Pool, is_at
@@ -195,7 +196,7 @@ def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
     Where the largest has it already and holds worse, that is the largest of those in it that need nothing.
     """
     exact = [h for h in pool.small if h.need <= pool.nothing and h.elements] if pool.largest.holds(start) else []
-    known = max([pool.largest] if not exact else exact, key=lambda h: _size(h.placed))
+    known = max(exact or [pool.largest], key=lambda h: _size(h.placed))
     if known.holds(start) or has_all(start, known.placed):
         return pool
     both = _generated(surface, [known.placed, start], pool.failed, known.iterations, ALIKE * pool.nothing)
@@ -220,17 +221,24 @@ def _grown(surface: Surface, pool: Pool, found: Hypothesis) -> Pool:
     return replace(pool, small=(*pool.small, *kept, found), largest=largest)
 
 
-def _join(surface: Surface, parts: list[Hypothesis], known: Iterable[Hypothesis], most: float) -> Hypothesis | None:
+def _join(
+    surface: Surface, parts: list[Hypothesis], known: Iterable[Hypothesis], most: float, close: float = math.inf
+) -> Hypothesis | None:
     """The group that hypotheses generate, fitted unless it is one of them or known; None if they generate none.
 
-    One that seems to need more than `most` is told without elements.
+    One that seems to need more than `most` is told without elements; one that no fit brings to `close`, by few points.
     """
     placed = [h.placed for h in parts if h is not NOTHING]
-    return _generated(surface, placed, (*parts, *known), max(h.iterations for h in parts), most)
+    return _generated(surface, placed, (*parts, *known), max(h.iterations for h in parts), most, close)
 
 
 def _generated(
-    surface: Surface, parts: Sequence[Placed], known: Sequence[Hypothesis], before: int, most: float
+    surface: Surface,
+    parts: Sequence[Placed],
+    known: Sequence[Hypothesis],
+    before: int,
+    most: float,
+    close: float = math.inf,
 ) -> Hypothesis | None:
     placed = joined(parts)
     if placed is None:
@@ -244,6 +252,8 @@ def _generated(
     look = looked_at(surface, placed, COARSE * most)
     if look.needs > most:
         return Hypothesis(placed=placed, elements=(), need=look.needs)
+    if look.needs > (ALIKE if look.settled else COARSE) * close:
+        return roughly_judged(surface, look, before=before)
     return fitted(surface, look.placed, error_rad=look.error_rad, before=before)
 
 
@@ -253,7 +263,10 @@ def _worst(found: Hypothesis) -> tuple[float, float]:
 
 
 def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
-    """Groups from C1 upwards, each inside the next, by what they need; the last one may be beyond the limit."""
+    """Groups from C1 upwards, each inside the next, by what they need; the last one may be beyond the limit.
+
+    Those that no fit brings within the limit of the pool are only looked at: what larger tolerances would make of them.
+    """
     elements = [single(e) for e in pool.largest.elements if e.need < pool.largest.need / ALIKE]
     near = [h for h in pool.turned_down() if h.need <= COARSE * pool.limit]
     rest = sorted([*pool.small, *elements, pool.largest, *near], key=_worst)
@@ -267,9 +280,9 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
             break
         level = max(ALIKE * rest[0].need, here.need, exact_need(surface.floor), pool.nothing / ALIKE)
         batch = [h for h in rest if h.need <= level]
-        found = _join(surface, [here, *batch], known, most)
+        found = _join(surface, [here, *batch], known, most, pool.limit)
         if found is None or not found.elements or found.need > ALIKE * level:
-            singly = [_join(surface, [here, h], known, most) for h in batch[:SINGLY]]
+            singly = [_join(surface, [here, h], known, most, pool.limit) for h in batch[:SINGLY]]
             tried = [h for h in (found, *singly) if h is not None]
             known += tried
             found = min((h for h in tried if h.elements), key=_worst, default=None)

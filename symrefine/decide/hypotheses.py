@@ -118,15 +118,22 @@ class Look:
     """A group where a fit on a few points put it, what it needs by them, and how far off it may stand (radians)."""
 
     placed: Placed
+    history: tuple[Iterate, ...]
     needs: float
     error_rad: float
+
+    @property
+    def settled(self) -> bool:
+        """Whether the fit came to its end."""
+        return self.history[-1].converged
 
 
 def looked_at(surface: Surface, start: Placed, most: float) -> Look:
     """A fit on a few points; one that needs more than `most` after `SHORT` steps ends, and is judged by fewer."""
-    state, error = start.roughly_framed(), start_error(surface)
+    state, error, history = start.roughly_framed(), start_error(surface), []
     stride = surface.stride(max(GLANCE, LOOK // len(state.standard)))
     for iterate in refine(surface.cloud, state, start_error_rad=error, stride=stride):
+        history.append(iterate)
         if iterate.index == SHORT and not iterate.converged:
             needs = _seems(surface, start.moved(iterate.state), GLANCE)
             if needs > most:
@@ -134,7 +141,8 @@ def looked_at(surface: Surface, start: Placed, most: float) -> Look:
     else:
         needs = _seems(surface, start.moved(iterate.state), LOOK)
     off = max(iterate.step, math.sqrt(max(float(np.diag(iterate.covariance).max()), 0.0)))
-    return Look(placed=start.moved(iterate.state), needs=needs, error_rad=min(error, SPREAD * off))
+    placed = start.moved(iterate.state)
+    return Look(placed=placed, history=tuple(history), needs=needs, error_rad=min(error, SPREAD * off))
 
 
 def _seems(surface: Surface, placed: Placed, sources: int) -> float:
@@ -166,9 +174,16 @@ def judged(surface: Surface, placed: Placed) -> Hypothesis:
     return _placed(surface, placed, (), 0)
 
 
-def _placed(surface: Surface, placed: Placed, history: tuple[Iterate, ...], before: int) -> Hypothesis:
-    """A group judged where a fit put it."""
-    parts = _Parts.of(placed)
+def roughly_judged(surface: Surface, look: Look, *, before: int = 0) -> Hypothesis:
+    """A group judged where a look put it, by as few points of each element as a fit moves."""
+    return _placed(surface, look.placed, look.history, before, GLANCE)
+
+
+def _placed(
+    surface: Surface, placed: Placed, history: tuple[Iterate, ...], before: int, least: int = MOVED_EACH
+) -> Hypothesis:
+    """A group judged where a fit put it, by so many points of each element at least."""
+    parts = _Parts.of(placed, least)
     misses = surface.misses(parts.motions, sources=parts.sources)
     found, need = _judged(surface, parts, misses)
     if surface.openings is not None and need > exact_need(surface.floor):
@@ -195,7 +210,7 @@ class _Parts:
     sources: int
 
     @classmethod
-    def of(cls, placed: Placed) -> "_Parts":
+    def of(cls, placed: Placed, least: int) -> "_Parts":
         operations = elements(placed.group)
         each = [part.motions(placed.center) for part in operations]
         ends = np.cumsum([0, *map(len, each)]).tolist()
@@ -204,7 +219,7 @@ class _Parts:
             operations=tuple(operations),
             motions=tuple(motion for motions in each for motion in motions),
             rows=tuple(slice(*pair) for pair in pairwise(ends)),
-            sources=_moved_each(len(operations)),
+            sources=_moved_each(len(operations), least),
         )
 
 
@@ -233,7 +248,7 @@ def _belief(found: Element) -> float:
     return math.sqrt(found.coverage.unseen / max(found.coverage.supported, 1e-9))
 
 
-def _moved_each(operations: int, least: int = MOVED_EACH) -> int:
+def _moved_each(operations: int, least: int) -> int:
     return min(max(least, MOVED // operations), MOVED // 4)
 
 

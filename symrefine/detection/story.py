@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
 from symrefine.decide.chain import COARSE
-from symrefine.decide.hypotheses import Element, Hypothesis, judged
+from symrefine.decide.hypotheses import Element, Hypothesis, fitted, judged
 from symrefine.decide.posterior import NEAR, Decision, alternatives
 from symrefine.detection.examination import Examined, examined
 from symrefine.detection.measure import Measured, Outliers
@@ -93,10 +93,14 @@ def chosen(detection: Detection, point_group: str) -> Detection:
         InputError: no group of the chain.
     """
     found, tolerance = detection.examined, detection.tolerance
-    names = [link.group.name for link in found.links]
+    links = found.links
+    names = [link.group.name for link in links]
     if point_group not in names:
         raise InputError(f"point_group is {point_group!r}; expected one of {', '.join(names)}")
     index, decision = names.index(point_group), found.decided(tolerance)
+    if links[index].need > found.pool.limit:  # it may have been looked at only
+        fit = replace(fitted(found.surface, links[index].placed), need=links[index].need)
+        found = replace(found, links=(*links[:index], fit, *links[index + 1 :]))
     told = _report(found, decision, index, "", tolerance, detection.staircase, Clock())
     return replace(told, timings=detection.timings)
 
