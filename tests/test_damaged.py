@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.path import Path as MatplotlibPath
 from scipy.spatial import cKDTree
 
 from experiments.objects import damage
 from experiments.objects.built_symmetry import specimen
 from experiments.objects.poses import Pose
-from experiments.objects.shapes import bottle, box, join, mug, sample, stool, table
+from experiments.objects.shapes import bottle, box, join, mug, revolve, sample, stool, table
 from experiments.studies import damaged, groups, single_views
 from symrefine.cli import invoke
 from symrefine.complete import complete
@@ -214,6 +215,59 @@ def test_a_tube_is_open_at_its_ends_and_nowhere_else(radius, noise_rel):
     # Points at random leave a gap here and there.
     assert (from_end[made.openings.line] < 0.1).mean() > 0.9
     assert made.openings.border[from_end < 0.01].mean() > 0.9
+
+
+def lens(half_height):
+    """Two caps that meet in a sharp rim, closed."""
+    radius = np.linspace(0.0, 1.0, 9)
+    arc = np.column_stack([radius, half_height * (radius**2 - 1.0)])
+    return revolve(np.concatenate([arc, arc[-2::-1] * [1.0, -1.0]]).tolist())
+
+
+@pytest.mark.parametrize("half_height", [0.12, 0.2, 0.35])
+def test_a_sharp_rim_is_no_border(half_height):
+    """Two sheets meet there, and part from there on; of a cap alone it is where the surface ends."""
+    points, _ = posed(sample(join([lens(half_height)]), 20000, 0.0, np.random.default_rng(23)), 24)
+    made = surface_of(points)
+    assert made.openings is None or not made.openings.evident
+    cap = sample(join([lens(half_height)]), 40000, 0.0, np.random.default_rng(25))
+    made = surface_of(cap[cap[:, 2] > 0.0])
+    assert made.openings.evident
+    rim = (
+        np.linalg.norm(made.cloud.points[:, :2], axis=1) > np.linalg.norm(made.cloud.points[:, :2], axis=1).max() - 0.02
+    )
+    assert made.openings.border[rim].mean() > 0.8
+
+
+@pytest.mark.parametrize("half_height", [0.12, 0.2])
+def test_what_stands_at_a_sharp_rim_is_not_explained_away(half_height):
+    """A block on one side of the rim leaves one mirror, whatever a body of revolution would hide behind the rim."""
+    block = box((1.0, 0.0, 0.1), (0.45, 0.2, 0.2))
+    points, _ = posed(sample(join([lens(half_height), block]), 20000, 0.0, np.random.default_rng(26)), 27)
+    found = detect(points)
+    assert (found.point_group, found.confidence > 0.9) == ("Cs", True)
+
+
+PLATES = {
+    "trapezium": [(0, 0), (1, 0), (0.7, 0.6), (0.1, 0.6)],
+    "corner cut": [(0, 0), (1, 0), (1, 0.4), (0.7, 0.7), (0, 0.7)],
+    "notched": [(0, 0), (1, 0), (1, 0.6), (0.7, 0.6), (0.7, 0.45), (0.5, 0.45), (0.5, 0.6), (0, 0.6)],
+}
+
+
+@pytest.mark.parametrize("noise_rel", [0.0, 0.003])
+@pytest.mark.parametrize("outline", PLATES)
+def test_a_plane_that_slides_on_itself_tells_nothing_of_what_is_not_there(outline, noise_rel):
+    """Any turn carries what was seen of a plate onto its plane; where it ends is all that it says."""
+    rng = np.random.default_rng(28)
+    corners = np.array(PLATES[outline], dtype=float)
+    inside = MatplotlibPath(corners)
+    flat = rng.random((60000, 2))
+    flat = flat[inside.contains_points(flat)][:20000]
+    points = np.column_stack([flat, 0.004 * rng.integers(0, 2, len(flat))])
+    points += noise_rel * np.linalg.norm(np.ptp(points, axis=0)) * rng.normal(size=points.shape)
+    found = detect(posed(points, 29)[0])
+    assert found.point_group in ("Cs", "C1", "undetermined")
 
 
 def test_a_cut_that_one_of_many_mirrors_keeps_hides_no_other():

@@ -24,7 +24,7 @@ from symrefine.shape import Shape
 from symrefine.surface.misses import Deviation
 from symrefine.surface.surface import Coverage
 
-ALL = Coverage(supported=1.0, contradicted=0.0, unseen=0.0)
+ALL = Coverage(supported=1.0, contradicted=0.0, unseen=0.0, told=1.0)
 CENTER = np.array([0.3, -1.2, 2.5])
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 SIDES = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]]

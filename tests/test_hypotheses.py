@@ -29,7 +29,7 @@ from symrefine.surface.skin import isolated_points, local_planes
 from symrefine.surface.surface import Coverage, Surface
 
 ORIGIN = np.zeros(3)
-ALL = Coverage(supported=1.0, contradicted=0.0, unseen=0.0)
+ALL = Coverage(supported=1.0, contradicted=0.0, unseen=0.0, told=1.0)
 FINITE = "Cs Ci C2 C3 C5 C2v C3v C4v C3h S4 S6 D2 D3 D5 D2h D3h D6h D2d D3d T Td Th O Oh I Ih".split()
 BUILDS = {
     "table": (table, "C4v"),

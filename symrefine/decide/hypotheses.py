@@ -244,8 +244,12 @@ def exact_need(floor: float) -> float:
 
 
 def _belief(found: Element) -> float:
-    """What an element asks to believe: 1 where as much of its image was not seen as was; areas grow with lengths."""
-    return math.sqrt(found.coverage.unseen / max(found.coverage.supported, 1e-9))
+    """What an element asks to believe: 1 where as much of its image was not seen as was; areas grow with lengths.
+
+    Where all that was seen but for a detail slides on itself, there is nothing to believe it for.
+    """
+    told = found.coverage.supported if found.coverage.told > SHARES[0] else 0.0
+    return math.sqrt(found.coverage.unseen / max(told, 1e-9))
 
 
 def _moved_each(operations: int, least: int) -> int:

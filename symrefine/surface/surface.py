@@ -27,11 +27,16 @@ HOPELESS = 3.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Coverage:
-    """Shares of a surface that operations carry onto itself (of what moves), where it says no, where nobody looked."""
+    """Shares of a surface that operations carry onto itself (of what moves), where it says no, where nobody looked.
+
+    `told` is the share that is carried onto another part of it, and not along its own plane, by the one that says most:
+    a flat piece slides on itself under many operations, wherever it ends.
+    """
 
     supported: float
     contradicted: float
     unseen: float
+    told: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,13 +96,22 @@ class Surface:
 
     def coverage(self, misses: Array, motions: Sequence[Isometry], *, sources: int = 10**9) -> Coverage:
         """What K operations say that miss by so much where it was seen [K, N]: the one that says least."""
-        still = self.cloud.points[:: self.stride(sources)]
-        travel = [np.linalg.norm(m.apply(still) - still, axis=1) for m in motions]
-        moved = np.stack(travel) > self.far * self.diagonal
+        some, margin = slice(None, None, self.stride(sources)), self.far * self.diagonal
+        still, normals = self.cloud.points[some], self.cloud.normals[some]
+        travels = [m.apply(still) - still for m in motions]
+        far = np.stack([np.linalg.norm(t, axis=1) for t in travels])
+        moved = far > margin
+        # Out of the own plane, as it was and as it came to lie, by more than its tilt may be wrong.
+        turned = [m.turn(normals) for m in motions]
+        heights = [
+            np.stack([np.einsum("ni,ni->n", t, n) for n in (normals, u)]) for t, u in zip(travels, turned, strict=True)
+        ]
+        out = abs(np.stack(heights)).max(axis=1) > margin + self.cloud.flatness[some] * far
         unseen = np.isnan(misses)
         off = np.nan_to_num(misses) > self.far
         return Coverage(
             supported=float((moved & ~unseen & ~off).mean(axis=1).min()),
+            told=float((out & ~unseen & ~off).mean(axis=1).max()),
             contradicted=float(off.mean(axis=1).max()),
             unseen=float(unseen.mean(axis=1).max()),
         )
