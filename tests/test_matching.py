@@ -28,6 +28,11 @@ from symrefine.surface.tree import Tree, side_by_side
 BOX = join([box((0, 0, 0), (1, 0.7, 0.4))])
 
 
+def matched(cloud, motion, *more, **options):
+    """The pairs under one operation."""
+    return match(cloud, [motion], *more, **options)[0]
+
+
 def normalised(points):
     centred = points - points.mean(axis=0)
     return centred / np.sqrt((centred**2).sum(axis=1).mean())
@@ -187,7 +192,7 @@ def test_local_planes_of_a_handful_of_points_are_no_error(count):
 def check_handful(found, count):
     assert len(found.points) == count
     assert np.isfinite(found.points).all()
-    assert np.isfinite(match(found, mirror([0, 0, 1]), 0.1).weights).all()
+    assert np.isfinite(matched(found, mirror([0, 0, 1]), 0.1).weights).all()
 
 
 # The sign of normals
@@ -203,7 +208,7 @@ def test_signs_of_normals_do_not_matter(exact):
     np.testing.assert_allclose(a.points, b.points, atol=1e-15)
     np.testing.assert_allclose(a.thickness, b.thickness, atol=1e-15)
     motion = mirror([0.02, 1, 0.01], 0.01)
-    p, q = (match(c, motion, 0.05) for c in (a, b))
+    p, q = (matched(c, motion, 0.05) for c in (a, b))
     np.testing.assert_array_equal(p.sources, q.sources)
     np.testing.assert_array_equal(p.targets, q.targets)
     np.testing.assert_allclose(p.weights, q.weights, atol=1e-14)
@@ -237,7 +242,7 @@ def brute_force(cloud, motion, uncertainty):
 def test_pairs_are_those_of_brute_force(motion):
     cloud = local_planes(cloud_of(mug(), 3000, 0.003, 13), 500, np.random.default_rng(13))
     for uncertainty in (0.0, 0.1):
-        pairs = match(cloud, motion, uncertainty)
+        pairs = matched(cloud, motion, uncertainty)
         assert list(zip(pairs.sources.tolist(), pairs.targets.tolist(), strict=True)) == brute_force(
             cloud, motion, uncertainty
         )
@@ -245,9 +250,9 @@ def test_pairs_are_those_of_brute_force(motion):
 
 def test_points_that_hardly_move_are_left_out():
     cloud = exact_planes(BOX, 1500, 14)
-    assert match(cloud, mirror([0, 0, 1]), 0.1).sources.size > 1000
-    assert match(cloud, Isometry.about(np.zeros(3), np.eye(3)), 0.1).sources.size == 0
-    pairs = match(cloud, mirror([0, 0, 1]), 0.0)
+    assert matched(cloud, mirror([0, 0, 1]), 0.1).sources.size > 1000
+    assert matched(cloud, Isometry.about(np.zeros(3), np.eye(3)), 0.1).sources.size == 0
+    pairs = matched(cloud, mirror([0, 0, 1]), 0.0)
     assert np.abs(2 * cloud.points[pairs.sources, 2]).min() > cloud.spacing
     assert (
         np.mean(pairs.sources == pairs.targets) < 0.02
@@ -256,10 +261,10 @@ def test_points_that_hardly_move_are_left_out():
 
 def test_pairs_too_far_apart_or_with_other_normals_are_left_out():
     cloud = exact_planes(BOX, 1500, 15)
-    gone = match(cloud, mirror([0, 0, 1], 10.0), 0.1)
+    gone = matched(cloud, mirror([0, 0, 1], 10.0), 0.1)
     assert gone.sources.size == gone.targets.size == gone.weights.size == 0
     quarter = Isometry.about(np.zeros(3), rotation([1, 0, 0], np.pi / 4))
-    pairs = match(cloud, quarter, 0.5)
+    pairs = matched(cloud, quarter, 0.5)
     cosine = np.einsum("ij,ij->i", quarter.turn(cloud.normals[pairs.sources]), cloud.normals[pairs.targets])
     assert pairs.sources.size
     assert np.abs(cosine).min() > np.sqrt(0.5)
@@ -267,7 +272,7 @@ def test_pairs_too_far_apart_or_with_other_normals_are_left_out():
 
 def test_stride_takes_every_so_manieth_source():
     cloud = exact_planes(mug(), 1200, 16)
-    every, third = (match(cloud, mirror([0, 1, 0.02]), 0.1, stride=s) for s in (1, 3))
+    every, third = (matched(cloud, mirror([0, 1, 0.02]), 0.1, stride=s) for s in (1, 3))
     kept = every.sources % 3 == 0
     np.testing.assert_array_equal(third.sources, every.sources[kept])
     np.testing.assert_array_equal(third.targets, every.targets[kept])
@@ -280,7 +285,7 @@ def test_order_of_the_points_does_not_matter():
     for order in (np.arange(900), shuffle):
         cloud = local_planes(points[order], 900, np.random.default_rng(18))
         # The neighbourhood's size is chosen from a random few; here both choices agree.
-        pairs = match(cloud, mirror([0.1, 1, 0]), 0.05)
+        pairs = matched(cloud, mirror([0.1, 1, 0]), 0.05)
         ends = np.column_stack([cloud.points[pairs.sources], cloud.points[pairs.targets], pairs.weights])
         found.append(ends[np.lexsort(ends.T)])
     np.testing.assert_allclose(found[0], found[1], atol=1e-9)
@@ -293,13 +298,13 @@ def test_weights_follow_the_residual_and_stay_finite_where_it_is_zero():
     normals = np.broadcast_to([0.0, 0, 1], (800, 3))
     sheet = local_planes(flat, 800, rng, normals=normals, exact=True)
     half_turn = Isometry.about(np.zeros(3), rotation([0, 0, 1], np.pi))
-    np.testing.assert_allclose(match(sheet, half_turn, 0.0).weights, 1.0)
+    np.testing.assert_allclose(matched(sheet, half_turn, 0.0).weights, 1.0)
 
     lifted = flat.copy()
     lifted[:40, 2] = 0.05
     outliers = local_planes(lifted, 800, rng, normals=normals, exact=True)
     for uncertainty, light in ((0.0, True), (1.0, False)):
-        pairs = match(outliers, half_turn, uncertainty)
+        pairs = matched(outliers, half_turn, uncertainty)
         error = np.abs(outliers.points[pairs.sources, 2] - outliers.points[pairs.targets, 2])
         assert pairs.weights[error == 0].min() == 1.0
         assert (pairs.weights[error > 0].max() < 0.1) == light
@@ -312,7 +317,7 @@ def test_rough_neighbourhoods_count_less():
     blob = 0.15 * rng.standard_normal((400, 3)) + [0, 0, 1]
     cloud = local_planes(np.concatenate([flat, blob]), 2400, rng)
     # With so large an uncertainty no residual is too large: only the flatness of the neighbourhoods is left.
-    pairs = match(cloud, mirror([1, 0, 0]), 10.0)
+    pairs = matched(cloud, mirror([1, 0, 0]), 10.0)
     high = cloud.points[pairs.sources, 2] > 0.5
     assert pairs.weights[high].mean() < 0.7 * pairs.weights[~high].mean()
     flatness = np.exp(-(cloud.flatness[pairs.sources] ** 2) - cloud.flatness[pairs.targets] ** 2)
@@ -326,7 +331,7 @@ def test_isolated_points_pair_with_their_images_in_three_equations():
     atoms = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
     cloud = isolated_points(atoms)
     motion = mirror([1, 1, 0])
-    pairs = match(cloud, motion, 0.1)
+    pairs = matched(cloud, motion, 0.1)
     np.testing.assert_allclose(motion.apply(atoms[pairs.sources]), atoms[pairs.targets], atol=1e-14)
     assert sorted(pairs.sources.tolist()) == [0, 1, 2, 3]  # those on the plane stay, and count
     np.testing.assert_allclose(pairs.weights, 1.0)
@@ -341,7 +346,7 @@ def test_isolated_points_pair_with_their_images_in_three_equations():
 
 def test_equations_of_local_planes_are_one_for_each_pair():
     cloud = exact_planes(mug(), 600, 21)
-    pairs = match(cloud, mirror([0, 1, 0]), 0.1)
+    pairs = matched(cloud, mirror([0, 1, 0]), 0.1)
     sources, targets, directions, weights = pair_equations(cloud, pairs)
     np.testing.assert_array_equal(sources, cloud.points[pairs.sources])
     np.testing.assert_array_equal(targets, cloud.points[pairs.targets])
@@ -416,7 +421,7 @@ def test_points_meet_points_of_their_own_class_only(isolated):
     else:
         cloud = local_planes(points, 600, rng, normals=normals, labels=labels, exact=True)
     motion = mirror([1, 0, 0])
-    pairs = match(cloud, motion, 0.1)
+    pairs = matched(cloud, motion, 0.1)
     assert pairs.sources.size > 500
     np.testing.assert_array_equal(cloud.labels[pairs.targets], cloud.labels[pairs.sources])
     # Each meets the nearest of its class, nearer ones of others or not.
@@ -435,7 +440,7 @@ def test_a_residual_at_the_scale_counts_a_quarter(robust):
     misses[[1, 3]] = robust, 2.0 * robust
     for size in (0.9, 1.1):
         other = half * [-1, 1, 1] + size * misses[:, None] * [0, 0, 1]
-        pairs = match(isolated_points(np.concatenate([half, other])), mirror([1, 0, 0]), 0.0, robust=robust)
+        pairs = matched(isolated_points(np.concatenate([half, other])), mirror([1, 0, 0]), 0.0, robust=robust)
         np.testing.assert_array_equal(pairs.targets[:40], np.arange(40) + 40)
         np.testing.assert_allclose(pairs.weights[[1, 3]], [0.25, 0.04], rtol=1e-9)
         np.testing.assert_allclose(pairs.weights[5], (1 / (1 + robust**-2)) ** 2, rtol=1e-9)
@@ -510,3 +515,15 @@ with multiprocessing.get_context("fork").Pool(2) as pool:
 """
     environment = {k: v for k, v in os.environ.items() if k != "OMP_NUM_THREADS"} | {"PYTHONWARNINGS": "ignore"}
     subprocess.run([sys.executable, "-c", script], check=True, timeout=60, env=environment)
+
+
+def test_several_operations_are_matched_as_each_alone():
+    rng = np.random.default_rng(8)
+    cloud = local_planes(rng.normal(size=(900, 3)), 900, rng)
+    motions = [mirror([0, 0, 1]), mirror([0.2, 1, 0]), Isometry.about(np.zeros(3), -np.eye(3))]
+    for pairs, motion in zip(match(cloud, motions, 0.1, stride=2), motions, strict=True):
+        alone = matched(cloud, motion, 0.1, stride=2)
+        assert pairs.sources.size
+        np.testing.assert_array_equal(pairs.sources, alone.sources)
+        np.testing.assert_array_equal(pairs.targets, alone.targets)
+        np.testing.assert_array_equal(pairs.weights, alone.weights)

@@ -165,11 +165,9 @@ def _thetas(cloud: LocalPlanes, frame: Array, theta: Array) -> Iterator[Array]:
     step = np.inf
     yield theta
     for _ in range(MAX_OUTER):
+        mirrors = [Isometry.reflection(Plane(normal=n, offset=0.0)) for n in _about_third(theta) @ frame]
         grams = []
-        for normal in _about_third(theta) @ frame:
-            pairs = match(
-                cloud, Isometry.reflection(Plane(normal=normal, offset=0.0)), min(START_ERROR_RAD, 4.0 * step)
-            )
+        for pairs in match(cloud, mirrors, min(START_ERROR_RAD, 4.0 * step)):
             sources, targets, directions, weights = pair_equations(cloud, pairs)
             grams.append(axis_gram(gram(design_rows(sources, targets, directions), weights), frame, np.zeros(3)))
         turned = closest_planes(np.stack(grams), theta)

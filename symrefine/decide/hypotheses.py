@@ -102,7 +102,8 @@ def glances(surface: Surface, starts: Sequence[Placed], most: float = math.inf) 
     for limit in (LIMITS[1], LIMITS[-1]) if surface.openings is None else LIMITS[-1:]:
         asked = np.flatnonzero(found[owner] < most)
         if asked.size:
-            needs = surface.needs([every[i] for i in asked], sources=GLANCE, bound=limit * most, tests=GLANCED)
+            motions, bound = [every[i] for i in asked], limit * most
+            needs = surface.needs(motions, sources=GLANCE, bound=bound, discs=1, tests=GLANCED)
             np.maximum.at(found, owner[asked], needs)
     return found.tolist()
 

@@ -1,11 +1,12 @@
 """Which local planes a moved one meets, and what each pair is worth."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from symrefine.geometry import Array, Isometry
+from symrefine.geometry import Array, Isometry, Mask
 from symrefine.shape import Index
 from symrefine.surface.skin import LocalPlanes, Planes, Skin
 
@@ -26,9 +27,9 @@ class Pairs:
 
 
 def match(
-    cloud: LocalPlanes, motion: Isometry, uncertainty: float, *, stride: int = 1, robust: float = ROBUST
-) -> Pairs:
-    """Pair every `stride`-th local plane, moved, with the nearest one; weight by how much the pair is worth.
+    cloud: LocalPlanes, motions: Sequence[Isometry], uncertainty: float, *, stride: int = 1, robust: float = ROBUST
+) -> tuple[Pairs, ...]:
+    """Pair every `stride`-th local plane, moved by each of K operations, with the nearest one, and weight the pairs.
 
     Pairs are dropped when the moved normal disagrees by more than 45 degrees, when the point hardly moves, so that it
     would meet itself, or when they are farther apart than a few spacings and what the present uncertainty can move a
@@ -37,27 +38,33 @@ def match(
     below: with exact data it would collapse (method.md, section 4).
 
     Args:
-        uncertainty: how far the motion may still move a point, RMS radii.
+        uncertainty: how far the motions may still move a point, RMS radii.
         robust: that scale over the median absolute residual.
     """
     source = np.arange(0, len(cloud.points), stride)
-    moved = motion.apply(cloud.points[source])
-    reach = _reach(cloud.spacing, uncertainty)
-    distance, target = cloud.nearest(moved, cloud.classes(source), bound=reach)
+    points, classes = cloud.points[source], cloud.classes(source)
+    moved = np.stack([motion.apply(points) for motion in motions])
+    every = None if classes is None else np.tile(classes, len(motions))
+    distance, target = cloud.nearest(np.concatenate(moved), every, bound=_reach(cloud.spacing, uncertainty))
+    distance, target = distance.reshape(moved.shape[:2]), target.reshape(moved.shape[:2])
     keep = np.isfinite(distance)
-    if not cloud.isolated:
-        travel = np.linalg.norm(moved - cloud.points[source], axis=1)
-        keep &= travel > cloud.spacing
-    source, target, moved = source[keep], target[keep], moved[keep]
     if cloud.isolated:
-        scale = robust_scale(distance[keep], cloud.spacing, uncertainty, robust)
-        return Pairs(sources=source, targets=target, weights=geman_mcclure(distance[keep] ** 2, scale))
-    agree = _facing(motion.turn(cloud.normals[source]), cloud.normals[target])
-    source, target, moved = source[agree], target[agree], moved[agree]
-    error = np.einsum("ij,ij->i", moved - cloud.points[target], cloud.normals[target])
-    flat = worth(cloud.flatness[source], cloud.flatness[target])
-    scale = robust_scale(error, cloud.spacing, uncertainty, robust)
-    return Pairs(sources=source, targets=target, weights=flat * geman_mcclure(error**2, scale))
+        error, flat = distance, np.ones_like(distance)
+    else:
+        keep &= np.linalg.norm(moved - points, axis=2) > cloud.spacing
+        target = np.where(keep, target, 0)
+        normals = cloud.normals[target]
+        keep &= _facing(np.stack([motion.turn(cloud.normals[source]) for motion in motions]), normals)
+        error = np.einsum("kni,kni->kn", moved - cloud.points[target], normals)
+        flat = worth(cloud.flatness[source], cloud.flatness[target])
+
+    def weighted(off: Array, kept: Mask) -> Array:
+        return geman_mcclure(off[kept] ** 2, robust_scale(off[kept], cloud.spacing, uncertainty, robust))
+
+    return tuple(
+        Pairs(sources=source[k], targets=t[k], weights=f[k] * weighted(e, k))
+        for k, t, f, e in zip(keep, target, flat, error, strict=True)
+    )
 
 
 def meet(
@@ -79,11 +86,11 @@ def _reach(spacing: float, uncertainty: float) -> float:
 
 
 def _facing(moved: Array, normals: Array) -> NDArray[np.bool_]:
-    return np.asarray(np.abs(np.einsum("ij,ij->i", moved, normals)) > AGREE)
+    return np.asarray(np.abs(np.einsum("...i,...i->...", moved, normals)) > AGREE)
 
 
 def worth(source: Array, target: Array) -> Array:
-    """What pairs [N] of planes count for, from the flatness of both."""
+    """What pairs [..., N] of planes count for, from the flatness of both."""
     return np.asarray(np.exp(-(source**2) - target**2))
 
 

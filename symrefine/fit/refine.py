@@ -145,7 +145,7 @@ def refine(
     )  # fmt: skip
     for index in range(1, max_outer + 1):
         uncertainty = min(start_error_rad, SPREAD * step)
-        pairs = tuple(match(cloud, motion, uncertainty, stride=stride, robust=robust) for motion in state.motions)
+        pairs = match(cloud, state.motions, uncertainty, stride=stride, robust=robust)
         grams = np.stack([_pair_gram(cloud, p) for p in pairs])
         theta = _thetas(grams, state) if state.bundle else np.zeros(0)
         solution = _solve(grams, state, basis, float(np.median(theta)) if theta.size else 0.0)

@@ -101,7 +101,7 @@ def fitted(outlines: Outlines, start: Placed) -> Placed:
         motions = placed.operations()
         each = MOVED // (4 * len(motions))
         matched = [
-            [pair_equations(s.cloud, match(s.cloud, m, error, stride=s.stride(each))) for m in motions]
+            [pair_equations(s.cloud, pairs) for pairs in match(s.cloud, motions, error, stride=s.stride(each))]
             for s in outlines.surfaces
         ]
 

@@ -106,15 +106,22 @@ def needs_of_atoms(misses: Array) -> Array:
     return np.asarray(reduce(np.maximum, [v / limit for v, limit in zip(statistics, ATOM_LIMITS, strict=True)]))
 
 
-def miss_distances(cloud: LocalPlanes, motions: Sequence[Isometry], *, stride: int = 1, bound: float = np.inf) -> Array:
+def miss_distances(
+    cloud: LocalPlanes,
+    motions: Sequence[Isometry],
+    *,
+    stride: int = 1,
+    bound: float = np.inf,
+    discs: int = DISCS,
+) -> Array:
     """Distances [K, M / stride] of every `stride`-th local plane, moved by each of K operations, to the surface.
 
-    Those beyond `bound` count as `bound`, which is quicker.
+    Those beyond `bound` count as `bound`, which is quicker; `discs` as of `disc_distances`.
     """
     sources, classes = cloud.points[::stride], cloud.classes(slice(None, None, stride))
     moved = np.concatenate([m.apply(sources) for m in motions])
     every = None if classes is None else np.tile(classes, len(motions))
-    return disc_distances(cloud, moved, every, bound=bound).reshape(len(motions), len(sources))
+    return disc_distances(cloud, moved, every, bound=bound, discs=discs).reshape(len(motions), len(sources))
 
 
 def disc_distances(
@@ -124,6 +131,7 @@ def disc_distances(
     *,
     skip_self: bool = False,
     bound: float = np.inf,
+    discs: int = DISCS,
 ) -> Array:
     """Distance [Q] from points to the nearest of the discs that the local planes of their class around them span.
 
@@ -132,9 +140,10 @@ def disc_distances(
         classes: [Q] where the cloud has classes.
         skip_self: the queries are points of the cloud, which are not compared with their own discs.
         bound: queries without a disc so near are not looked at any closer; all distances end there.
+        discs: how many are looked at around each; one is twice as quick, and at edges may not be the nearest.
     """
     skip = int(skip_self)
-    count = min(DISCS + skip, len(cloud.points))
+    count = min(discs + skip, len(cloud.points))
     away, near = cloud.around(queries, classes, count - skip, skip=skip, bound=bound)
     rows = [slice(first, first + AT_ONCE) for first in range(0, len(queries), AT_ONCE)]
     apart = [_to_discs(cloud, queries[r], away[r], near[r], None if classes is None else classes[r]) for r in rows]

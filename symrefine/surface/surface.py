@@ -9,7 +9,16 @@ import numpy as np
 
 from symrefine.geometry import Array, Isometry, read_only
 from symrefine.surface.drift import Drift
-from symrefine.surface.misses import LIMITS, SURE, TOLERANCE, miss_distances, needs, needs_of_atoms, spread_distance
+from symrefine.surface.misses import (
+    DISCS,
+    LIMITS,
+    SURE,
+    TOLERANCE,
+    miss_distances,
+    needs,
+    needs_of_atoms,
+    spread_distance,
+)
 from symrefine.surface.openings import Openings
 from symrefine.surface.skin import LocalPlanes
 
@@ -29,8 +38,8 @@ HOPELESS = 3.0
 class Coverage:
     """Shares of a surface that operations carry onto itself (of what moves), where it says no, where nobody looked.
 
-    `told` is the share that is carried onto another part of it, and not along its own plane, by the one that says most:
-    a flat piece slides on itself under many operations, wherever it ends.
+    Where parts are unseen, `told` is the share that is carried onto another part of it, not along its own plane, by the
+    operation that says most: a flat piece slides on itself under many, wherever it ends.
     """
 
     supported: float
@@ -72,17 +81,21 @@ class Surface:
         """Stride that leaves about `sources` local planes; enough for the patches of an image to hang together."""
         return max(1, len(self.cloud.points) // max(sources, PATCHES if self.openings is not None else 1))
 
-    def misses(self, motions: Sequence[Isometry], *, sources: int = 10**9, bound: float = math.inf) -> Array:
+    def misses(
+        self, motions: Sequence[Isometry], *, sources: int = 10**9, bound: float = math.inf, discs: int = DISCS
+    ) -> Array:
         """By how much each of K operations misses the surface [K, N], fractions of the diagonal.
 
         Args:
             motions: the operations.
             sources: local planes that are moved.
             bound: misses end here, which is quicker.
+            discs: as of `disc_distances`.
         """
         stride = self.stride(sources)
         bound = bound if self.openings is None else min(bound, HOPELESS * LIMITS[-1] * self.tolerance)
-        return miss_distances(self.cloud, motions, stride=stride, bound=bound * self.diagonal) / self.diagonal
+        bound *= self.diagonal
+        return miss_distances(self.cloud, motions, stride=stride, bound=bound, discs=discs) / self.diagonal
 
     def seen(self, misses: Array, motions: Sequence[Isometry], *, sources: int = 10**9) -> Array:
         """The misses [K, N] of K operations, NaN for what they carry to where nobody looked; `sources` as before."""
@@ -96,24 +109,26 @@ class Surface:
 
     def coverage(self, misses: Array, motions: Sequence[Isometry], *, sources: int = 10**9) -> Coverage:
         """What K operations say that miss by so much where it was seen [K, N]: the one that says least."""
-        some, margin = slice(None, None, self.stride(sources)), self.far * self.diagonal
-        still, normals = self.cloud.points[some], self.cloud.normals[some]
-        travels = [m.apply(still) - still for m in motions]
-        far = np.stack([np.linalg.norm(t, axis=1) for t in travels])
-        moved = far > margin
-        # Out of the own plane, as it was and as it came to lie, by more than its tilt may be wrong.
-        turned = [m.turn(normals) for m in motions]
-        heights = [
-            np.stack([np.einsum("ni,ni->n", t, n) for n in (normals, u)]) for t, u in zip(travels, turned, strict=True)
-        ]
-        out = abs(np.stack(heights)).max(axis=1) > margin + self.cloud.flatness[some] * far
+        some = slice(None, None, self.stride(sources))
+        still, far = self.cloud.points[some], self.far * self.diagonal
+        travels = np.stack([m.apply(still) - still for m in motions])
+        lengths = np.linalg.norm(travels, axis=2)
         unseen = np.isnan(misses)
         off = np.nan_to_num(misses) > self.far
+        met = ~unseen & ~off
+        supported = float(((lengths > far) & met).mean(axis=1).min())
+        told = supported
+        if unseen.any():
+            # Out of the own plane, as it was and as it came to lie, by more than its tilt may be wrong.
+            normals = self.cloud.normals[some]
+            turned = np.stack([m.turn(normals) for m in motions])
+            heights = np.maximum(*(abs(np.einsum("kni,...ni->kn", travels, n)) for n in (normals, turned)))
+            told = float(((heights > far + self.cloud.flatness[some] * lengths) & met).mean(axis=1).max())
         return Coverage(
-            supported=float((moved & ~unseen & ~off).mean(axis=1).min()),
-            told=float((out & ~unseen & ~off).mean(axis=1).max()),
+            supported=supported,
             contradicted=float(off.mean(axis=1).max()),
             unseen=float(unseen.mean(axis=1).max()),
+            told=told,
         )
 
     def needed(self, misses: Array, motions: Sequence[Isometry], tests: int = 1) -> Array:
@@ -156,13 +171,19 @@ class Surface:
         return float(needs(misses.ravel(), self.noise)) if self.cloud.body == "surface" else 0.0
 
     def needs(
-        self, motions: Sequence[Isometry], *, sources: int = 10**9, bound: float = math.inf, tests: int = 1
+        self,
+        motions: Sequence[Isometry],
+        *,
+        sources: int = 10**9,
+        bound: float = math.inf,
+        discs: int = DISCS,
+        tests: int = 1,
     ) -> Array:
         """The smallest tolerances [K] at which each of K operations holds, as far as it was seen.
 
-        `sources` and `bound` as of `misses`, `tests` as of `needed`.
+        `sources`, `bound` and `discs` as of `misses`, `tests` as of `needed`.
         """
-        misses = self.misses(motions, sources=sources, bound=bound)
+        misses = self.misses(motions, sources=sources, bound=bound, discs=discs)
         return self.needed(self.seen(misses, motions, sources=sources), motions, tests)
 
     def need(self, motions: Sequence[Isometry], *, sources: int = 10**9) -> float:
