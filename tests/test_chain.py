@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from experiments.objects.boundary import instance
 from experiments.objects.shapes import box, join, sample
+from experiments.studies import groups
 from experiments.studies.boundary import Case, look
 from symrefine.decide.chain import chain, explore
 from symrefine.decide.hypotheses import NOTHING, SAME_RAD, START_ERROR, Hypothesis, fitted
@@ -19,7 +20,7 @@ from symrefine.decide.posterior import Link, decide
 from symrefine.detection.measure import gather, measure
 from symrefine.detection.story import detect
 from symrefine.fit.placed import Placed
-from symrefine.geometry import frame_with_z, random_orthogonal, rotation
+from symrefine.geometry import frame_with_z, line_angle_rad, random_orthogonal, rotation
 from symrefine.groups import is_subgroup, point_group
 from symrefine.shape import Shape
 
@@ -294,3 +295,35 @@ def test_an_exact_group_stays_where_a_larger_one_that_it_is_no_part_of_is_found_
     made = instance("tolerances", "ring100 to D10h", 21)
     shape, _ = look(Case(family="tolerances", name="ring100 to D10h", seed=21), made)
     assert [detect(shape, tolerance=t).point_group for t in (0.001, 0.0025)] == ["D10h", "D10h"]
+
+
+@pytest.mark.parametrize(("name", "noise_rel"), [("spool", 0.0), ("cone", 0.01)])
+def test_of_many_mirrors_that_noise_hides_the_truest_is_told(name, noise_rel):
+    """A body of revolution with one detail out of place: mirrors near the true one need next to nothing as well."""
+    case = groups.Case(shape=name, sibling=True, noise_rel=noise_rel, seed=35)
+    shape, turn = groups.posed(case)
+    found = detect(shape)
+    true = groups.true_group(name, True).mirrors()[0] @ turn.T
+    assert found.point_group == "Cs"
+    assert line_angle_rad(found.planes[0].plane.normal, true) < np.radians(2.0)
+
+
+def test_what_a_group_holds_but_for_a_few_degrees_makes_no_larger_one():
+    """A mirror found 2 degrees off one of five is that one: joined they are no group of sixty."""
+    surface = ring()[1]
+    tilt = rotation(np.array([0.0, 0.0, 1.0]), np.radians(2.0))
+    whole = of("C2v")
+    whole = replace(
+        whole,
+        placed=Placed(group=point_group("C5v"), center=ORIGIN),
+        need=0.02,
+        elements=tuple(replace(e, need=0.02) for e in whole.elements),
+    )
+    lone = replace(of("Cs"), placed=Placed(group=point_group("Cs", mirror_frame() @ tilt), center=ORIGIN), need=0.001)
+    links = chain(surface, Pool(largest=whole, small=(lone,)), LIMIT)
+    assert [h.group.name for h in links] == ["C1", "Cs", "C5v"]
+
+
+def mirror_frame():
+    """The frame of a mirror of C5v."""
+    return frame_with_z(point_group("C5v").mirrors()[0])

@@ -240,7 +240,9 @@ def _generated(
     most: float,
     close: float = math.inf,
 ) -> Hypothesis | None:
-    placed = joined(parts)
+    # Directions of what holds less well may be off by more than one fit tells two of them apart by.
+    whole = (p for p in parts if all(has_all(p, other) for other in parts))
+    placed = next(whole, None) or joined(parts)
     if placed is None:
         return None
     told = [h for h in known if h.history] + [h for h in known if not h.elements and h.need > most]
@@ -257,9 +259,9 @@ def _generated(
     return fitted(surface, look.placed, error_rad=look.error_rad, before=before)
 
 
-def _worst(found: Hypothesis) -> tuple[float, float]:
-    """What a group needs; of those that noise hides, the mean miss of its worst element."""
-    return found.need, max((e.deviation.mean for e in found.elements), default=0.0)
+def _worst(found: Hypothesis, hidden: float) -> tuple[float, float]:
+    """What a group needs; of those that need no more than is hidden, the mean miss of its worst element."""
+    return max(found.need, hidden), max((e.deviation.mean for e in found.elements), default=0.0)
 
 
 def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
@@ -269,7 +271,9 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     """
     elements = [single(e) for e in pool.largest.elements if e.need < pool.largest.need / ALIKE]
     near = [h for h in pool.turned_down() if h.need <= COARSE * pool.limit]
-    rest = sorted([*pool.small, *elements, pool.largest, *near], key=_worst)
+    # What is hidden by noise, or by the least tolerance that is asked for, tells no two groups apart.
+    hidden = max(exact_need(surface.floor), pool.nothing / ALIKE)
+    rest = sorted([*pool.small, *elements, pool.largest, *near], key=lambda h: _worst(h, hidden))
     known = [pool.largest, *pool.failed]
     links = [NOTHING]
     while rest := [h for h in rest if not links[-1].holds(h.placed)]:
@@ -278,14 +282,14 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
         most = max(limit, ALONE * here.need) if here.group.name == "Cs" else limit
         if rest[0].need > most:
             break
-        level = max(ALIKE * rest[0].need, here.need, exact_need(surface.floor), pool.nothing / ALIKE)
+        level = max(ALIKE * rest[0].need, here.need, hidden)
         batch = [h for h in rest if h.need <= level]
         found = _join(surface, [here, *batch], known, most, pool.limit)
         if found is None or not found.elements or found.need > ALIKE * level:
             singly = [_join(surface, [here, h], known, most, pool.limit) for h in batch[:SINGLY]]
             tried = [h for h in (found, *singly) if h is not None]
             known += tried
-            found = min((h for h in tried if h.elements), key=_worst, default=None)
+            found = min((h for h in tried if h.elements), key=lambda h: _worst(h, hidden), default=None)
         # Directions may part what together makes the same group again.
         if found is None or found.group.name == here.group.name:
             rest = [h for h in rest if h not in batch]

@@ -27,7 +27,7 @@ from symrefine.surface.surface import Coverage, Surface
 # no sample.
 GLANCE, LOOK, MOVED, MOVED_EACH = 120, 600, 12000, 1200
 # Steps of a look after which those that will not come near end.
-SHORT = 3
+SHORT = 2
 # A glance allows for the worst of the operations of a group that it takes: without, the share that details may have
 # (0.6 %) is less than one of its points, and a single stray among them turns down every candidate.
 GLANCED = 4

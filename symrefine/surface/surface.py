@@ -122,7 +122,7 @@ class Surface:
             # Out of the own plane, as it was and as it came to lie, by more than its tilt may be wrong.
             normals = self.cloud.normals[some]
             turned = np.stack([m.turn(normals) for m in motions])
-            heights = np.maximum(*(abs(np.einsum("kni,...ni->kn", travels, n)) for n in (normals, turned)))
+            heights = np.maximum(*(abs(np.einsum("kni,kni->kn", travels, n)) for n in (normals[None], turned)))
             told = float(((heights > far + self.cloud.flatness[some] * lengths) & met).mean(axis=1).max())
         return Coverage(
             supported=supported,
