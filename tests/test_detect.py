@@ -696,6 +696,34 @@ def test_mirrors_through_an_axis_do_not_crowd_out_the_one_across_it():
     assert detect(groups.posed(case)[0]).point_group == "D7h"
 
 
+def pipe(corners, height):
+    """The walls over a polygon, open at both ends."""
+    low, k = np.column_stack([corners, np.zeros(len(corners))]), np.arange(len(corners))
+    n, after = len(k), np.roll(k, -1)
+    walls = np.concatenate([np.column_stack([k, after, after + n]), np.column_stack([k, after + n, k + n])])
+    return np.concatenate([low, low + [0, 0, height]]), walls
+
+
+@pytest.mark.parametrize(
+    ("sides", "height"), [(12, 3.0), (20, 3.0), pytest.param(48, 0.7, marks=SLOW), pytest.param(64, 0.7, marks=SLOW)]
+)
+def test_an_open_tube_is_that_of_its_cross_section(sides, height):
+    """Its normals lie across its axis: no fit knows where along it the middle is, and what was known before is kept."""
+    turn = 2 * np.pi * np.arange(sides) / sides
+    corners, walls = pipe(np.column_stack([np.cos(turn), np.sin(turn)]), height)
+    corners = corners @ random_orthogonal(np.random.default_rng(sides)).T + 3.0
+    found = detect((corners, walls))
+    assert found.point_group in (f"D{sides}h", "Dinfh")
+    assert np.linalg.norm(found.center - corners.mean(axis=0)) < found.tolerance * found.diagonal
+
+
+def test_an_open_pipe_over_a_scalene_triangle_has_the_mirror_across_it():
+    corners, walls = pipe([[0, 0], [2, 0], [0.4, 1]], 1.7)
+    found = detect((corners @ random_orthogonal(np.random.default_rng(1)).T, walls))
+    assert found.point_group == "Cs"
+    assert found.confidence > 0.95
+
+
 def test_what_a_person_chooses_instead_has_its_operations():
     """A box almost square: whatever is chosen of its chain has a place, and each group is inside the next."""
     points = sample(join([box((0, 0, 0), (1.0, 0.97, 0.5))]), 6000, 0.001, np.random.default_rng(1))

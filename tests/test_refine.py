@@ -18,6 +18,7 @@ from symrefine.geometry import (
 )
 from symrefine.moments.moments import shape_moments
 from symrefine.moments.quadrature import sample_surface
+from symrefine.shape import Shape
 from symrefine.surface.skin import isolated_points, local_planes
 
 BOX = join([box((0, 0, 0), (1, 0.7, 0.4))])
@@ -322,6 +323,17 @@ def test_the_cost_is_a_mean_over_the_pairs():
     assert costs[1] == pytest.approx(costs[0], rel=0.2)
     # Two noisy planes apart: of the order of the square of their thickness, which neighbours share.
     assert 0.02 < costs[0] / np.median(cloud.thickness) ** 2 < 4
+
+
+def test_along_an_open_pipe_nothing_moves():
+    sides = Shape(BOX.points, BOX.faces[[k for k, f in enumerate(BOX.faces) if np.ptp(BOX.points[f, 2]) > 0]])
+    cloud, frame, rng = placed(sides, 3, 6000, exact=True)
+    off = 0.01 * rng.standard_normal(3)
+    start = Framed(standard=-np.eye(3)[None], frame=frame, center=off)
+    *_, last = refine(cloud, start)
+    moved = frame @ last.state.center
+    assert moved[2] == pytest.approx(frame[2] @ off, abs=1e-6)
+    assert np.abs(moved[:2]).max() < 2e-3
 
 
 # The covariance

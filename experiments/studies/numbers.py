@@ -87,7 +87,7 @@ KIND_OF = {
         "fit.frame": "LONGEST",
         "fit.matching": "ROBUST SCALE_FLOOR AGREE",
         "fit.placed": "FREE_TURNS FITTED BUNDLE",
-        "fit.refine": "MAX_OUTER SETTLED WITHIN_NOISE LONGEST SPREAD",
+        "fit.refine": "MAX_OUTER SETTLED WITHIN_NOISE LONGEST SPREAD UNSEEN",
         "fit.vertices": "ROUNDS NEAR ASKED GLANCES",
         "moments.moments": "BLOCK WAVES",
         "moments.running": "WIDTH",

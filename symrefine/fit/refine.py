@@ -34,6 +34,8 @@ WITHIN_NOISE = 0.22
 SPREAD = 4.0
 # Largest ratio of successive steps that is extrapolated.
 LONGEST = 0.7
+# Share of the largest eigenvalue of the pairs up to which a motion is one that they do not see, but for rounding.
+UNSEEN = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -138,6 +140,7 @@ def refine(
     """
     state, step = start, np.inf
     last: Array = np.zeros(6)
+    way: Array = np.zeros(6)
     basis = observable_motions(start.standard, start.frame, start.center)
     yield Iterate(
         index=0, state=state, theta_rad=np.zeros(0), step=np.inf, covariance=np.zeros((6, 6)), cost=np.nan, inliers=0,
@@ -148,15 +151,20 @@ def refine(
         pairs = match(cloud, state.motions, uncertainty, stride=stride, robust=robust)
         grams = np.stack([_pair_gram(cloud, p) for p in pairs])
         theta = _thetas(grams, state) if state.bundle else np.zeros(0)
-        solution = _solve(grams, state, basis, float(np.median(theta)) if theta.size else 0.0)
+        seen, unseen = _seen(grams, state, basis)
+        solution = _solve(grams, state, seen, float(np.median(theta)) if theta.size else 0.0)
         weight = max(sum(float(p.weights.sum()) for p in pairs), 1e-300)
         covariance = (
-            cloud.redundancy * solution.cost / weight * np.linalg.pinv(solution.hessian, rcond=1e-9, hermitian=True)
+            cloud.redundancy * solution.cost / weight * np.linalg.pinv(solution.hessian, rcond=UNSEEN, hermitian=True)
         )
         noise = WITHIN_NOISE * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
         settled = bool(np.abs(solution.x).max() < SETTLED or np.all(np.abs(solution.x) <= noise))
         last = solution.x * _remaining(solution.x, last)
-        state, step = _moved(state, last), float(np.abs(last).max())
+        state, step, way = _moved(state, last), float(np.abs(last).max()), way + last
+        # A tilt lets what is unseen seem seen: how far it went meanwhile is taken back.
+        if unseen.size:
+            away = unseen @ (unseen.T @ way)
+            state, way = _moved(state, -away), way - away
         yield Iterate(
             index=index,
             state=state,
@@ -201,6 +209,17 @@ def closest_planes(grams3: Array, angles_rad: Array) -> Array:
     """Angles [b] of planes through an axis after Gauss-Newton over theta, on their Gram matrices [b, 3, 3]."""
     found = minimise_all(lambda theta, which: theta_models(grams3[which], theta), angles_rad[:, None])
     return found.x[:, 0]
+
+
+def _seen(grams: Array, state: Framed, basis: Array) -> tuple[Array, Array]:
+    """A basis [6, q] of motions apart: [6, p] that the pairs see, and [6, q - p] that they do not.
+
+    Along an open tube, all of whose normals lie across it, rounding alone would say how far to go.
+    """
+    hessian = basis.T @ frame_model(grams, state.standard, state.frame, state.center, np.zeros(6)).hessian @ basis
+    values, vectors = np.linalg.eigh(hessian)
+    seen = values > UNSEEN * values[-1]
+    return (basis if seen.all() else basis @ vectors[:, seen]), basis @ vectors[:, ~seen]
 
 
 def _solve(grams: Array, state: Framed, basis: Array, theta: float) -> Solution:
