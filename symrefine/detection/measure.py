@@ -198,10 +198,12 @@ def _hidden(surface: Surface, tolerance: float, *, is_mesh: bool) -> str:
     if least <= tolerance:
         return ""
     hidden, asked = (f"{100.0 * part:.2g} %" for part in (float(np.quantile(surface.noise, 0.95)), tolerance))
-    what, remedy = ("mesh, by its samples,", "") if is_mesh else ("cloud", ", or give more points, or less noise")
+    ask = f"a tolerance of {asked} is asked; ask for {_above(100 * least)} % or more"
+    if is_mesh:  # of flat faces most samples miss nothing, those at edges do
+        return f"the mesh is known by samples, which tell nothing below {_above(100 * least)} % of the diagonal; {ask}"
     return (
-        f"the {what} does not even agree with itself: 5 % of one half of it misses the other by {hidden} of the "
-        f"diagonal or more, and a tolerance of {asked} is asked; ask for {_above(100 * least)} % or more{remedy}"
+        f"the cloud does not even agree with itself: 5 % of one half of it misses the other by {hidden} of the "
+        f"diagonal or more, and {ask}, or give more points, or less noise"
     )
 
 
