@@ -3,8 +3,10 @@
 import base64
 import json
 import math
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from html import unescape
 from html.parser import HTMLParser
 from io import BytesIO
 from pathlib import Path
@@ -15,6 +17,7 @@ import pytest
 import trimesh
 from scipy.spatial import cKDTree
 
+import symrefine
 from experiments.objects.damage import cut
 from experiments.objects.molecule_sets import molecule
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
@@ -28,7 +31,7 @@ from symrefine.picture.rows import found_rows
 from symrefine.plane import detect_planar
 from symrefine.report import model, write_html
 from symrefine.report.charts import bar_chart, decision_chart, line_chart
-from symrefine.report.markup import island, plain
+from symrefine.report.markup import island, plain, schoenflies
 from symrefine.report.mesh import simplified, subdivided
 from symrefine.report.page import html_page
 from symrefine.shape import Shape
@@ -190,6 +193,28 @@ def test_a_cube_is_three_lines_that_open() -> None:
     text = text_of(page)
     for title in ("Nine mirror planes", "13 axes: 3 of order 4, 4 of order 3, 6 of order 2", "and the inversion"):
         assert title in text
+
+
+def test_a_kind_is_open_only_if_those_above_it_are(any_case: Case, pages: Pages) -> None:
+    opened = ["open" in tag for tag in re.findall("<details[^>]*>", pages(any_case))]
+    assert opened == sorted(opened, reverse=True)
+
+
+@pytest.mark.parametrize("name", ["C4v", "Oh", "K", "Ci", "S6", "D12d", "Cinfv", "O(2)", "SO(2)"])
+def test_a_symbol_reads_as_it_is_written(name: str) -> None:
+    assert re.sub("<[^>]*>", "", schoenflies(name)) == words.symbol(name)
+    assert ("<sub>" in schoenflies(name)) == (len(name) > 1 and "(" not in name)
+
+
+def test_the_call_in_python_gives_the_result_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    np.savetxt("it's one.csv", [[1.0, 0.3, 0.0], [0.2, 1.0, 0.0], [0.0, 0.4, 1.0], [1.0, 0.3, -0.1]])
+    found = symrefine.detect("it's one.csv", tolerance=0.03)
+    found.save("page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    call = unescape(page.partition("# or in Python: ")[2].partition("</pre>")[0])
+    again = eval(call, {"symrefine": symrefine})
+    assert (again.options, again.point_group) == (found.options, found.point_group)
 
 
 def test_page_of_what_is_undetermined(shapeless: Case) -> None:
@@ -445,7 +470,9 @@ def test_charts_stay_within_their_frame() -> None:
 def test_the_decision_has_a_row_for_each_group_in_ascending_order() -> None:
     steps = [(0.01, "C1"), (0.02, "C2v"), (0.04, "D4h")]
     chart = decision_chart("C2v", [("C2v", 0.7, 0.0), ("D4h", 0.3, 0.03)], steps, 0.02)
-    rows = [row.split(">")[1].split("<")[0] for row in chart.split('scope="row"')[1:]]
+    rows = [
+        re.sub("<[^>]*>", "", row.partition(">")[2].partition("</th>")[0]) for row in chart.split('scope="row"')[1:]
+    ]
     assert rows == ["C1", "C2v", "D4h"]
     assert chart.count("the answer") == 3
     assert chart.count('class="asked"') == 1

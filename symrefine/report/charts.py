@@ -6,6 +6,8 @@ from html import escape
 
 import numpy as np
 
+from symrefine.report.markup import schoenflies
+
 WIDTH, HEIGHT = 400, 210
 LEFT, RIGHT, TOP, BOTTOM = 62, 22, 16, 40
 
@@ -105,7 +107,7 @@ def _decided(
         for t, at in steps
     )
     strong = ' class="answer"' if answer else ""
-    title = "undeter&shy;mined" if name == "undetermined" else escape(name.replace("inf", "∞"))
+    title = "undeter&shy;mined" if name == "undetermined" else schoenflies(name)
     return f'<tr{strong}><th scope="row">{title}</th><td>{share}</td>{needs}{cells}</tr>'
 
 

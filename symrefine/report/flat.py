@@ -70,7 +70,7 @@ def _head(d: PlanarDetection, shape: Shape) -> str:
             f"Under {each}, 95 % of the outline meets itself within {percent(max(*misses, 1e-4))} of the diagonal, "
             f"where the tolerance of {percent(d.tolerance)} allows {percent(LIMITS[1] * d.tolerance)}."
         )
-    return head(f"Symmetry of {shape.source}", d.point_group, detected_lines(d), summary)
+    return head(f"Symmetry of {shape.source}", "", detected_lines(d), summary, group=d.point_group)
 
 
 def _drawing(d: PlanarDetection, scene: FlatScene) -> str:

@@ -8,7 +8,7 @@ from symrefine.picture.words import percent
 from symrefine.report.markup import code, copy_button, plain, prose
 from symrefine.surface.misses import Deviation
 
-# Groups of up to so many rows are open from the start.
+# Groups of up to so many rows are open from the start, if those above them are.
 OPEN = 5
 # What a bar holds, in limits.
 FULL = 1.25
@@ -100,23 +100,23 @@ def listing(groups: Sequence[Group], heads: Heads, nothing: str) -> str:
         "of the diagonal: on average, for the best 95 % and 99 %, and at worst. The bar shows the 95 % against what is "
         "allowed, the mark on it."
     )
-    parts = "".join(_group(group, heads) for group in groups)
+    short = [len(group.rows) <= OPEN for group in groups]
+    parts = "".join(_group(group, heads, opened=all(short[: k + 1])) for k, group in enumerate(groups))
     title = "What came close" if all(group.missed for group in groups) else "What was found"
     return f'<h2>{title}</h2>{parts}<p class="quiet">{prose(told)}</p>'
 
 
-def _group(group: Group, heads: Heads) -> str:
+def _group(group: Group, heads: Heads, *, opened: bool) -> str:
     worst = max(row.misses.p95 for row in group.rows)
     title = group.title[:1].upper() + group.title[1:]
     said = "refined and turned down" if group.missed else f"95 % within {percent(max(worst, 1e-4))}"
-    opened = " open" if len(group.rows) <= OPEN else ""
     score = "× limit" if group.missed else "conf."
     named = ("", heads.vector, "mean", "95 %", "99 %", "max", score, heads.matrix)
     columns = "".join(f'<th scope="col">{plain(h)}</th>' for h in named)
     body = "".join(_row(row) for row in group.rows)
-    kind = " near" if group.missed else ""
+    kind, shown = (" near" if group.missed else ""), (" open" if opened else "")
     return (
-        f'<details class="group{kind}"{opened}><summary><b>{plain(title)}</b> <span>{said}</span></summary>'
+        f'<details class="group{kind}"{shown}><summary><b>{plain(title)}</b> <span>{said}</span></summary>'
         f'<div class="wide" tabindex="0" role="region" aria-label="{plain(title)}">'
         f"<table><thead><tr>{columns}</tr></thead><tbody>{body}</tbody></table></div></details>"
     )

@@ -71,6 +71,13 @@ def sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:].rstrip('.')}."
 
 
+def schoenflies(name: str) -> str:
+    """A Schoenflies symbol as it is printed, as HTML: what follows its first letter stands below the line."""
+    letter, below = name[:1], name[1:].replace("inf", "∞")
+    # O(2) and SO(2) of the plane are no such symbols.
+    return f"{plain(letter)}<sub>{plain(below)}</sub>" if below and "(" not in name else plain(name)
+
+
 def section(title: str, told: str, body: str) -> str:
     """A headline, a paragraph of plain text, and HTML."""
     return f"<section><h2>{plain(title)}</h2><p>{prose(told)}</p>{body}</section>"
@@ -91,11 +98,15 @@ def facts(pairs: Iterable[tuple[str, str]]) -> str:
     return f"<dl>{items}</dl>"
 
 
-def head(about: str, title: str, beside: str, summary: str) -> str:
-    """What the page is about, the answer in large letters, what it means, and one sentence."""
+def head(about: str, title: str, beside: str, summary: str, *, group: str = "") -> str:
+    """What the page is about, the answer in large letters, what it means, and one sentence.
+
+    The answer is `title`, and the symbol of a `group`, if it is one.
+    """
+    answer = " ".join(filter(None, (plain(title), schoenflies(group))))
     return (
         f'<header><p class="over">{plain(about)}</p>'
-        f"<h1>{plain(title)} <span>{plain(beside)}</span></h1>"
+        f"<h1>{answer} <span>{plain(beside)}</span></h1>"
         f'<p class="lead">{prose(summary)}</p></header>'
     )
 

@@ -64,15 +64,15 @@ def page(detection: Detection, shape: Shape) -> Page:
 
 
 def _head(d: Detection, shape: Shape) -> str:
-    title, below = symbol(d.point_group), meaning(d.group)
+    title, group, below = "", d.point_group, meaning(d.group)
     summary = fit(d) or f"Nothing holds at a tolerance of {percent(d.tolerance)} of the diagonal."
     if d.undetermined:
-        title, below, summary = "Undetermined", "", sentence(d.undetermined)
+        title, group, below, summary = "Undetermined", "", "", sentence(d.undetermined)
     elif d.at_least:
-        title = f"At least {title}"
+        title = "At least"
     if d.textured is not None:
         summary += f" With its texture it is {symbol(d.textured.point_group)}."
-    return head(f"Symmetry of {shape.source}", title, below, summary)
+    return head(f"Symmetry of {shape.source}", title, below, summary, group=group)
 
 
 def _fallback(d: Detection, picture: bytes) -> str:
@@ -254,10 +254,15 @@ def again(verb: str, given: Mapping[str, str], asked: Mapping[str, Any], python:
         asked: options of the command, by their names in Python.
         python: those of the function.
     """
-    words = ", ".join([*given, *(f"{name}={value!r}" for name, value in python.items())])
-    lines = [f"symrefine.{verb}({words})"]
     files = list(given.values())
-    if all(Path(name).suffix for name in files):  # what came as an object has the name of its kind, and no suffix
+    are_files = all(
+        Path(name).suffix for name in files
+    )  # what came as an object has the name of its kind, and no suffix
+    # What is read with options of the command alone is a shape that was read so.
+    named = list(map(repr, files)) if are_files and len(python) == len(asked) else list(given)
+    words = [*named, *(f"{name}={value!r}" for name, value in python.items())]
+    lines = [f"symrefine.{verb}({', '.join(words)})"]
+    if are_files:
         options = [word for name, value in asked.items() for word in _option(name, value)]
         lines = [shlex.join(["symrefine", verb, *files, *options]), f"# or in Python: {lines[0]}"]
     told = f"symrefine {version('symrefine')}. The result is a function of the input and these options alone."
