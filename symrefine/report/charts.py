@@ -60,7 +60,7 @@ def bar_chart(title: str, rows: Sequence[tuple[str, float, str, bool]], threshol
         f'style="width:{max(place(value), 0.5):.1f}%"></i></span><span>{escape(remark)}</span></li>'
         for name, value, remark, strong in rows
     )
-    key = f'<p class="quiet"><u></u>{escape(threshold_name)}</p>'
+    key = f'<p class="quiet"><u></u>{escape(threshold_name)}; on a logarithmic scale</p>'
     return f'<ul class="bars" aria-label="{escape(title, quote=True)}">{lines}</ul>{key}'
 
 
