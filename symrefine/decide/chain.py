@@ -8,6 +8,7 @@ an exact element stays in it, and the group at any tolerance is read from the sa
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -273,7 +274,8 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     near = [h for h in pool.turned_down() if h.need <= COARSE * pool.limit]
     # What is hidden by noise, or by the least tolerance that is asked for, tells no two groups apart.
     hidden = max(exact_need(surface.floor), pool.nothing / ALIKE)
-    rest = sorted([*pool.small, *elements, pool.largest, *near], key=lambda h: _worst(h, hidden))
+    worst = partial(_worst, hidden=hidden)
+    rest = sorted([*pool.small, *elements, pool.largest, *near], key=worst)
     known = [pool.largest, *pool.failed]
     links = [NOTHING]
     while rest := [h for h in rest if not links[-1].holds(h.placed)]:
@@ -289,7 +291,7 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
             singly = [_join(surface, [here, h], known, most, pool.limit) for h in batch[:SINGLY]]
             tried = [h for h in (found, *singly) if h is not None]
             known += tried
-            found = min((h for h in tried if h.elements), key=lambda h: _worst(h, hidden), default=None)
+            found = min((h for h in tried if h.elements), key=worst, default=None)
         # Directions may part what together makes the same group again.
         if found is None or found.group.name == here.group.name:
             rest = [h for h in rest if h not in batch]

@@ -255,9 +255,8 @@ def again(verb: str, given: Mapping[str, str], asked: Mapping[str, Any], python:
         python: those of the function.
     """
     files = list(given.values())
-    are_files = all(
-        Path(name).suffix for name in files
-    )  # what came as an object has the name of its kind, and no suffix
+    # What came as an object has the name of its kind, and no suffix.
+    are_files = all(Path(name).suffix for name in files)
     # What is read with options of the command alone is a shape that was read so.
     named = list(map(repr, files)) if are_files and len(python) == len(asked) else list(given)
     words = [*named, *(f"{name}={value!r}" for name, value in python.items())]
