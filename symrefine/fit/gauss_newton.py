@@ -1,5 +1,6 @@
 """Damped Gauss-Newton on small dense problems, one or many side by side; it knows nothing of symmetry."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -54,41 +55,40 @@ def minimise(
     linearise: Callable[[Array], Linearisation],
     start: Array,
     *,
+    first: Linearisation | None = None,
     move: Callable[[Array, Array], Array] = np.add,
     max_steps: int = 6,
     tolerance: float = 1e-6,
-    longest: float = np.inf,
+    longest: float = math.inf,
 ) -> Solution:
     """Minimise `r(x)'r(x)` from `start` by Gauss-Newton steps, damped (Levenberg) only when a step fails to descend.
 
     Args:
         linearise: cost, gradient [n] and Gauss-Newton matrix [n, n] in small steps from x.
         start: [n], or whatever `move` moves.
+        first: what `linearise` says of the start, if that is known.
         move: x after a step [n].
         max_steps: evaluations after the first.
         tolerance: converged once a step is shorter than this.
         longest: steps are cut to this length.
     """
-
-    def alone(x: Array, _: Index) -> Linearisations:
-        here = linearise(x[0])
-        return Linearisations(costs=np.array([here.cost]), gradients=here.gradient[None], hessians=here.hessian[None])
-
-    found = minimise_all(
-        alone,
-        np.array(start, dtype=np.float64)[None],
-        move=lambda x, step: move(x[0], step[0])[None],
-        max_steps=max_steps,
-        tolerance=tolerance,
-        longest=longest,
-    )
-    return Solution(
-        x=found.x[0],
-        cost=float(found.costs[0]),
-        hessian=found.hessians[0],
-        steps=int(found.steps[0]),
-        converged=bool(found.converged[0]),
-    )
+    x: Array = np.array(start, dtype=np.float64)
+    here = first or linearise(start)
+    damping: Array = np.zeros(())
+    steps, converged = 0, here.hessian.trace() <= 0.0
+    for _ in range(max_steps):
+        if converged:
+            break
+        step = _steps(here.gradient, here.hessian, damping)
+        length = math.sqrt(step @ step)
+        trial = move(x, step if length <= longest else step * (longest / length))
+        there = linearise(trial)
+        better = there.cost <= here.cost
+        if better:
+            x, here, steps = trial, there, steps + 1
+        damping = _next_damping(damping, better)
+        converged = length < tolerance or here.hessian.trace() <= 0.0
+    return Solution(x=x, cost=here.cost, hessian=here.hessian, steps=steps, converged=bool(converged))
 
 
 def minimise_all(
@@ -113,7 +113,7 @@ def minimise_all(
     x, first = np.array(starts, dtype=np.float64), linearise(starts, np.arange(len(starts)))
     costs, gradients, hessians = first.costs.copy(), first.gradients.copy(), first.hessians.copy()
     damping, steps = np.zeros(len(x)), np.zeros(len(x), dtype=np.intp)
-    converged = np.diagonal(hessians, axis1=1, axis2=2).max(axis=1, initial=0.0) <= 0.0
+    converged = np.trace(hessians, axis1=1, axis2=2) <= 0.0
     for _ in range(max_steps):
         active = np.flatnonzero(~converged)
         if not active.size:
@@ -128,13 +128,19 @@ def minimise_all(
         x[taken], costs[taken] = trial[better], there.costs[better]
         gradients[taken], hessians[taken] = there.gradients[better], there.hessians[better]
         steps[taken] += 1
-        damping[active] = np.where(better, damping[active] / 10, np.maximum(10 * damping[active], 1e-4))
-        converged[active] = (length < tolerance) | (np.diagonal(hessians[active], axis1=1, axis2=2).max(axis=1) <= 0.0)
+        damping[active] = _next_damping(damping[active], better)
+        converged[active] = (length < tolerance) | (np.trace(hessians[active], axis1=1, axis2=2) <= 0.0)
     return Solutions(x=x, costs=costs, hessians=hessians, steps=steps, converged=converged)
 
 
+def _next_damping(damping: Array, better: bool | NDArray[np.bool_]) -> Array:
+    """Damping [...] after steps, from that before them and whether they descended."""
+    return np.where(better, damping / 10, np.maximum(10 * damping, 1e-4))
+
+
 def _steps(gradients: Array, hessians: Array, damping: Array) -> Array:
-    """Damped Gauss-Newton steps [K, n]."""
-    scale = np.diagonal(hessians, axis1=1, axis2=2).max(axis=1)
-    damped = hessians + (scale * np.maximum(damping, 1e-12))[:, None, None] * np.eye(gradients.shape[1])
-    return np.asarray(-np.linalg.solve(damped, gradients[:, :, None])[:, :, 0])
+    """Damped Gauss-Newton steps [..., n], by shares [...] of the largest curvature."""
+    scale = np.diagonal(hessians, axis1=-2, axis2=-1).max(axis=-1)
+    added = scale * np.maximum(damping, 1e-12)
+    damped = hessians + added[..., None, None] * np.eye(gradients.shape[-1])
+    return np.asarray(-np.linalg.solve(damped, gradients[..., None])[..., 0])

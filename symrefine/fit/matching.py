@@ -43,19 +43,21 @@ def match(
     """
     source = np.arange(0, len(cloud.points), stride)
     points, classes = cloud.points[source], cloud.classes(source)
-    moved = np.stack([motion.apply(points) for motion in motions])
+    turns, shifts = np.stack([m.matrix.T for m in motions]), np.stack([m.shift for m in motions])[:, None]
+    moved = points @ turns + shifts
     every = None if classes is None else np.tile(classes, len(motions))
-    distance, target = cloud.nearest(np.concatenate(moved), every, bound=_reach(cloud.spacing, uncertainty))
+    distance, target = cloud.nearest(moved.reshape(-1, 3), every, bound=_reach(cloud.spacing, uncertainty))
     distance, target = distance.reshape(moved.shape[:2]), target.reshape(moved.shape[:2])
     keep = np.isfinite(distance)
     if cloud.isolated:
         error, flat = distance, np.ones_like(distance)
     else:
-        keep &= np.linalg.norm(moved - points, axis=2) > cloud.spacing
+        travel = moved - points
+        keep &= _dot(travel, travel) > cloud.spacing**2
         target = np.where(keep, target, 0)
         normals = cloud.normals[target]
-        keep &= _facing(np.stack([motion.turn(cloud.normals[source]) for motion in motions]), normals)
-        error = np.einsum("kni,kni->kn", moved - cloud.points[target], normals)
+        keep &= _facing(cloud.normals[source] @ turns, normals)
+        error = _dot(moved - cloud.points[target], normals)
         flat = worth(cloud.flatness[source], cloud.flatness[target])
 
     def weighted(off: Array, kept: Mask) -> Array:
@@ -86,7 +88,12 @@ def _reach(spacing: float, uncertainty: float) -> float:
 
 
 def _facing(moved: Array, normals: Array) -> NDArray[np.bool_]:
-    return np.asarray(np.abs(np.einsum("...i,...i->...", moved, normals)) > AGREE)
+    return np.asarray(np.abs(_dot(moved, normals)) > AGREE)
+
+
+def _dot(a: Array, b: Array) -> Array:
+    """Inner products [...] of vectors [..., 3]."""
+    return np.einsum("...i,...i->...", a, b)
 
 
 def worth(source: Array, target: Array) -> Array:
@@ -96,7 +103,8 @@ def worth(source: Array, target: Array) -> Array:
 
 def robust_scale(error: Array, spacing: float, uncertainty: float, robust: float = ROBUST) -> float:
     """Scale of the Geman-McClure weights from residuals [N], bounded from below."""
-    middle = float(np.median(np.abs(error))) if error.size else 0.0
+    half = error.size // 2
+    middle = float(np.partition(np.abs(error), half)[half]) if error.size else 0.0
     return max(robust * middle, SCALE_FLOOR * spacing, uncertainty)
 
 

@@ -17,7 +17,6 @@ from symrefine.fit.residual import (
     design_rows,
     frame_model,
     gram,
-    observable_motions,
     theta_models,
     turn_frame,
 )
@@ -141,7 +140,6 @@ def refine(
     state, step = start, np.inf
     last: Array = np.zeros(6)
     way: Array = np.zeros(6)
-    basis = observable_motions(start.standard, start.frame, start.center)
     yield Iterate(
         index=0, state=state, theta_rad=np.zeros(0), step=np.inf, covariance=np.zeros((6, 6)), cost=np.nan, inliers=0,
         pairs=(), inner_steps=0, converged=False,
@@ -151,12 +149,9 @@ def refine(
         pairs = match(cloud, state.motions, uncertainty, stride=stride, robust=robust)
         grams = np.stack([_pair_gram(cloud, p) for p in pairs])
         theta = _thetas(grams, state) if state.bundle else np.zeros(0)
-        seen, unseen = _seen(grams, state, basis)
-        solution = _solve(grams, state, seen, float(np.median(theta)) if theta.size else 0.0)
+        solution, sight, unseen = _solve(grams, state, float(np.median(theta)) if theta.size else 0.0)
         weight = max(sum(float(p.weights.sum()) for p in pairs), 1e-300)
-        covariance = (
-            cloud.redundancy * solution.cost / weight * np.linalg.pinv(solution.hessian, rcond=UNSEEN, hermitian=True)
-        )
+        covariance = cloud.redundancy * solution.cost / weight * sight
         noise = WITHIN_NOISE * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
         settled = bool(np.abs(solution.x).max() < SETTLED or np.all(np.abs(solution.x) <= noise))
         last = solution.x * _remaining(solution.x, last)
@@ -211,28 +206,36 @@ def closest_planes(grams3: Array, angles_rad: Array) -> Array:
     return found.x[:, 0]
 
 
-def _seen(grams: Array, state: Framed, basis: Array) -> tuple[Array, Array]:
-    """A basis [6, q] of motions apart: [6, p] that the pairs see, and [6, q - p] that they do not.
+def _solve(grams: Array, state: Framed, theta: float) -> tuple[Solution, Array, Array]:
+    """Gauss-Newton over what the pairs see of the shared frame's motions, from a turn by theta about its third axis.
 
-    Along an open tube, all of whose normals lie across it, rounding alone would say how far to go.
+    They see no glide along a plane and no turn about a lone normal, which change no operation; nor, along an open tube
+    all of whose normals lie across it, how far to go, which rounding alone would say.
+
+    Returns: the solution, x [6]; the inverse [6, 6] of its matrix over the motions seen, 0 over the others; and those,
+    [6, 6 - p], orthonormal.
     """
-    hessian = basis.T @ frame_model(grams, state.standard, state.frame, state.center, np.zeros(6)).hessian @ basis
-    values, vectors = np.linalg.eigh(hessian)
+
+    def model(x: Array) -> Linearisation:
+        return frame_model(grams, state.standard, state.frame, state.center, x)
+
+    here = model(np.zeros(6))
+    values, vectors = np.linalg.eigh(here.hessian)
     seen = values > UNSEEN * values[-1]
-    return (basis if seen.all() else basis @ vectors[:, seen]), basis @ vectors[:, ~seen]
+    basis = vectors[:, seen]
 
+    def within(full: Linearisation) -> Linearisation:
+        return Linearisation(cost=full.cost, gradient=basis.T @ full.gradient, hessian=basis.T @ full.hessian @ basis)
 
-def _solve(grams: Array, state: Framed, basis: Array, theta: float) -> Solution:
-    """Gauss-Newton over a basis [6, q] of the shared frame's motions, from a turn by theta about its third axis."""
-
-    def linearise(y: Array) -> Linearisation:
-        full = frame_model(grams, state.standard, state.frame, state.center, basis @ y)
-        return replace(full, gradient=basis.T @ full.gradient, hessian=basis.T @ full.hessian @ basis)
-
-    # What a step leaves is about its square (radians, RMS radii), and the next iterate takes it.
     start = basis.T @ np.array([0.0, 0.0, theta, 0.0, 0.0, 0.0])
-    solution = minimise(linearise, start, tolerance=math.sqrt(0.1 * SETTLED))
-    return replace(solution, x=basis @ solution.x, hessian=basis @ solution.hessian @ basis.T)
+    solution = minimise(
+        lambda y: within(model(basis @ y)),
+        start,
+        first=within(model(basis @ start) if theta else here),
+        # What a step leaves is about its square (radians, RMS radii), and the next iterate takes it.
+        tolerance=math.sqrt(0.1 * SETTLED),
+    )
+    return replace(solution, x=basis @ solution.x), (basis / values[seen]) @ basis.T, vectors[:, ~seen]
 
 
 def _moved(state: Framed, x: Array) -> Framed:

@@ -101,47 +101,32 @@ def _apart(outputs: Array, count: int) -> Array:
     return outputs.reshape(len(outputs), count, -1).transpose(1, 0, 2)
 
 
-def _quadratic(ca: Any, name: str, unknown: Any, phi: Any, parameters: list[Any]) -> Any:
-    """casadi function (unknown, parameters, G) -> cost, gradient and Gauss-Newton matrix of phi' G phi."""
-    g = ca.SX.sym("G", phi.numel(), phi.numel())
-    jacobian = ca.densify(ca.jacobian(phi, unknown))
-    weighted = ca.mtimes(g, phi)
-    outputs = [ca.dot(phi, weighted), ca.mtimes(jacobian.T, weighted), ca.mtimes([jacobian.T, g, jacobian])]
-    return ca.Function(name, [unknown, *parameters, g], [ca.densify(o) for o in outputs])
-
-
 def _theta_function(count: int) -> Any:
+    """casadi function (thetas, G) -> costs, gradients and Gauss-Newton matrices of planes through an axis."""
     import casadi as ca
 
-    theta = ca.SX.sym("theta")
-    return _quadratic(ca, "theta", theta, ca.vertcat(1, ca.cos(2 * theta), ca.sin(2 * theta)), []).map(count)
+    theta, g = ca.SX.sym("theta"), ca.SX.sym("G", 3, 3)
+    phi = ca.vertcat(1, ca.cos(2 * theta), ca.sin(2 * theta))
+    jacobian, weighted = ca.densify(ca.jacobian(phi, theta)), ca.mtimes(g, phi)
+    outputs = [ca.dot(phi, weighted), ca.mtimes(jacobian.T, weighted), ca.mtimes([jacobian.T, g, jacobian])]
+    return ca.Function("theta", [theta, g], [ca.densify(o) for o in outputs]).map(count)
 
 
-def _frame_symbols(ca: Any) -> tuple[Any, Any, list[Any]]:
-    """Unknowns, phi and parameters of one operation in a movable frame."""
+def _frame_function(count: int) -> Any:
+    """casadi function (x, frame, center, standard) -> phi of each operation, its derivatives in x beside it.
+
+    What the operations share goes in once.
+    """
+    import casadi as ca
+
     x, frame, center = ca.SX.sym("x", 6), ca.SX.sym("frame", 3, 3), ca.SX.sym("center", 3)
     standard = ca.SX.sym("standard", 3, 3)
     moved = ca.mtimes(_turn(ca, x[:3]), frame)
     matrix = ca.mtimes([moved.T, standard, moved])
     shifted = center + ca.mtimes(frame.T, x[3:])
     phi = ca.vertcat(ca.reshape(matrix.T, 9, 1), shifted - ca.mtimes(matrix, shifted), 1)
-    return x, phi, [frame, center, standard]
-
-
-def _frame_function(count: int) -> Any:
-    """All that the operations share goes in once, and what they add up to comes out."""
-    import casadi as ca
-
-    x, phi, parameters = _frame_symbols(ca)
-    return _quadratic(ca, "frame", x, phi, parameters).map("frames", "serial", count, [0, 1, 2], [0, 1, 2])
-
-
-def _jacobian_function(count: int) -> Any:
-    import casadi as ca
-
-    x, phi, parameters = _frame_symbols(ca)
-    function = ca.Function("jacobian", [x, *parameters], [ca.densify(ca.jacobian(phi, x))])
-    return function.map("jacobians", "serial", count, [0, 1, 2], [])
+    outputs = [ca.densify(ca.horzcat(phi, ca.jacobian(phi, x)))]
+    return ca.Function("frame", [x, frame, center, standard], outputs).map("frames", "serial", count, [0, 1, 2], [])
 
 
 def _turn(ca: Any, w: Any) -> Any:
@@ -177,9 +162,16 @@ def frame_model(grams: Array, standard: Array, frame: Array, center: Array, x: A
         center: [3].
         x: small rotation about, and shift along, the frame's axes.
     """
-    function = _compiled(_frame_function, len(standard))
-    cost, gradient, hessian = function(x, frame, center, _beside(standard), _beside(grams))
-    return Linearisation(cost=float(cost[0, 0]), gradient=gradient[:, 0], hessian=hessian)
+    rows = _tangents(standard, frame, center, x)
+    weighted = rows @ grams
+    products = rows.transpose(1, 0, 2).reshape(7, -1) @ weighted.transpose(1, 0, 2).reshape(7, -1).T
+    return Linearisation(cost=float(products[0, 0]), gradient=products[1:, 0], hessian=products[1:, 1:])
+
+
+def _tangents(standard: Array, frame: Array, center: Array, x: Array) -> Array:
+    """phi of each operation and below it its derivatives in x [k, 7, 13]."""
+    found = _compiled(_frame_function, len(standard))(x, frame, center, _beside(standard))[0]
+    return found.T.reshape(len(standard), 7, SIZE)
 
 
 def observable_motions(standard: Array, frame: Array, center: Array) -> Array:
@@ -188,10 +180,9 @@ def observable_motions(standard: Array, frame: Array, center: Array) -> Array:
     q = 3 for one plane, 5 for the planes through an axis, 6 for the mirrors of a cube: what is left out (gliding
     along the plane or the axis, turning about a lone normal) no residual can see.
     """
-    jacobian = _compiled(_jacobian_function, len(standard))
-    found = jacobian(np.zeros(6), frame, center, _beside(standard))[0]
-    _, values, rows = np.linalg.svd(_apart(found, len(standard)).reshape(-1, 6), full_matrices=False)
-    return rows[values > 1e-6 * values[0]].T
+    changes = _tangents(standard, frame, center, np.zeros(6))[:, 1:].transpose(1, 0, 2).reshape(6, -1)
+    vectors, values, _ = np.linalg.svd(changes, full_matrices=False)
+    return vectors[:, values > 1e-6 * values[0]]
 
 
 def axis_gram(gram13: Array, frame: Array, point: Array) -> Array:

@@ -140,8 +140,7 @@ class PointGroup:
 
     def distance_rad(self, operations: ArrayLike) -> Array:
         """Angle [k] between each orthogonal matrix [k, 3, 3] and the nearest operation of the group."""
-        given = nearest_orthogonal(operations)
-        return chord_angles(given, self.nearest(given))
+        return _away_rad(self, nearest_orthogonal(operations))
 
     def nearest(self, matrices: Array) -> Array:
         """The operation [k, 3, 3] nearest to each orthogonal matrix [k, 3, 3], exactly; any one of several."""
@@ -197,7 +196,14 @@ def is_subgroup(a: PointGroup, b: PointGroup, tolerance_rad: float = EXACT) -> b
     if b.is_finite and not a.is_finite:
         return False
     members = a.frame.T @ standard_operations(_sampled(a.symbol, 7)) @ a.frame
-    return bool(chord_angles(members, b.nearest(members)).max() <= tolerance_rad)
+    return bool(_away_rad(b, members).max() <= tolerance_rad)
+
+
+def _away_rad(group: PointGroup, matrices: Array) -> Array:
+    """Angle [k] between each orthogonal matrix [k, 3, 3] and the nearest operation of a group."""
+    if group.is_finite:
+        return nearest_operations(matrices, standard_operations(group.symbol), group.frame)[1]
+    return chord_angles(matrices, group.nearest(matrices))
 
 
 def _sampled(symbol: Symbol, fold: int) -> Symbol:
