@@ -162,27 +162,10 @@ def frame_model(grams: Array, standard: Array, frame: Array, center: Array, x: A
         center: [3].
         x: small rotation about, and shift along, the frame's axes.
     """
-    rows = _tangents(standard, frame, center, x)
+    rows = _compiled(_frame_function, len(standard))(x, frame, center, _beside(standard))[0].T.reshape(-1, 7, SIZE)
     weighted = rows @ grams
     products = rows.transpose(1, 0, 2).reshape(7, -1) @ weighted.transpose(1, 0, 2).reshape(7, -1).T
     return Linearisation(cost=float(products[0, 0]), gradient=products[1:, 0], hessian=products[1:, 1:])
-
-
-def _tangents(standard: Array, frame: Array, center: Array, x: Array) -> Array:
-    """phi of each operation and below it its derivatives in x [k, 7, 13]."""
-    found = _compiled(_frame_function, len(standard))(x, frame, center, _beside(standard))[0]
-    return found.T.reshape(len(standard), 7, SIZE)
-
-
-def observable_motions(standard: Array, frame: Array, center: Array) -> Array:
-    """Orthonormal basis [6, q] of the motions of the frame that change any of the operations.
-
-    q = 3 for one plane, 5 for the planes through an axis, 6 for the mirrors of a cube: what is left out (gliding
-    along the plane or the axis, turning about a lone normal) no residual can see.
-    """
-    changes = _tangents(standard, frame, center, np.zeros(6))[:, 1:].transpose(1, 0, 2).reshape(6, -1)
-    vectors, values, _ = np.linalg.svd(changes, full_matrices=False)
-    return vectors[:, values > 1e-6 * values[0]]
 
 
 def axis_gram(gram13: Array, frame: Array, point: Array) -> Array:
