@@ -177,7 +177,7 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
         if glance >= _hopeless(surface):
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
             continue
-        look = looked_at(surface, start, COARSE * pool.limit)
+        look = looked_at(surface, start, COARSE * pool.limit, pool.has)
         moved, needs = look.placed, look.needs
         pool = replace(pool, looks=(*pool.looks, (glance, moved)))
         if needs > ALIKE * pool.limit:

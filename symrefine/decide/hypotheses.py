@@ -5,7 +5,7 @@ the table that everything else reads.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -129,16 +129,25 @@ class Look:
         return self.history[-1].converged
 
 
-def looked_at(surface: Surface, start: Placed, most: float) -> Look:
-    """A fit on a few points; one that needs more than `most` after `SHORT` steps ends, and is judged by fewer."""
+def looked_at(
+    surface: Surface, start: Placed, most: float, known: Callable[[Placed], bool] = lambda _: False
+) -> Look:
+    """A fit on a few points; one that needs more than `most` after `SHORT` steps ends, and is judged by fewer.
+
+    One that comes to what is `known` to need nothing ends there, and needs nothing.
+    """
     state, error, history = start.roughly_framed(), start_error(surface), []
     stride = surface.stride(max(GLANCE, LOOK // len(state.standard)))
     for iterate in refine(surface.cloud, state, start_error_rad=error, stride=stride):
         history.append(iterate)
-        if iterate.index == SHORT and not iterate.converged:
-            needs = _seems(surface, start.moved(iterate.state), GLANCE)
-            if needs > most:
-                break
+        if iterate.converged or iterate.index < SHORT:
+            continue
+        here = start.moved(iterate.state)
+        if known(here):
+            needs = 0.0
+            break
+        if iterate.index == SHORT and (needs := _seems(surface, here, GLANCE)) > most:
+            break
     else:
         needs = _seems(surface, start.moved(iterate.state), LOOK)
     off = max(iterate.step, math.sqrt(max(float(np.diag(iterate.covariance).max()), 0.0)))
