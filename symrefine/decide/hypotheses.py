@@ -129,9 +129,7 @@ class Look:
         return self.history[-1].converged
 
 
-def looked_at(
-    surface: Surface, start: Placed, most: float, known: Callable[[Placed], bool] = lambda _: False
-) -> Look:
+def looked_at(surface: Surface, start: Placed, most: float, known: Callable[[Placed], bool] = lambda _: False) -> Look:
     """A fit on a few points; one that needs more than `most` after `SHORT` steps ends, and is judged by fewer.
 
     One that comes to what is `known` to need nothing ends there, and needs nothing.
@@ -150,6 +148,9 @@ def looked_at(
             break
     else:
         needs = _seems(surface, start.moved(iterate.state), LOOK)
+        # Where noise is as thick as a surface it may draw a fit away, step by step.
+        if not iterate.converged and (stayed := _seems(surface, start, LOOK)) < needs:
+            return Look(placed=start, history=tuple(history[:1]), needs=stayed, error_rad=error)
     off = max(iterate.step, math.sqrt(max(float(np.diag(iterate.covariance).max()), 0.0)))
     placed = start.moved(iterate.state)
     return Look(placed=placed, history=tuple(history), needs=needs, error_rad=min(error, SPREAD * off))
@@ -168,13 +169,15 @@ def start_error(surface: Surface) -> float:
 def fitted(surface: Surface, start: Placed, *, error_rad: float = START_ERROR, before: int = 0) -> Hypothesis:
     """The group fitted as a whole from where it stands, which may be off by `error_rad`, and judged.
 
-    Of a surface with openings it may stay where it stands: what lies behind them is matched with what does not.
+    It may stay where it stands if the fit does not settle, or if the surface has openings: what lies behind them is
+    matched with what does not.
     """
     state = start.framed()
     stride = surface.stride(_moved_each(len(state.standard), GLANCE))
     history = tuple(refine(surface.cloud, state, start_error_rad=error_rad, stride=stride))
     found = _placed(surface, start.moved(history[-1].state), history, before)
-    if surface.openings is None or found.need <= exact_need(surface.floor):
+    drawn = surface.openings is not None or not history[-1].converged
+    if not drawn or found.need <= exact_need(surface.floor):
         return found
     return min(found, _placed(surface, start, history[:1], before), key=lambda h: h.need)
 

@@ -46,7 +46,9 @@ def match(
     turns, shifts = np.stack([m.matrix.T for m in motions]), np.stack([m.shift for m in motions])[:, None]
     moved = points @ turns + shifts
     every = None if classes is None else np.tile(classes, len(motions))
-    distance, target = cloud.nearest(moved.reshape(-1, points.shape[1]), every, bound=_reach(cloud.spacing, uncertainty))
+    distance, target = cloud.nearest(
+        moved.reshape(-1, points.shape[1]), every, bound=_reach(cloud.spacing, uncertainty)
+    )
     distance, target = distance.reshape(moved.shape[:2]), target.reshape(moved.shape[:2])
     keep = np.isfinite(distance)
     if cloud.isolated:
