@@ -517,3 +517,12 @@ def test_files_beside_a_mesh_are_bounded_before_they_are_read(kind: str, tmp_pat
         stream.truncate(2**40)  # takes no room on the disk
     with pytest.raises(InputError, match=r"has 1,099,511,627,776 bytes; expected 268,435,456 at most"):
         load(path, texture=True)
+
+
+def test_the_image_of_a_texture_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write_obj(tmp_path, BOX, plain)
+    image = next(tmp_path.glob("*.png"))
+    before = image.read_bytes()
+    assert invoke(["detect", str(path), "--texture", "--picture", str(image)]) == 2
+    assert "is the same file as the input" in capsys.readouterr().err
+    assert image.read_bytes() == before
