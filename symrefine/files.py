@@ -23,6 +23,8 @@ _FIRST, _BETWEEN = "[\n", ",\n"
 Writer = Callable[[Path], object]
 # The files that were asked for since somebody wants to know.
 _asked: ContextVar[list[Path] | None] = ContextVar("asked", default=None)
+# What brings a file here that is asked for, where it comes from elsewhere.
+_bring: ContextVar[Callable[[Path], object] | None] = ContextVar("bring", default=None)
 
 
 def check_target(path: Path) -> None:
@@ -195,16 +197,22 @@ def _is_replaceable(path: Path) -> bool:
     return path.is_file() or not path.exists()
 
 
-def file_bytes(file: Path) -> bytes:
+def file_bytes(file: Path, *, first: int | None = None, most: int | None = None) -> bytes:
     """What a file holds.
 
+    Args:
+        first: so many bytes of it are wanted, or all.
+        most: bytes that it may have.
+
     Raises:
-        InputError: it is missing, unreadable or empty, or no file.
+        InputError: it is missing, unreadable, empty or too large, or no file.
     """
     ask(file)
     try:
         state = file.stat()
-        data = file.read_bytes() if is_regular(state) else None
+        if most is not None and state.st_size > most:
+            raise InputError(f"has {state.st_size:,} bytes; expected {most:,} at most")
+        data = _first_bytes(file, first) if is_regular(state) else None
     except FileNotFoundError:
         raise InputError("no such file") from None
     except ValueError as error:  # a name that no system takes
@@ -218,15 +226,28 @@ def file_bytes(file: Path) -> bytes:
     return data
 
 
+def _first_bytes(file: Path, count: int | None) -> bytes:
+    if count is None:
+        return file.read_bytes()
+    with file.open("rb") as stream:
+        return stream.read(count)
+
+
 def is_regular(state: os.stat_result) -> bool:
     """Whether something is no pipe and no device, which have no end that one could wait for."""
     return stat.S_ISREG(state.st_mode) or stat.S_ISDIR(state.st_mode)
 
 
 def ask(file: Path) -> None:
-    """Tell those who want to know that a file is asked for, by a reader that does not come here."""
+    """Tell those who want to know that a file is asked for, by a reader that does not come here, and have it brought.
+
+    Raises:
+        InputError: it cannot be brought from where it lies.
+    """
     if (asked := _asked.get()) is not None and file not in asked:
         asked.append(file)
+    if (bring := _bring.get()) is not None and not os.path.lexists(file):
+        bring(file)
 
 
 @contextmanager
@@ -238,3 +259,17 @@ def asked_for() -> Iterator[list[Path]]:
         yield asked
     finally:
         _asked.reset(token)
+
+
+@contextmanager
+def brought(bring: Callable[[Path], object]) -> Iterator[None]:
+    """Have files brought that are asked for and not there, as long as this lasts.
+
+    Args:
+        bring: puts a file in its place, if it can be had.
+    """
+    token = _bring.set(bring)
+    try:
+        yield
+    finally:
+        _bring.reset(token)

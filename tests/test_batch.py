@@ -242,6 +242,13 @@ def test_manifests_that_are_wrong_are_refused_with_their_line(
     assert err.rstrip("\n").isprintable()
 
 
+def test_a_manifest_is_not_overwritten(run: Run, lab: Path) -> None:
+    table = lab / "models.csv"
+    table.write_text(text := "path\nobjects/box001.xyz\n")
+    refused(run("batch", "--manifest", table, "--table", table), "--table", "is the same file as the input")
+    assert table.read_text() == text
+
+
 def test_ids_of_bop_are_numbers(run: Run, lab: Path) -> None:
     (lab / "m.csv").write_text("path,id\nobjects/box001.xyz,mug\n")
     refused(run("batch", "--manifest", "m.csv", "--bop", "info.json"), "m.csv:2: --bop takes the number", "'mug' is no")

@@ -692,7 +692,7 @@ def test_batch_without_out_writes_nothing(
 def test_a_bug_in_one_file_does_not_end_the_others(
     run: Run, shelf: Path, tmp_path: Path, record: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def found(job: Job, _: dict[str, Any]) -> dict[str, Any]:
+    def found(job: Job, *_: object) -> dict[str, Any]:
         if job.path.endswith("b.ply"):
             raise ZeroDivisionError("oh")
         return record

@@ -226,6 +226,45 @@ def test_gltf_of_numbers_that_count_nothing(tmp_path: Path, value: object) -> No
             load(path)
 
 
+def test_buffers_beside_gltf_are_read_as_far_as_they_are_said_to_go(tmp_path: Path) -> None:
+    import base64
+
+    path, buffer = tmp_path / "a.gltf", tmp_path / "a b.bin"
+    data = base64.b64decode(json.loads(gltf(dict))["buffers"][0]["uri"].partition(",")[2])
+    path.write_text(gltf(lambda tree: tree["buffers"][0].update(uri="a%20b.bin")))
+    with buffer.open("wb") as stream:
+        stream.write(data)
+        stream.truncate(2**40)  # takes no room on the disk
+    assert len(load(path).points) == 3
+    buffer.write_bytes(data[:-1])
+    with pytest.raises(InputError, match=r"buffer 'a%20b\.bin': has 47 bytes; expected 48, its byteLength"):
+        load(path)
+
+
+@POSIX
+@pytest.mark.parametrize(
+    ("uri", "said"),
+    [
+        ("pipe", "is a pipe or a device"),
+        ("/dev/zero", "lies outside of the folder"),
+        ("x/../../y", "lies outside of the folder"),
+        ("none.bin", "no such file"),
+        ("a\0b", "is no name of a file"),
+        (EVIL, "no such file"),
+        (5, "buffer 0 has uri '5'"),
+        ("", "Is a directory"),
+    ],
+    ids=ascii,
+)
+def test_what_is_no_buffer_beside_gltf(tmp_path: Path, uri: object, said: str) -> None:
+    path = tmp_path / "a.gltf"
+    os.mkfifo(tmp_path / "pipe")
+    path.write_text(gltf(lambda tree: tree["buffers"][0].update(uri=uri)))
+    with pytest.raises(InputError, match=said) as refusal:
+        load(path)
+    assert str(refusal.value).isprintable()
+
+
 @pytest.mark.parametrize("options", [{"tolerance": "x"}, {"tolerance": None}, {"seed": -1}, {"seed": "1"}], ids=str)
 def test_options_that_are_none(options: dict[str, object]) -> None:
     for call in (lambda: symrefine.detect(CUBE, **options), lambda: symrefine.align(CUBE, CUBE, **options)):

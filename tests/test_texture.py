@@ -7,6 +7,7 @@ from importlib.resources import files
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import numpy as np
@@ -462,3 +463,66 @@ def test_pictures_show_the_texture() -> None:
         shares.append(float((pixels[..., 2] > 2.0 * pixels[..., 0] + 0.02).mean()))
     assert shares[0] > 0.15
     assert shares[1] < 0.05
+
+
+def _obj_above(folder: Path) -> Path:
+    """An .obj whose image lies in a folder beside its own, as data sets have them."""
+    (folder / "models").mkdir()
+    (folder / "textures").mkdir()
+    path = write_obj(folder / "models", BOX, plain)
+    for image in list(path.parent.glob("*.png")):
+        image.rename(folder / "textures" / image.name)
+    materials = next(path.parent.glob("*.mtl"))
+    materials.write_text(materials.read_text().replace("map_Kd ", "map_Kd ../textures/"))
+    return path
+
+
+def test_what_an_address_names_beside_it_is_fetched_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = pytest.importorskip("fsspec").filesystem("memory")
+    store.store.clear()
+    monkeypatch.chdir(tmp_path)
+    near = _obj_above(tmp_path)
+    for file in (path for path in tmp_path.rglob("*") if path.is_file()):
+        store.pipe(f"/set/{file.relative_to(tmp_path).as_posix()}", file.read_bytes())
+
+    def batch(path: object, out: str) -> tuple[dict[str, Any], str]:
+        invoke(["batch", str(path), "--texture", "--out", out])
+        return json.loads(Path(out).read_text().splitlines()[-1]), capsys.readouterr().out
+
+    here, there = (batch(path, out)[0] for path, out in ((near, "a.jsonl"), ("memory://set/models", "b.jsonl")))
+    assert there["error"] is None
+    assert there["textured"] == here["textured"]
+    assert set(there["beside"]) == set(here["beside"]) != set()
+    assert "1 done before" in batch("memory://set/models", "b.jsonl")[1]
+    image = next(name for name in store.find("/set/textures"))
+    whole = store.cat_file(image)
+    store.pipe(image, whole[:40])
+    errors = [batch("memory://set/models", out)[0]["error"] for out in ("b.jsonl", "c.jsonl")]
+    assert errors[0] == errors[1]
+    assert errors[0].startswith("memory:///set/models/")
+    assert "symrefine-" not in errors[0]  # the folder of a copy has another name every time
+    store.rm(image)
+    assert "no such file" in batch("memory://set/models", "b.jsonl")[0]["error"]
+    store.pipe(image, whole)
+    assert batch("memory://set/models", "b.jsonl")[0]["error"] is None
+
+
+@pytest.mark.parametrize("kind", ["image", "materials"])
+def test_files_beside_a_mesh_are_bounded_before_they_are_read(kind: str, tmp_path: Path) -> None:
+    path = write_obj(tmp_path, BOX, plain)
+    large = next(tmp_path.glob("*.png" if kind == "image" else "*.mtl"))
+    with large.open("r+b") as stream:
+        stream.truncate(2**40)  # takes no room on the disk
+    with pytest.raises(InputError, match=r"has 1,099,511,627,776 bytes; expected 268,435,456 at most"):
+        load(path, texture=True)
+
+
+def test_the_image_of_a_texture_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write_obj(tmp_path, BOX, plain)
+    image = next(tmp_path.glob("*.png"))
+    before = image.read_bytes()
+    assert invoke(["detect", str(path), "--texture", "--picture", str(image)]) == 2
+    assert "is the same file as the input" in capsys.readouterr().err
+    assert image.read_bytes() == before

@@ -135,7 +135,8 @@ def _jobs(args: argparse.Namespace) -> tuple[list["Job"], dict[str, int]]:
     found = _sources(args)
     check_table_option(args)
     outputs = {"--out": args.out, "--bop": args.bop, "--table": args.table}
-    check_outputs(outputs, (Path(source.path) for source in found))
+    manifests = () if args.manifest is None else (args.manifest,)
+    check_outputs(outputs, (Path(name) for name in chain(manifests, (source.path for source in found))))
     check_beside("--bop", args.bop, {"--bop-scale": args.bop_scale})
     numbers = {} if args.bop is None else _numbered(args, found)
     options = detection_options(args)

@@ -37,7 +37,7 @@ from symrefine.cli.values import (
     natural,
 )
 from symrefine.errors import InputError
-from symrefine.files import Writer, text_writer
+from symrefine.files import Writer, asked_for, text_writer
 
 if TYPE_CHECKING:
     from symrefine.shape import Shape
@@ -108,7 +108,9 @@ def run(args: argparse.Namespace) -> int:
     many = Many(json_to=args.json, head=ROW_HEAD, line=row_line, record=lambda given: _examined(args, given)[2])
     with counting("detecting", len(paths)) as doing:
         given = objects(paths, args.format, read)
-        first = next(given)
+        with asked_for() as asked:
+            first = next(given)
+        check_outputs(_of_one(args), asked)  # images of textures and masks are inputs, too
         if several := len(paths) > 1 or first.frames > 1:
             check_alone(_of_one(args), f"{paths[0]} holds {first.frames}", "choose one with --frame")
             records = list(many.told(chain([first], given), doing))

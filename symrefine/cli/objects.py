@@ -18,7 +18,7 @@ from symrefine.files import ENDLESS, asked_for, is_regular
 from symrefine.fleet.crew import HERE, Executor
 from symrefine.fleet.journal import Journal, Kinds, Latest
 from symrefine.fleet.limits import Limits, Lost
-from symrefine.fleet.remote import fetched, is_remote, state
+from symrefine.fleet.remote import beside, fetched, is_remote, state
 from symrefine.fleet.rows import Row
 from symrefine.fleet.shard import PART, piece
 from symrefine.fleet.tasks import finish, is_final, our_version
@@ -141,7 +141,7 @@ def holds(row: Row | None, job: Job, limits: Limits) -> bool:
     compared = {*now, "id", "scale"} - {"error", "sha256" if is_remote(job.path) else "state"}
     if now["error"] is not None or any(row.get(key) != now.get(key) for key in compared):
         return False
-    if row.get("beside", {}) != _beside(Path(job.path), row.get("beside", {})):
+    if row.get("beside", {}) != _beside(job.path, row.get("beside", {})):
         return False
     return job.scale is None or row["error"] is not None or row.get("bop", {}).get("scale") == job.scale
 
@@ -162,36 +162,39 @@ def examine_file(job: Job) -> Row:
     row = _head(job)
     if row["error"] is not None:
         return row
-    with asked_for() as asked:
-        try:
-            row |= _found(job, row)
-        except MemoryError:
-            raise
-        except Exception as error:  # noqa: BLE001 - one file must not end the others
-            row["error"] = failure(job.name if job.frames else job.path, error)
-    file = Path(job.path)
-    names = [os.path.relpath(path, file.parent) for path in asked if path != file]
-    return row | {"beside": _beside(file, names)} if names and not is_remote(job.path) else row
+    names: list[str] = []
+    # Of several objects in a file that is read whole there is nothing more to fetch.
+    here = nullcontext(Path(job.path)) if job.frames else _here(job.path)
+    try:
+        with here as file, asked_for() as asked:
+            try:
+                with told_as(str(file), job.path), told_as(str(file.parent), _folder(job.path)):
+                    row |= _found(job, file, row)
+            finally:
+                names = [os.path.relpath(path, file.parent) for path in asked if path != file]
+    except MemoryError:
+        raise
+    except Exception as error:  # noqa: BLE001 - one file must not end the others
+        row["error"] = failure(job.name if job.frames else job.path, error)
+    return row | {"beside": _beside(job.path, names)} if names else row
 
 
-def _found(job: Job, row: Row) -> Row:
+def _found(job: Job, file: Path, row: Row) -> Row:
     """What is found in one object, whose row has been begun; of a file that holds several, how many."""
     from symrefine.cli.detect import detected as decided
 
-    # Of several objects in a file that is read whole there is nothing more to fetch.
-    with nullcontext(Path(job.path)) if job.frames else _here(job.path) as file, told_as(str(file), job.path):
-        clock = Clock()
-        with clock("load"):
-            row["sha256"], frames = _frames(job, file, row)
-            if len(frames) > 1 and job.is_file:
-                return {"frames": len(frames)}
-            with about(str(file)):
-                frames.check(job.frame)
-            shape = frames[job.frame or 0]
-            shape = replace(shape, source=job.path) if shape.source == str(file) else shape
-        found = decided(shape, dict(job.options), job.path)
-        told: Row = found.to_dict(load_s=clock.seconds["load"])
-        return told if job.scale is None else told | {"bop": _bop(found, found.shape, job.scale)}
+    clock = Clock()
+    with clock("load"):
+        row["sha256"], frames = _frames(job, file, row)
+        if len(frames) > 1 and job.is_file:
+            return {"frames": len(frames)}
+        with about(str(file)):
+            frames.check(job.frame)
+        shape = frames[job.frame or 0]
+        shape = replace(shape, source=job.path) if shape.source == str(file) else shape
+    found = decided(shape, dict(job.options), job.path)
+    told: Row = found.to_dict(load_s=clock.seconds["load"])
+    return told if job.scale is None else told | {"bop": _bop(found, found.shape, job.scale)}
 
 
 def _frames(job: Job, file: Path, row: Row) -> tuple[str, "Frames[Any]"]:
@@ -264,16 +267,21 @@ def _digest_of(path: Path, _: tuple[int, ...]) -> str:
         return file_digest(stream, "sha256").hexdigest()
 
 
-def _beside(path: Path, names: Iterable[str]) -> dict[str, str | None]:
+def _beside(path: str, names: Iterable[str]) -> dict[str, str | None]:
     """What tells the content of files that a file needs, by their place from its folder; None of one not there."""
-    return {name: _digest_or_none(path.parent / name) for name in names}
+    return {name: _digest_or_none(path, name) for name in names}
 
 
-def _digest_or_none(path: Path) -> str | None:
+def _digest_or_none(path: str, name: str) -> str | None:
     try:
-        return _digest(path)
+        return state(beside(path, name)) if is_remote(path) else _digest(Path(path).parent / name)
     except (InputError, ValueError):  # a name that no system takes
         return None
+
+
+def _folder(path: str) -> str:
+    """The folder of a file, as messages call it."""
+    return beside(path, ".") if is_remote(path) else str(Path(path).parent)
 
 
 def _here(path: str) -> AbstractContextManager[Path]:

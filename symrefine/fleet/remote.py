@@ -1,5 +1,6 @@
 """Files that fsspec reaches: listed, and brought to this machine one at a time for as long as they are needed."""
 
+import os
 import re
 import tempfile
 from collections.abc import Callable, Iterator
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from symrefine.errors import InputError
+from symrefine.files import brought
 
 # What file systems call the things that change with a file.
 _CHANGING = ("size", "mtime", "ETag", "etag", "Last-Modified", "LastModified", "last_modified")
@@ -47,17 +49,50 @@ def listed(url: str, wanted: Callable[[Path], bool], *, recursive: bool) -> dict
 
 @contextmanager
 def fetched(url: str) -> Iterator[Path]:
-    """A copy of a file on this machine, of the same name, as long as this lasts.
+    """A copy of a file on this machine, of the same name, as long as this lasts; what it names beside it comes, too.
 
     Raises:
         InputError: it cannot be had.
     """
     system, path = _reached(url)
     with tempfile.TemporaryDirectory(prefix="symrefine-") as folder:
-        copy = Path(folder, path.rstrip("/").rpartition("/")[2])
+        # In folders as there, for what it names may lie in one above or beside its own.
+        copy = Path(folder, *(part for part in path.split("/") if part not in ("", ".", "..")))
+        copy.parent.mkdir(parents=True, exist_ok=True)
         with _told(url):
             system.get_file(path, str(copy))
-        yield copy
+
+        def bring(file: Path) -> None:
+            place = Path(os.path.normpath(file))
+            if not place.is_relative_to(folder):
+                return
+            name = os.path.relpath(place, copy.parent)
+            there = _joined(path, name)
+            with _told(beside(url, name)):
+                if system.isfile(there):
+                    place.parent.mkdir(parents=True, exist_ok=True)
+                    system.get_file(there, str(place))
+
+        with brought(bring):
+            yield copy
+
+
+def beside(url: str, name: str) -> str:
+    """The address of a file by its place from the folder of another; of "." the folder itself."""
+    path, *rest = url.partition("::")
+    return f"{_joined(path, name)}{''.join(rest)}"
+
+
+def _joined(path: str, name: str) -> str:
+    folder = _above(path)
+    for part in Path(name).parts:
+        folder = _above(folder) if part == ".." else f"{folder}{part}/"
+    return folder.rstrip("/")
+
+
+def _above(path: str) -> str:
+    """The folder of a path, with the slash at its end; empty where it has none."""
+    return path[: path.rstrip("/").rfind("/") + 1]
 
 
 def state(url: str) -> str:

@@ -2,13 +2,15 @@
 
 import io
 import json
+import os
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 from urllib.parse import unquote
 
-from symrefine.errors import InputError
-from symrefine.files import ask
+from symrefine.errors import InputError, about
+from symrefine.files import ask, file_bytes
 from symrefine.load.content import Content
+from symrefine.load.image import LARGEST_FILE
 from symrefine.load.scene import flattened
 from symrefine.load.text import shorten
 
@@ -54,9 +56,11 @@ def _read(data: bytes, text: bytes, kind: str, path: Path, *, texture: bool) -> 
 
     try:
         scene = trimesh.load_scene(
-            io.BytesIO(data), file_type=kind, resolver=trimesh.resolvers.FilePathResolver(str(path.absolute())),
+            io.BytesIO(data), file_type=kind, resolver=cast("Any", _Beside(path.parent, tree)),
             process=False, skip_materials=not texture,
         )  # fmt: skip
+    except InputError:
+        raise
     except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
         reason = str(error) or "its parts contradict one another"
         raise InputError(f"glTF cannot be read: {type(error).__name__}: {shorten(reason, 80)}") from None
@@ -129,6 +133,42 @@ def _beside(tree: Json, *kinds: str) -> list[str]:
     """Names of the files that a text refers to; others of these kinds lie in it."""
     uris = [thing.get("uri") for kind in kinds for thing in _objects(tree, kind)]
     return [unquote(uri) for uri in uris if isinstance(uri, str) and not uri.startswith("data:")]
+
+
+class _Beside:
+    """The files beside a glTF text, as trimesh asks for them: of a buffer no more than it is said to have.
+
+    Trimesh's own would wait for a pipe, and hold all of a file of any size.
+    """
+
+    def __init__(self, folder: Path, tree: Json) -> None:
+        self._folder, self._lengths = folder, dict[str, int]()
+        for number, buffer in enumerate(_objects(tree, "buffers")):
+            uri: Any = buffer.get("uri")
+            length: Any = buffer.get("byteLength")
+            if not isinstance(uri, str | None):
+                raise InputError(f"buffer {number} has uri {shorten(str(uri))}; expected the name of a file")
+            if not _is_whole(length, 1):
+                raise InputError(f"buffer {number} has byteLength {length!r}; expected a whole number from 1")
+            if uri is not None:
+                self._lengths[uri] = max(length, self._lengths.get(uri, 0))
+
+    def __getitem__(self, uri: str) -> bytes:
+        length = self._lengths.get(uri)
+        with about(f"{'image' if length is None else 'buffer'} {shorten(uri)}"):
+            if uri.startswith("data:"):
+                raise InputError("is no data in base64")
+            name = Path(unquote(uri))
+            if name.is_absolute() or ".." in Path(os.path.normpath(name)).parts:
+                raise InputError("lies outside of the folder of the file; move it there")
+            if length is None:
+                return file_bytes(self._folder / name, most=LARGEST_FILE)
+            data = file_bytes(self._folder / name, first=length)
+            if len(data) < length:
+                raise InputError(f"has {len(data):,} bytes; expected {length:,}, its byteLength")
+            return data
+
+    get = __getitem__
 
 
 def _check_textures(tree: Json, folder: Path) -> None:

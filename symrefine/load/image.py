@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 FORMATS = {".bmp": "BMP", ".jpeg": "JPEG", ".jpg": "JPEG", ".png": "PNG"}
 # More pixels add nothing to the moments, only gigabytes.
 LARGEST = 2**24
+# Bytes of the file of such a picture beside a mesh: four channels of 16 bits, not packed, and as much again.
+LARGEST_FILE = 2**28
 _LUMA = (0.299, 0.587, 0.114)
 _DEEP = {"I;16": 65535.0, "I;16B": 65535.0, "I;16L": 65535.0, "I": 65535.0}
 # Of a histogram: as many as a byte has grey values.

@@ -11,7 +11,7 @@ from symrefine.errors import InputError, about
 from symrefine.files import file_bytes
 from symrefine.geometry import Array
 from symrefine.load.content import Paint, Polygons
-from symrefine.load.image import FORMATS, check_size, open_image
+from symrefine.load.image import FORMATS, LARGEST_FILE, check_size, open_image
 from symrefine.load.text import numbered_lines, shorten
 from symrefine.shape import Index
 from symrefine.texture import Pixels, Texture
@@ -41,7 +41,8 @@ def read_images(paths: Sequence[Path]) -> tuple[Pixels, ...]:
         with about(f"texture {path}"):
             if path.suffix.lower() not in FORMATS:
                 raise InputError(f"unknown suffix {path.suffix!r}; known are {' '.join(sorted(FORMATS))}")
-            made.append(np.asarray(open_image(file_bytes(path), path.suffix.lower()).convert("RGB"), dtype=np.uint8))
+            image = open_image(file_bytes(path, most=LARGEST_FILE), path.suffix.lower())
+            made.append(np.asarray(image.convert("RGB"), dtype=np.uint8))
             check_total(made)
     return tuple(made)
 
@@ -79,7 +80,7 @@ def read_materials(path: Path) -> dict[str, Material]:
     found: dict[str, Material] = {}
     name = None
     with about(str(path)):
-        for number, text in numbered_lines(file_bytes(path), comment="#"):
+        for number, text in numbered_lines(file_bytes(path, most=LARGEST_FILE), comment="#"):
             keyword, _, rest = text.replace("\t", " ").partition(" ")
             rest = rest.strip()
             if keyword == "newmtl":
