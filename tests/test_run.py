@@ -12,6 +12,7 @@ import pytest
 from symrefine.cli import invoke
 
 EXPERIMENT = """
+import os
 import time
 from dataclasses import dataclass
 
@@ -25,7 +26,7 @@ class Case:
 
 
 def run(case):
-    time.sleep(case.wait)
+    time.sleep(case.wait if case.seed < 5 else float(os.environ.get("HELD", case.wait)))
     if case.seed == 3:
         raise InputError("three is\\nrefused")
     return {"third": case.seed / 3}
@@ -121,9 +122,10 @@ def test_mistakes_are_one_line_and_write_nothing(
     assert [p for p in sorted(config.parent.iterdir()) if p.name != "__pycache__"] == before
 
 
-def start(config: Path, out: str, *options: str) -> "subprocess.Popen[bytes]":
+def start(config: Path, out: str, *options: str, **environment: str) -> "subprocess.Popen[bytes]":
     command = [sys.executable, "-m", "symrefine", "run", str(config), "--out", out, *options]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
+    pipe, surroundings = subprocess.PIPE, os.environ | environment
+    return subprocess.Popen(command, stdout=pipe, stderr=pipe, env=surroundings, start_new_session=True)
 
 
 def rows_done(path: Path) -> int:
@@ -133,9 +135,9 @@ def rows_done(path: Path) -> int:
 @pytest.mark.skipif(os.name != "posix", reason="kills a process")
 @pytest.mark.parametrize(("kill", "workers"), [(signal.SIGKILL, "1"), (signal.SIGKILL, "2"), (signal.SIGINT, "2")])
 def test_killed_runs_lose_nothing_and_end_with_the_same_bytes(config: Path, kill: signal.Signals, workers: str) -> None:
-    slow = ("--set", "fixed.wait=0.3", "--workers", workers)
+    slow = ("--set", "fixed.wait=0.2", "--workers", workers)
     whole = start(config, "whole", *slow)
-    cut = start(config, "cut", *slow)
+    cut = start(config, "cut", *slow, HELD="60")  # the last of its tasks, lest it be done before it is killed
     journal = config.parent / "cut" / "journal.jsonl"
     deadline = time.monotonic() + 60
     while rows_done(journal) < 2 and time.monotonic() < deadline:
