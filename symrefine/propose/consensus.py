@@ -108,10 +108,10 @@ def _settled(matches: Matches, inside: Mask, within: float, det: int) -> tuple[t
     map_ = _fitted(matches, inside, det)
     for _ in range(ROUNDS):
         matrix, shift = map_
-        away = np.linalg.norm(matches.source @ matrix.T + shift - matches.target, axis=1)
+        off = matches.source @ matrix.T + shift - matches.target
         facing = np.abs(np.einsum("ij,ij->i", matches.source_normals @ matrix.T, matches.target_normals))
-        before, inside = inside, (away < within) & (facing > FACING)
-        if inside.sum() < 3 or (inside == before).all():
+        before, inside = inside, (np.einsum("ij,ij->i", off, off) < within**2) & (facing > FACING)
+        if np.count_nonzero(inside) < 3 or (inside == before).all():
             break
         map_ = _fitted(matches, inside, det)
     return map_, inside
@@ -120,9 +120,9 @@ def _settled(matches: Matches, inside: Mask, within: float, det: int) -> tuple[t
 def _fitted(matches: Matches, some: Mask, det: int) -> tuple[Array, Array]:
     """Least squares over some matches: orthogonal matrix of a determinant, and shift."""
     a, b = matches.source[some], matches.target[some]
-    moments = (b - b.mean(axis=0)).T @ (a - a.mean(axis=0))
-    matrix = det * orthogonal_factor(det * moments, proper=True)
-    return matrix, b.mean(axis=0) - matrix @ a.mean(axis=0)
+    a_mean, b_mean = a.sum(axis=0) / len(a), b.sum(axis=0) / len(b)
+    matrix = det * orthogonal_factor(det * (b - b_mean).T @ (a - a_mean), proper=True)
+    return matrix, b_mean - matrix @ a_mean
 
 
 def _same(map_: tuple[Array, Array], known: Proposal, within: float) -> bool:

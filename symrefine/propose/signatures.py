@@ -56,15 +56,17 @@ def mutual_matches(source: Array, target: Array, classes: tuple[Index, Index] | 
 
     Those come first that are least like a plane, which is like any other.
     """
-    # In single precision, which is quick and far finer than signatures are; numpy finds the least of rows, not columns.
+    # |a - b|^2 as one product, in single precision, which is quick and far finer than signatures are.
     a, b = source.astype(np.float32), target.astype(np.float32)
-    squares = (b**2).sum(axis=1) - 2.0 * (a @ b.T)
-    squares += (a**2).sum(axis=1)[:, None]
+    a_squares, b_squares = ((v * v).sum(axis=1, keepdims=True) for v in (a, b))
+    one, other = (np.ones_like(v) for v in (a_squares, b_squares))
+    squares = np.hstack([a, a_squares, one]) @ np.hstack([-2.0 * b, other, b_squares]).T
     if classes is not None:
         squares[classes[0][:, None] != classes[1]] = np.inf
-    nearest, back = squares.argmin(axis=1), np.ascontiguousarray(squares.T).argmin(axis=1)
-    found = back[nearest] == np.arange(len(source))
-    mutual = np.flatnonzero(found & np.isfinite(squares[np.arange(len(source)), nearest]))
+    nearest = squares.argmin(axis=1)
+    least = squares[np.arange(len(source)), nearest]
+    # The least of a column is that of its row too where both choose one another; numpy finds it faster than its place.
+    mutual = np.flatnonzero((least == squares.min(axis=0)[nearest]) & np.isfinite(least))
     turned = source.reshape(len(source), SHELLS, 3, BINS)[mutual, :, 1, -1].mean(axis=1)
     mutual = mutual[np.argsort(turned, kind="stable")]
     return mutual, nearest[mutual]

@@ -102,10 +102,11 @@ def _densest(directions: Array, feet: Array, worth: Array, told: int = TOLD) -> 
     if not some.any():
         return []
     cells, volume = _cells(directions, feet)
-    _, owner = np.unique(cells @ [1, 7, 7 * 64, 7 * 64**2, 7 * 64**3, 7 * 64**4], return_inverse=True)
-    density = np.bincount(owner, worth / volume)
+    owner = cells @ [1, 7, 7 * 64, 7 * 64**2, 7 * 64**3, 7 * 64**4]
     order = np.argsort(owner, kind="stable")
-    ends = np.searchsorted(owner[order], np.arange(len(density) + 1))
+    starts = np.flatnonzero(np.diff(owner[order], prepend=-1))
+    density = np.add.reduceat((worth / volume)[order], starts)
+    ends = np.append(starts, len(order))
     found: list[Vote] = []
     for cell in np.argsort(-density)[: 8 * told]:
         votes = order[ends[cell] : ends[cell + 1]]

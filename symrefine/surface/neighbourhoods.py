@@ -151,6 +151,16 @@ def connected_parts(one: Index, other: Index, count: int) -> Index:
     return np.asarray(connected_components(links, directed=False)[1])
 
 
+def renumbered(chosen: Index, count: int) -> tuple[Index, Index]:
+    """Which of `count` indices are chosen, ascending, and the place among them of each that is, of any shape.
+
+    As `numpy.unique` tells with the inverse, ten times as fast.
+    """
+    is_chosen = np.zeros(count, dtype=bool)
+    is_chosen[chosen] = True
+    return np.flatnonzero(is_chosen), (np.cumsum(is_chosen) - 1)[chosen]
+
+
 def choose_neighbours(
     points: Array, tree: Tree, rng: np.random.Generator, *, probes: int = 120, thin: float = 0.0
 ) -> int:
@@ -180,7 +190,7 @@ def choose_neighbours(
 
 def planes_of(points: Array, near: Index) -> tuple[Array, Array, Array]:
     """Means, normals and variances (across first), all [M, 3], of neighbourhoods [M, k] of points [N, 3]."""
-    members, own = np.unique(near, return_inverse=True) if near.size < len(points) else (slice(None), near)
+    members, own = renumbered(near, len(points)) if near.size < len(points) else (slice(None), near)
     return fit_planes(_added(sums_of(points[members]), own.ravel(), np.arange(0, near.size + 1, near.shape[1])))
 
 

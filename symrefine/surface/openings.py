@@ -19,6 +19,7 @@ from symrefine.surface.neighbourhoods import (
     Neighbourhoods,
     connected_parts,
     planes_of,
+    renumbered,
     smallest_eigenvectors,
     spreads_of,
 )
@@ -134,7 +135,7 @@ class Openings:
         if not begins.any():
             return covered
         patch = connected_parts(one[leave & ~begins], other[leave & ~begins], len(moved))
-        rim, back = np.unique(other[begins], return_inverse=True)
+        rim, back = renumbered(other[begins], len(moved))
         classes = cloud.classes(slice(None, None, stride))
         _, target = there_cloud.nearest(moved[rim], None if classes is None else classes[rim])
         there, here = there_openings.border[target][back], self.border[::stride][rim][back]

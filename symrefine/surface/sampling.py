@@ -4,6 +4,7 @@ A few thousand of the points tell whether there is anything to be done at all; o
 decided here depends on the surroundings of a point alone, so that it breaks no symmetry.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,7 +70,8 @@ def sampling(
     looks for either. `asked` of the points tell whether there is anything to be done. Of points that fill a volume none
     is set apart, and all are kept.
     """
-    kept: Index = np.arange(len(points))
+    size = len(points)
+    kept: Index = np.arange(size)
     taken: list[Index] = []
     lone: list[Index] = []
     if len(points) <= AROUND or points.std() == 0.0:
@@ -85,16 +87,16 @@ def sampling(
         around = around_some(points[kept], rng, asked)
     if outliers and groups and apart and (found := clumps(points[kept], around)):
         taken += [kept[c] for c in found]
-        kept = np.setdiff1d(kept, np.concatenate(taken))
+        kept = _without(kept, taken, size)
         around = around_some(points[kept], rng)
     if outliers and groups:
         lone = [kept[b] for b in filled(points[kept], around, rng)]
     if blobs and lone:
         taken += lone
-        kept = np.setdiff1d(kept, np.concatenate(lone))
+        kept = _without(kept, lone, size)
         kept = kept[_without_strays(points[kept])]  # the rim of what fills a volume is alone once that is gone
         around = around_some(points[kept], rng)
-    strays = np.setdiff1d(np.arange(len(points)), np.concatenate([kept, *taken]))
+    strays = _without(np.arange(size), [kept, *taken], size)
     even, shares = _evened(points[kept], rng) if _is_uneven(around) else (slice(None), None)
     return Sampling(
         kept=kept,
@@ -104,6 +106,13 @@ def sampling(
         clumps=tuple(taken),
         blobs=() if blobs else tuple(lone),
     )
+
+
+def _without(indices: Index, parts: Sequence[Index], size: int) -> Index:
+    """Those of indices below `size` that are in none of some parts."""
+    left = np.ones(size, dtype=bool)
+    left[np.concatenate(parts)] = False
+    return indices[left[indices]]
 
 
 def _without_strays(points: Array) -> Index:

@@ -7,7 +7,7 @@ import numpy as np
 
 from symrefine.geometry import Array, Mask
 from symrefine.shape import Index
-from symrefine.surface.neighbourhoods import planes_of, thickness_of
+from symrefine.surface.neighbourhoods import planes_of, renumbered, thickness_of
 from symrefine.surface.tree import Tree
 
 # Points that are asked first, and neighbours that tell of the surroundings of a point.
@@ -74,4 +74,5 @@ def around_some(points: Array, rng: np.random.Generator, asked: int = ASKED) -> 
 def some_of(points: Array, rng: np.random.Generator, asked: int = ASKED) -> Index:
     """Indices of so many of points [N, 3] at random, and of the farthest, lest a few strays are missed."""
     away = ((points - np.median(points, axis=0)) ** 2).sum(axis=1)
-    return np.union1d(rng.permutation(len(points))[:asked], np.argpartition(away, -1 - AROUND)[-AROUND:])
+    asked_or_far = np.concatenate([rng.permutation(len(points))[:asked], np.argpartition(away, -1 - AROUND)[-AROUND:]])
+    return renumbered(asked_or_far, len(points))[0]
