@@ -16,11 +16,14 @@ from symrefine.errors import DegenerateShapeError
 from symrefine.fit.placed import Operations, Placed, common_center, elements
 from symrefine.fit.refine import SPREAD, Iterate, refine
 from symrefine.fit.vertices import ROUNDED
-from symrefine.geometry import Array, Isometry, frame_with_z
+from symrefine.geometry import Array, Axis, Isometry, frame_with_z, rotation
 from symrefine.groups import PointGroup, from_elements, is_subgroup
+from symrefine.propose.folds import fold_candidates
 from symrefine.propose.votes import AGREE_RAD
 from symrefine.surface.misses import LIMITS, SHARES, Deviation
+from symrefine.surface.skin import Skin
 from symrefine.surface.surface import Coverage, Surface
+from symrefine.surface.wedge import Wedge
 
 # Local planes that are moved: at a glance by each operation, in a fit at least; in a look by all together; in a fit and
 # when judged by all together (a quarter of that by each at most), and when judged by each at least: 0.6 % of fewer are
@@ -206,7 +209,54 @@ def _placed(
         most = max(e.coverage.unseen for e in partly)
         if partial < need and (surface.openings.cameras or surface.openings.clumps or most > SHARES[1]):
             found, need = partly, partial
+    if least == MOVED_EACH:
+        found, need = _closely_judged(surface, found, need)
     return Hypothesis(placed=placed, elements=found, need=need, history=history, before=before)
+
+
+def _closely_judged(surface: Surface, found: tuple[Element, ...], need: float) -> tuple[tuple[Element, ...], float]:
+    """The elements of a group that seems to hold, and what it needs, by what one wedge about an axis tells of them.
+
+    There it shows which way details lean that are finer than neighbourhoods, and, of what seems round, teeth.
+    """
+    if surface.skin is None or need > surface.tolerance:
+        return found, need
+    turns = [e for e in found if e.operations.kind == "axis"]
+    highest = max((e.operations.order for e in turns), default=0.0)
+    for axis in (e for e in turns if e.operations.order == highest):
+        about = Axis(direction=axis.operations.direction, point=axis.center)
+        fold = _fold(surface.skin, about)
+        if fold and (len(found) > 1 or math.isinf(highest)) and not surface.looked_about(about, fold):
+            # Turns alone tell their axis best.
+            start = PointGroup(name=f"C{fold}", frame=frame_with_z(about.direction))
+            fitted(surface, Placed(group=start, center=about.point))
+        exact = axis.need <= exact_need(surface.floor) and math.isfinite(highest)
+        surface.look_about(about, fold or (int(highest) if exact else 0))
+    hidden = exact_need(surface.floor)  # noise puts the fit itself so far off
+    for wedge in surface.wedges if found else ():
+        each = [_telling(e, wedge) for e in found]
+        told = wedge.needs(
+            [m for motions in each for m in motions], surface.diagonal, open_=surface.openings is not None
+        )
+        ends = np.cumsum([len(motions) for motions in each])
+        told[told <= hidden] = 0.0
+        own = [float(part.max()) for part in np.split(told, ends[:-1])]
+        found = tuple(replace(e, need=max(e.need, n)) for e, n in zip(found, own, strict=True))
+    return found, max(need, *(e.need for e in found))
+
+
+def _telling(element: Element, wedge: Wedge) -> tuple[Isometry, ...]:
+    """The operations that tell of an element; of what is round about the axis of a wedge, one that swaps its halves."""
+    if math.isfinite(element.operations.order):
+        return element.operations.motions(element.center)
+    return (Isometry.about(element.center, rotation(element.operations.direction, 0.5 * wedge.pitch)),)
+
+
+def _fold(skin: Skin, axis: Axis) -> int:
+    """How often a surface repeats about an axis, as the azimuths of its points tell; 0 if they do not."""
+    points = skin.points - axis.point
+    told = fold_candidates(points, np.ones(len(points)), axis.direction)
+    return told[0].fold if told else 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -288,7 +288,7 @@ def _surface(
     if tree is not None and normals is None and fills_volume(local, tree, np.random.default_rng(0)):
         return _volume(local, labels, rng)
     uneven = None if exact or np.ptp(weights) == 0.0 else weights
-    whole = make_skin(local, rng, normals=normals, exact=exact, tree=tree)
+    whole = make_skin(local, rng, normals=normals, labels=labels, exact=exact, tree=tree)
 
     def half(some: Index) -> LocalPlanes:
         # As many neighbours as in the whole, so that noise is the same.
@@ -300,14 +300,15 @@ def _surface(
     # Neighbours stand together in memory, and any stride takes an even part of the surface.
     pick = pick[side_by_side(local[pick])]
     near = whole.near(pick, NEIGHBOURS) if len(local) >= NEIGHBOURS else None
-    cloud = whole.local_planes(pick, labels, near)
+    cloud = whole.local_planes(pick, near=near)
     diagonal = tight_diagonal(cloud.points)
     if exact:
         others = np.delete(np.arange(len(local)), pick)
         noise = sampling_distances(cloud, local[others], None if labels is None else labels[others])
     else:
         noise = noise_distances(len(local), half, rng)
-    surface = Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, tolerance=tolerance)
+    skin = None if exact else whole
+    surface = Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, skin=skin, tolerance=tolerance)
     # Where noise alone needs all that is allowed, nobody sees what is open.
     if tree is not None and (surface.floor < tolerance or views):
         surface = replace(surface, openings=openings(cloud, local, tree, views, near, clumps=hiding))

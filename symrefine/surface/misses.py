@@ -70,7 +70,7 @@ class Deviation:
 NO_MISS = Deviation(mean=0.0, p95=0.0, p99=0.0, max=0.0)
 
 
-def needs(misses: Array, noise: Array, tests: int = 1) -> Array:
+def needs(misses: Array, noise: Array, tests: int = 1, redundancy: float = 1.0) -> Array:
     """The smallest tolerances [...], fractions of the diagonal, at which misses [..., N] still count as symmetric.
 
     What noise alone explains is taken away, with what samples leave uncertain: from the mean in squares, as noise and
@@ -80,13 +80,14 @@ def needs(misses: Array, noise: Array, tests: int = 1) -> Array:
         misses: distances, fractions of the diagonal; NaN where nobody looked.
         noise: [M] misses that noise alone shows, in ascending order; none if empty.
         tests: of how many operations the worst counts: the more, the farther off one of them is by chance.
+        redundancy: how many misses are as good as one, as points take part in so many planes.
     """
     farthest = -np.sort(-misses, axis=-1)  # what is unseen stands last
     count = np.maximum(np.isfinite(misses).sum(axis=-1, keepdims=True), 1)
     farthest = np.nan_to_num(farthest)
     mean, beyond = farthest.sum(axis=-1) / count[..., 0], np.arange(1, misses.shape[-1] + 1) / count
     if noise.size:
-        sampled = np.sqrt((SURE**2 + 2.0 * np.log(tests)) * (1.0 / count + 1.0 / noise.size))
+        sampled = np.sqrt((SURE**2 + 2.0 * np.log(tests)) * redundancy * (1.0 / count + 1.0 / noise.size))
         chance = 1.0 - np.searchsorted(noise, farthest, side="right") / noise.size
         beyond = beyond - chance - sampled * np.sqrt(chance * (1.0 - chance))
         mean = np.sqrt(np.maximum(mean**2 - (noise.mean() + sampled[..., 0] * noise.std()) ** 2, 0.0))
@@ -95,7 +96,7 @@ def needs(misses: Array, noise: Array, tests: int = 1) -> Array:
     details = [(share, limit, 0.0) for share, limit in zip(SHARES, LIMITS[1:], strict=True)]
     for share, limit, least in (*details, (SPECK, SPECK_LIMIT, clear)):
         by_chance = np.sqrt(2.0 * np.log(tests) * share * (1.0 - share) / count)
-        told = (beyond > share + by_chance) & (farthest > least)
+        told = (beyond > np.maximum(share + by_chance, (redundancy - 1.0) / count)) & (farthest > least)
         found.append((farthest * told).max(axis=-1) / limit)
     return np.asarray(reduce(np.maximum, found))
 
@@ -199,11 +200,15 @@ def noise_distances(
         count: points of the cloud.
         planes: the surface that some of them make, given their indices.
     """
-    order = rng.permutation(count)
-    halves = [np.sort(order[k::2]) for k in (0, 1)]
-    one, other = (planes(half) for half in halves)
+    one, other = (planes(half) for half in halves(count, rng))
     across = []
     for here, there in ((one, other), (other, one)):
         some = slice(None, None, max(1, len(there.points) // ASKED))
         across.append(disc_distances(here, there.points[some], there.classes(some)))
     return np.concatenate(across) / (HALVES_OF_VOLUME if one.body == "volume" else 1.0)
+
+
+def halves(count: int, rng: np.random.Generator) -> tuple[Index, Index]:
+    """The indices of two random halves of so many points, ascending."""
+    order = rng.permutation(count)
+    return np.sort(order[::2]), np.sort(order[1::2])

@@ -111,6 +111,22 @@ class LocalPlanes(Planes):
             tree=Tree(_with_class(points, self.labels)),
         )
 
+    def with_copies(self, points: Array, normals: Array) -> "LocalPlanes":
+        """The same surface, and behind it as many of its planes again elsewhere, [M, 3] and [M, 3]."""
+        labels = None if self.labels is None else np.tile(self.labels, 2)
+        every = np.concatenate([self.points, points])
+        return replace(
+            self,
+            points=every,
+            normals=np.concatenate([self.normals, normals]),
+            thickness=np.tile(self.thickness, 2),
+            flatness=np.tile(self.flatness, 2),
+            reach=np.tile(self.reach, 2),
+            redundancy=2.0 * self.redundancy,
+            tree=Tree(_with_class(every, labels)),
+            labels=labels,
+        )
+
     def shared_by(self, _: int) -> float:
         """How many of the planes each point takes part in, whichever of them are met."""
         return self.redundancy
@@ -157,8 +173,17 @@ class Skin:
     @cached_property
     def spacing(self) -> float:
         """Median distance from a point to the nearest other one."""
+        return self._reach(1)
+
+    @cached_property
+    def width(self) -> float:
+        """Radius of the neighbourhoods that planes are fitted to; 0 where points and normals are exact."""
+        return self._reach(self.neighbours - 1) if self.neighbours > 1 else 0.0
+
+    def _reach(self, neighbour: int) -> float:
+        """Median distance from a point to one of the others, counted by how near they are, from 1 on."""
         some = self.points[:: max(1, len(self.points) // PROBES)]
-        return float(np.median(self.tree.query(some, 1, skip=1)[0]))
+        return float(np.median(self.tree.query(some, 1, skip=neighbour)[0]))
 
     @cached_property
     def _neighbourhoods(self) -> Neighbourhoods:

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from symrefine.geometry import Array, Isometry, read_only
+from symrefine.geometry import Array, Axis, Isometry, read_only
 from symrefine.surface.drift import Drift
 from symrefine.surface.misses import (
     DISCS,
@@ -20,7 +20,8 @@ from symrefine.surface.misses import (
     spread_distance,
 )
 from symrefine.surface.openings import Openings
-from symrefine.surface.skin import LocalPlanes
+from symrefine.surface.skin import LocalPlanes, Skin
+from symrefine.surface.wedge import Wedge
 
 # Standard deviation over mean of the distance to the nearest of random points in a volume (Weibull, shape 3).
 NEAREST_SPREAD = 0.363
@@ -58,6 +59,8 @@ class Surface:
         noise: [M] misses that noise alone shows, fractions of the diagonal; none if empty.
         openings: where the surface is open, or None.
         drift: windows that tell of parts out of place, where noise is thick.
+        skin: the points that the local planes were fitted to; None where there is no more to be known of them.
+        wedges: what was folded of it so far, where details may be finer than neighbourhoods.
         tolerance: what is asked for, as a fraction of the diagonal: of a surface with openings, what misses by more
             than 95 % may meets no surface.
     """
@@ -67,10 +70,21 @@ class Surface:
     noise: Array = field(default_factory=lambda: np.empty(0))
     openings: Openings | None = None
     drift: Drift | None = None
+    skin: Skin | None = None
+    wedges: list[Wedge] = field(default_factory=list)
     tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "noise", read_only(np.sort(self.noise)))
+
+    def look_about(self, axis: Axis, fold: int) -> None:
+        """Fold it about an axis of so many folds, unless it was, or neighbourhoods are small enough without."""
+        if self.skin is not None and fold > 1 and not self.looked_about(axis, fold):
+            self.wedges.extend(Wedge.of(self.skin, axis, fold))
+
+    def looked_about(self, axis: Axis, fold: int) -> bool:
+        """Whether it was folded so often about an axis, as near as neighbourhoods tell."""
+        return any(w.is_about(axis, fold) for w in self.wedges)
 
     @property
     def far(self) -> float:
