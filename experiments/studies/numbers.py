@@ -117,6 +117,7 @@ KIND_OF = {
         "surface.surface": "PATCHES PIECES HOPELESS WINDOWS WINDOWS_EACH",
         "surface.surroundings": "ASKED AROUND",
         "surface.tree": "LEAF ROW",
+        "surface.wedge": "PLANES ACROSS PARTS",
         "texture": "_CELL",
     },
     "rounding": {

@@ -17,14 +17,13 @@ from symrefine.surface.skin import LocalPlanes, Skin, drawn
 
 # Local planes of a wedge.
 PLANES = 4000
-# Neighbourhoods side by side that a wedge has to be wide for what leans in it to be seen: two for each half of the
-# second harmonic, the first that tells a wedge from its mirror image.
+# Neighbourhoods side by side that a wedge has to be wide for what leans in it to be seen without folding: two for each
+# half of the second harmonic, the first that tells a wedge from its mirror image. With more wider wedges are folded too.
 ACROSS = 4.0
 # Turns that are the same to so small a part of a wedge are one.
 PARTS = 16
-# See `_kind`, and that of turns by whole wedges.
+# See `_kind`.
 Kind = tuple[int, int, int]
-WHOLE: Kind = (1, 1, 0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -98,7 +97,7 @@ class Wedge:
         told = {
             k: m for k, m in zip(kinds, known, strict=True) if m is not None and not (open_ and m.matrix[2, 2] < 0.0)
         }
-        told.pop(WHOLE, None)
+        told.pop((1, 1, 0), None)  # turns by whole wedges
         if not told:
             return np.zeros(len(motions))
         moved = [_into(m.apply(_own(self.cloud)), self.pitch)[0] for m in told.values()]
