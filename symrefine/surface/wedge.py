@@ -17,8 +17,8 @@ from symrefine.surface.skin import LocalPlanes, Skin, drawn
 
 # Local planes of a wedge.
 PLANES = 4000
-# Neighbourhoods side by side that a wedge has to be wide for what leans in it to be seen without folding: two for each
-# half of the second harmonic, the first that tells a wedge from its mirror image. With more wider wedges are folded too.
+# Neighbourhoods side by side that a wedge has to be wide for what leans in it to be seen as it is: two for each half of
+# the second harmonic, the first that tells a wedge from its mirror image. With more, wider wedges are folded too.
 ACROSS = 4.0
 # Turns that are the same to so small a part of a wedge are one.
 PARTS = 16
