@@ -289,7 +289,73 @@ def test_two_models_of_one_object_are_refused(run: Run, models: Path, tmp_path: 
     shutil.copy(folder / "obj_000004.ply", folder / "obj_4.ply")
     assert "is object 4, and so is" in run(folder=folder, to=tmp_path / "new")[2]
     assert not (tmp_path / "new").exists()
-    assert "no model in it" in run(folder=tmp_path)[2]
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    assert "no mesh and no cloud in it" in run(folder=empty)[2]
+
+
+def test_models_of_other_names_are_numbered_and_keep_their_numbers(run: Run, models: Path, tmp_path: Path) -> None:
+    folder, to = tmp_path / "models", tmp_path / "new"
+    folder.mkdir()
+    for name, number in {"crate": 1, "wedge": 12}.items():
+        shutil.copy(models / f"obj_{number:06d}.ply", folder / f"{name}.ply")
+    status, _, said = run("--accept", 0.5, folder=folder, to=to)
+    assert status == 0
+    assert "no name tells a number" in said
+    numbers = {entry["file"]: entry["object"] for entry in of(to, "labels.json")["objects"]}
+    assert numbers == {"crate.ply": 1, "wedge.ply": 2}
+    choice = saved(tmp_path / "choice.json", decided(to, 2, note="seen"))
+    assert run("--decisions", choice, folder=folder, to=to)[0] == 0
+    shutil.copy(models / "obj_000004.ply", folder / "ashtray.ply")  # before all others by its name
+    before = rows(to)
+    assert run("--accept", 0.01, folder=folder, to=to)[0] == 0
+    told = {entry["file"]: entry for entry in of(to, "labels.json")["objects"]}
+    assert {name: entry["object"] for name, entry in told.items()} == numbers | {"ashtray.ply": 3}
+    assert (told["wedge.ply"]["by"], told["wedge.ply"]["note"]) == ("person", "seen")
+    assert rows(to) == before | {3: rows(to)[3]}, "nothing is done again"
+    (folder / "obj_000007.ply").write_bytes((folder / "crate.ply").read_bytes())
+    assert run("--accept", 0.5, folder=folder, to=tmp_path / "named")[0] == 0
+    assert list(of(tmp_path / "named", "models_info.json")) == ["7"], "a name that tells a number counts alone"
+
+
+def test_numbers_that_somebody_changed_are_refused(run: Run, models: Path, tmp_path: Path) -> None:
+    folder, to = tmp_path / "models", tmp_path / "new"
+    folder.mkdir()
+    shutil.copy(models / "obj_000001.ply", folder / "crate.ply")
+    assert run(folder=folder, to=to)[0] == 0
+    for damage in ("", "[]", '{"objects": [{"file": "crate.ply", "object": "1"}], "open": []}', '{"objects": 1}'):
+        (to / "labels.json").write_text(damage)
+        before = {path: path.read_bytes() for path in to.rglob("*") if path.is_file()}
+        status, said, error = run(folder=folder, to=to)
+        assert (status, said) == (2, "")
+        assert "labels.json: is no longer what `symrefine label` wrote" in error
+        assert before == {path: path.read_bytes() for path in to.rglob("*") if path.is_file()}
+
+
+@pytest.mark.slow
+def test_workers_and_a_cluster_write_the_same_labels(models: Path, first: Path, tmp_path: Path) -> None:
+    for name, options in {"two": ["--workers", "2"], "cluster": ["--dask", "local", "--workers", "2"]}.items():
+        assert invoke(["label", str(models), "--out", str(tmp_path / name), *options, "-q"]) == 0
+        assert rows(tmp_path / name) == rows(first)
+        for result in ("models_info.json", "labels.json"):
+            assert (tmp_path / name / result).read_bytes() == (first / result).read_bytes()
+        assert {p.name: p.read_bytes() for p in (tmp_path / name / "pictures").iterdir()} == {
+            p.name: p.read_bytes() for p in (first / "pictures").iterdir()
+        }
+
+
+def test_an_object_beyond_its_limit_is_open_with_the_reason_and_done_again_without(
+    run: Run, tmp_path: Path, models: Path
+) -> None:
+    to = tmp_path / "new"
+    status, said, _ = run("--time-limit", 0.001, to=to)
+    assert status == 1
+    assert "3 failed" in said
+    assert all("0.001 s, the limit of time" in entry["why"] for entry in of(to, "labels.json")["open"])
+    lines = (to / "objects.jsonl").read_text()
+    assert run("--time-limit", 0.001, to=to)[0] == 1
+    assert (to / "objects.jsonl").read_text() == lines, "lost under the same limit, it is not tried again"
+    assert run(to=to)[0] == 0
 
 
 def test_a_person_decides_where_noise_hides_the_answer(run: Run, tmp_path: Path) -> None:

@@ -21,11 +21,23 @@ _BYTES = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "ki": 2**10, "mi": 2**20, "
 
 
 def add_fleet_options(parser: argparse.ArgumentParser, task: str) -> None:
-    """The options that say how many tasks are done.
+    """The options that say how many tasks are done, and which.
 
     Args:
         task: what one is called: "file".
     """
+    add_executor_options(parser, task)
+    parser.add_argument(
+        "--shard",
+        type=shard,
+        metavar="I/N",
+        help=f"only every N-th {task}, from the I-th one on; `symrefine merge` makes one of the N parts",
+    )
+    add_table_option(parser)
+
+
+def add_executor_options(parser: argparse.ArgumentParser, task: str) -> None:
+    """The options that say where tasks are done, and what one may take."""
     parser.add_argument(
         "--workers",
         type=count,
@@ -37,12 +49,6 @@ def add_fleet_options(parser: argparse.ArgumentParser, task: str) -> None:
         metavar="ADDRESS",
         help="do them on a cluster of Dask: tcp://host:port of its scheduler, or `local` for one of --workers on this "
         "machine; needs the extra dask",
-    )
-    parser.add_argument(
-        "--shard",
-        type=shard,
-        metavar="I/N",
-        help=f"only every N-th {task}, from the I-th one on; `symrefine merge` makes one of the N parts",
     )
     parser.add_argument(
         "--time-limit",
@@ -57,7 +63,6 @@ def add_fleet_options(parser: argparse.ArgumentParser, task: str) -> None:
         help=f"what the process of one {task} may hold, libraries (0.3GB) included, such as 2GB or 512MiB; on Linux "
         "(default: no limit)",
     )
-    add_table_option(parser)
 
 
 def add_table_option(parser: argparse.ArgumentParser) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from symrefine.cli.fleet import add_executor_options, executor
 from symrefine.cli.inputs import failure
 from symrefine.cli.outputs import complain, is_quiet, note, print_lines, write_all
 from symrefine.cli.signs import progress
@@ -13,7 +14,6 @@ from symrefine.cli.values import (
     add_detection_options,
     add_frame_option,
     add_scan_options,
-    count,
     detection_options,
     millimetres,
     probability,
@@ -22,6 +22,7 @@ from symrefine.errors import InputError, about, one_line
 from symrefine.files import pieces_writer, text_writer, whole
 
 if TYPE_CHECKING:
+    from symrefine.fleet.crew import Executor
     from symrefine.fleet.journal import Journal
     from symrefine.fleet.limits import Lost
     from symrefine.review.decisions import Decisions
@@ -32,12 +33,12 @@ if TYPE_CHECKING:
 
 HELP = "label the symmetries of a data set: detect all, and have a person decide the doubtful ones on a page"
 DESCRIPTION = (
-    "Detect the symmetries of all models in DIR, named as BOP does (obj_000001.ply is object 1), and write to a "
-    "folder: models_info.json with the symmetries of all that are settled, labels.json with who settled them and what "
-    "is still open, and review.html, a page that needs no server, on which a person chooses the group of each object "
-    "and saves the choices as decisions.json. Run again with --decisions they are applied, and kept in the folder. An "
-    "object is settled where a person decided it, or its confidence is that of --accept; no other has an entry in "
-    "models_info.json. What was detected is not detected again."
+    "Detect the symmetries of all models in DIR, named as BOP does (obj_000001.ply is object 1) or else numbered in "
+    "the order of their names, and write to a folder: models_info.json with the symmetries of all that are settled, "
+    "labels.json with who settled them and what is still open, and review.html, a page that needs no server, on which "
+    "a person chooses the group of each object and saves the choices as decisions.json. Run again with --decisions "
+    "they are applied, and kept in the folder. An object is settled where a person decided it, or its confidence is "
+    "that of --accept; no other has an entry in models_info.json. What was detected is not detected again."
 )
 # Of a group that was not found: the least probability that is worth a word.
 _WORTH = 0.01
@@ -47,7 +48,12 @@ Job = tuple["Row", str, str]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("dir", metavar="DIR", help="folder of models: obj_000001.ply is object 1")
+    parser.add_argument(
+        "dir",
+        metavar="DIR",
+        help="folder of models: obj_000001.ply is object 1; where no name is like that, all are numbered from 1 on, "
+        "and keep their numbers",
+    )
     parser.add_argument("--out", required=True, metavar="FOLDER", help="where the labels go; it is made if not there")
     parser.add_argument("--decisions", metavar="FILE", help="apply these choices, saved from the page of the review")
     parser.add_argument(
@@ -59,9 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scale", type=millimetres, metavar="X", help="millimetres in one unit of the files (default: 1)"
     )
-    parser.add_argument(
-        "--workers", type=count, default=1, metavar="N", help="files done at the same time (default: %(default)s)"
-    )
+    add_executor_options(parser, "file")
     add_class_options(parser)
     add_frame_option(parser, otherwise="there has to be one; files that hold one are taken as they are")
     add_scan_options(parser)
@@ -77,15 +81,18 @@ def run(args: argparse.Namespace) -> int:
     from symrefine.review.decisions import read_decisions
     from symrefine.review.labels import labelled, merged
     from symrefine.review.objects import doubtful_first
-    from symrefine.review.store import DECISIONS, heads, opened
+    from symrefine.review.store import DECISIONS, LABELS, heads, numbers_before, opened
 
-    models, out = models_of(Path(args.dir)), Path(args.out)
+    does, out = executor(args), Path(args.out)
+    models, is_told = models_of(Path(args.dir), numbers_before(out))
+    if not is_told:
+        note(f"{args.dir}: no name tells a number, as obj_000001.ply does; {out / LABELS} has those that were given")
     asked = heads(models, detection_options(args), float(args.scale or 1.0))
     given = read_decisions(Path(args.decisions)) if args.decisions else {}
     _check(args.decisions, given, asked)
     with opened(out) as held:
         kept = read_decisions(out / DECISIONS) if (out / DECISIONS).is_file() else {}
-        rows = _detected(args, asked, held)
+        rows = _detected(args, does, asked, held)
         _check(args.decisions, given, rows)
         decisions = merged(_fitting(kept, rows, out / DECISIONS), given)
         labels = labelled(rows, decisions, args.accept)
@@ -116,9 +123,8 @@ def _fitting(kept: "Decisions", rows: "Rows", place: Path) -> "Decisions":
     return {number: decision for number, decision in kept.items() if not told[number]}
 
 
-def _detected(args: argparse.Namespace, asked: "Rows", held: "Journal") -> "Rows":
+def _detected(args: argparse.Namespace, does: "Executor", asked: "Rows", held: "Journal") -> "Rows":
     """The rows of all objects, on disk; those that still tell of their files are not made again."""
-    from symrefine.fleet.crew import on_this_machine
     from symrefine.fleet.tasks import finish
     from symrefine.review.store import ROWS, holds
 
@@ -126,11 +132,11 @@ def _detected(args: argparse.Namespace, asked: "Rows", held: "Journal") -> "Rows
     if held.torn:
         note(f"{out / ROWS}: the last row is incomplete; it is removed and done again")
     latest = held.latest
-    kept = {n: None for n, row in asked.items() if holds(out, cast("Row | None", latest.get(n)), row)}
+    kept = {n: None for n, row in asked.items() if holds(out, cast("Row | None", latest.get(n)), row, does.limits)}
     jobs = [(row, args.dir, args.out) for number, row in asked.items() if number not in kept]
     print_lines(_line(row) for row in cast("Rows", held.among(kept)).values())
     with progress("detecting", len(asked), len(kept)) as advance:
-        for made in finish(on_this_machine(args.workers, tell=note), examine_model, jobs, lost, held):
+        for made in finish(does, examine_model, jobs, lost, held):
             row = cast("Row", made)
             if is_quiet() and row["error"] is not None:
                 complain(row["error"])

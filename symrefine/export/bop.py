@@ -143,25 +143,40 @@ def number_of(name: str) -> int | None:
     return int(match[1]) if match else None
 
 
-def models_of(folder: Path) -> dict[int, Path]:
-    """The models of a folder by their number, as BOP names them: object 1 is obj_000001.ply. What else is there stays.
+def models_of(folder: Path, known: Mapping[str, int] | None = None) -> tuple[dict[int, Path], bool]:
+    """The models of a folder by their number, and whether their names tell it.
+
+    Where a name is as BOP gives them, object 1 is obj_000001.ply, the numbers are theirs, and what else is there stays.
+    Where none is, all count: a model keeps the number that it had, and the others go on from there, from 1 if there is
+    none, in the order of their names.
+
+    Args:
+        known: numbers that models without such a name had before, by the names of their files.
 
     Raises:
-        InputError: no such folder, no such model, or two of one object.
+        InputError: no such folder, no model, or two of one object.
     """
     from symrefine.load import READERS, stem_of, suffix_of
 
     if not folder.is_dir():
         raise InputError(f"{folder}: {'is a file, not a' if folder.exists() else 'no such'} directory")
+    paths = sorted(p for p in folder.iterdir() if suffix_of(p) in READERS and p.is_file() and p.name[0] != ".")
+    if not paths:
+        raise InputError(f"{folder}: no mesh and no cloud in it; known are {' '.join(READERS)}, and .gz of each")
+    numbers = {path: number for path in paths if (number := number_of(stem_of(path))) is not None}
+    if is_told := bool(numbers):
+        paths = list(numbers)
+    else:
+        had = known or {}
+        numbers = {path: had[path.name] for path in paths if path.name in had}
+        new = (path for path in paths if path not in numbers)
+        numbers |= {path: number for number, path in enumerate(new, max(had.values(), default=0) + 1)}
     models: dict[int, Path] = {}
-    for path in sorted(p for p in folder.iterdir() if suffix_of(p) in READERS and p.is_file()):
-        if (number := number_of(stem_of(path))) is not None:
-            other = models.setdefault(number, path)
-            if other != path:
-                raise InputError(f"{path}: is object {number}, and so is {other.name}; keep one of them")
-    if not models:
-        raise InputError(f"{folder}: no model in it; object 1 is obj_000001.ply, or of another suffix that can be read")
-    return dict(sorted(models.items()))
+    for path in paths:
+        other = models.setdefault(numbers[path], path)
+        if other != path:
+            raise InputError(f"{path}: is object {numbers[path]}, and so is {other.name}; keep one of them")
+    return dict(sorted(models.items())), is_told
 
 
 def diameter(points: Array) -> float:

@@ -1,5 +1,6 @@
 """The folder of the labels of a data set: what was found in each object is kept there, and found again."""
 
+import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from hashlib import file_digest, sha256
@@ -8,9 +9,10 @@ from types import NoneType
 from typing import Any, cast
 
 from symrefine.errors import InputError
-from symrefine.files import check_target, naming
+from symrefine.files import check_target, file_bytes, naming
 from symrefine.fleet import journal
-from symrefine.fleet.tasks import our_version
+from symrefine.fleet.limits import Limits
+from symrefine.fleet.tasks import is_final, our_version
 from symrefine.load import IMAGES
 from symrefine.review.objects import Row, flaw
 
@@ -58,6 +60,25 @@ def opened(out: Path) -> Iterator[journal.Journal]:
         yield held
 
 
+def numbers_before(out: Path) -> dict[str, int]:
+    """The numbers that the labels in a folder give to the objects, by the names of their files; none without labels.
+
+    Raises:
+        InputError: somebody changed the labels.
+    """
+    path = out / LABELS
+    if not path.is_file():
+        return {}
+    try:
+        told = json.loads(file_bytes(path))
+        numbers = {entry["file"]: entry["object"] for entry in (*told["objects"], *told["open"])}
+    except (ValueError, RecursionError, LookupError, TypeError):
+        numbers = {"": None}
+    if not all(isinstance(name, str) and type(number) is int for name, number in numbers.items()):
+        raise InputError(f"{path}: is no longer what `symrefine label` wrote; name another folder")
+    return numbers
+
+
 def heads(models: Mapping[int, Path], options: dict[str, Any], scale: float) -> dict[int, Row]:
     """What names objects: number, file and content, the options, the version; nothing is known of them yet.
 
@@ -98,13 +119,18 @@ def _head(number: int, path: Path, options: dict[str, Any], scale: float, looks:
     return cast("Row", row)
 
 
-def holds(out: Path, row: Row | None, now: Row) -> bool:
+def holds(out: Path, row: Row | None, now: Row, limits: Limits) -> bool:
     """Whether a row made before still tells of its object, and its pictures are there.
+
+    Args:
+        out: the folder.
+        now: what names the object today.
+        limits: of today; what was lost under others is done again.
 
     Raises:
         InputError: it would, but somebody changed it.
     """
-    if row is None or now["sha256"] is None or row.get("lost") is not None:
+    if row is None or now["sha256"] is None or not is_final(cast("dict[str, Any]", row), limits):
         return False
     same = all(row.get(key) == now.get(key) for key in ("file", "sha256", "version", "options", "scale"))
     if not same or not all(_is_there(place_of_picture(out, row, k)) for k in range(len(row["choices"]))):
