@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,8 @@ class Case:
 
 
 def run(case):
+    with open(os.environ.get("BEGUN", os.devnull), "a") as begun:
+        begun.write(f"{case.seed}\\n")
     time.sleep(case.wait if case.seed < 5 else float(os.environ.get("HELD", case.wait)))
     if case.seed == 3:
         raise InputError("three is\\nrefused")
@@ -122,6 +125,14 @@ def test_mistakes_are_one_line_and_write_nothing(
     assert [p for p in sorted(config.parent.iterdir()) if p.name != "__pycache__"] == before
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """What is started is, though this process may run in the background of a shell, which has it ignore interrupts."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def start(config: Path, out: str, *options: str, **environment: str) -> "subprocess.Popen[bytes]":
     command = [sys.executable, "-m", "symrefine", "run", str(config), "--out", out, *options]
     pipe, surroundings = subprocess.PIPE, os.environ | environment
@@ -132,6 +143,7 @@ def rows_done(path: Path) -> int:
     return path.read_bytes().count(b"\n") if path.is_file() else 0
 
 
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.skipif(os.name != "posix", reason="kills a process")
 @pytest.mark.parametrize(("kill", "workers"), [(signal.SIGKILL, "1"), (signal.SIGKILL, "2"), (signal.SIGINT, "2")])
 def test_killed_runs_lose_nothing_and_end_with_the_same_bytes(config: Path, kill: signal.Signals, workers: str) -> None:
@@ -158,3 +170,22 @@ def test_killed_runs_lose_nothing_and_end_with_the_same_bytes(config: Path, kill
     assert cut.stderr is not None
     cut.stdout.close()
     cut.stderr.close()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="interrupts a process")
+def test_what_a_shell_keeps_from_interrupts_goes_on_with_its_workers(config: Path) -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        begun = config.parent / "begun"
+        whole = start(config, "whole", "--set", "fixed.wait=0.2", "--workers", "2", BEGUN=str(begun))
+        journal = config.parent / "whole" / "journal.jsonl"
+        deadline = time.monotonic() + 60
+        while rows_done(journal) < 1 and time.monotonic() < deadline:
+            time.sleep(0.01)
+        os.killpg(whole.pid, signal.SIGINT)
+        whole.communicate(timeout=60)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert whole.returncode == 1  # one of its tasks is refused
+    assert rows_done(journal) == 8
+    assert sorted(begun.read_text().split()) == list("01234567"), "none was begun again"

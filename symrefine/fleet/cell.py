@@ -141,7 +141,8 @@ def _end_with_parent() -> None:
     from multiprocessing import parent_process
 
     warnings.simplefilter("ignore")
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as of what a shell runs in the background
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
     parent = parent_process()
     if parent is None:
         return
