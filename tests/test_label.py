@@ -344,9 +344,7 @@ def test_workers_and_a_cluster_write_the_same_labels(models: Path, first: Path, 
         }
 
 
-def test_an_object_beyond_its_limit_is_open_with_the_reason_and_done_again_without(
-    run: Run, tmp_path: Path, models: Path
-) -> None:
+def test_an_object_beyond_its_limit_is_open_with_the_reason_and_done_again_without(run: Run, tmp_path: Path) -> None:
     to = tmp_path / "new"
     status, said, _ = run("--time-limit", 0.001, to=to)
     assert status == 1
