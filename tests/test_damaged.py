@@ -46,6 +46,11 @@ def posed(points, seed):
     return pose.of(points), pose
 
 
+def bushed_nut():
+    """So much surface that some of its points are too far apart to tell its density."""
+    return specimen("shape", "bushed_nut")[0]
+
+
 # Strays, clumps, density
 
 
@@ -60,7 +65,7 @@ def test_strays_are_found_and_nothing_else(share):
     assert found[made.strays == 1].mean() > 0.75
 
 
-@pytest.mark.parametrize("make", [table, mug, bottle, lambda: stool(5), lambda: BRICK])
+@pytest.mark.parametrize("make", [table, mug, bottle, lambda: stool(5), lambda: BRICK, bushed_nut])
 @pytest.mark.parametrize("ratio", [1.0, 10.0])
 def test_a_surface_has_no_strays_however_uneven(make, ratio):
     points = damage.uneven(make(), ratio, np.random.default_rng(3)).points

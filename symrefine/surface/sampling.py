@@ -97,7 +97,7 @@ def sampling(
         kept = kept[_without_strays(points[kept])]  # the rim of what fills a volume is alone once that is gone
         around = around_some(points[kept], rng)
     strays = _without(np.arange(size), [kept, *taken], size)
-    even, shares = _evened(points[kept], rng) if _is_uneven(around) else (slice(None), None)
+    even, shares = _evened(points[kept], rng) if _is_uneven(around, points[kept]) else (slice(None), None)
     return Sampling(
         kept=kept,
         even=kept[even],
@@ -169,17 +169,22 @@ def _scattered(points: Array, box: Array) -> bool:
     return bool(4.0 / 3.0 * np.pi * np.median(away) ** 3 * len(points) > CROWDED * np.prod(box))
 
 
-def _is_uneven(around: Surroundings) -> bool:
-    """Whether the density falls off along some direction, as that of a scanner does; it is what shifts moments.
+def _is_uneven(around: Surroundings, points: Array) -> bool:
+    """Whether the density of points [N, 3] falls off along some direction, as a scanner's does: that shifts moments.
 
-    Flat neighbourhoods must show it as well: on thin parts it is a matter of shape how far away others are.
+    Flat neighbourhoods must show it as well: on thin parts it is a matter of shape how far away others are. Where those
+    of some of the points, which `around` tells of, are wide enough for that everywhere, all are asked.
     """
     area = _area(around)
-    if not area.all() or np.median(around.away[:, -1]) > WIDEST:
-        return False  # points are repeated, or so few that the shape decides how far away their neighbours are
+    if not area.all():
+        return False  # points are repeated
     flat = around.thickness < FLAT
     told = [np.ones_like(flat), flat] if flat.sum() > AROUND else [np.ones_like(flat)]
-    return all(_trend(around.points[some], np.log(area[some])) > UNEVEN for some in told)
+    if not all(_trend(around.points[some], np.log(area[some])) > UNEVEN for some in told):
+        return False
+    if np.median(around.away[:, -1]) <= WIDEST:
+        return True
+    return len(around.points) < len(points) and _is_uneven(Surroundings.of(points), points)
 
 
 def _trend(points: Array, values: Array) -> float:
