@@ -102,7 +102,7 @@ def verdicts(found: Detection, points: Array) -> Verdicts:
     motions = [Isometry.about(center, m) for m in every if not np.allclose(m, np.eye(3))]
     misses = surface.misses(motions)
     unseen = np.isnan(surface.seen(misses, motions))
-    owner = surface.cloud.tree.nearest(local)[1] if surface.cloud.labels is None else np.arange(len(local))
+    owner = surface.cloud.of_one_class().nearest(local, None)[1]
     images: Array = np.empty((0, 3))
     for motion, hidden in zip(motions, unseen, strict=True):
         new = motion.apply(local[hidden[owner]])

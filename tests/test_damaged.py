@@ -18,6 +18,7 @@ from experiments.objects.shapes import bottle, box, join, mug, revolve, sample, 
 from experiments.studies import damaged, groups, single_views
 from symrefine.cli import invoke
 from symrefine.complete import complete
+from symrefine.detection import examination
 from symrefine.detection.measure import HIDDEN, gather, measure
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
@@ -99,6 +100,34 @@ def test_a_density_that_falls_off_hides_nothing_and_is_told(make):
     assert found.even_sample is not None
     assert 1000 < found.even_sample < 0.5 * len(points)
     assert f"decided by {found.even_sample:,} points, more evenly spread" in scanned(found)
+
+
+@pytest.mark.parametrize(("kind", "strength"), [("clump", 0.05), ("hole", 0.15), ("views", 2.0), ("mild", 0.05)])
+def test_labels_that_every_operation_keeps_change_nothing(kind, strength):
+    case = damaged.Case(family="shape", name="bossed_prism", kind=kind, strength=strength, seed=3)
+    made, truth = damaged.damaged(case)
+    away = np.linalg.norm(made.points - truth.center, axis=1)
+    scan = Shape(points=made.points, viewpoint=made.viewpoint, labels=(away > np.median(away)).astype(int))
+    found = detect(scan)
+    assert found.point_group == truth.group.name
+    whole = complete(scan, found)
+    assert whole.inferred.any() == found.at_least
+    assert len(whole.points) >= len(made.points) - len(found.outliers)
+
+
+@pytest.mark.parametrize("labelled", [False, True])
+def test_what_fills_a_volume_beside_the_body_is_a_part_if_it_is_carried_to_others(labelled):
+    """A blade whose walls noise makes one; a clump on a mirror, which carries it to itself, may be none."""
+    points = sample(specimen("shape", "propeller6")[0], 20000, 0.01, np.random.default_rng(5))
+    rod, at = np.random.default_rng(6).normal(size=(600, 3)), points[np.argmax(points[:, 0])]
+    blobs = {
+        True: points[np.linalg.norm(points - at, axis=1) < 0.15],
+        False: 0.03 * rod + (0.0, 0.0, points[:, 2].max()),
+    }
+    found = detect(Shape(points=points, labels=(points[:, 2] > 0.0).astype(int) if labelled else None))
+    assert found.point_group == ("C6" if labelled else "D6")
+    for is_part, blob in blobs.items():
+        assert examination._has_counterparts(found.examined, blob, found.tolerance) is is_part
 
 
 def test_outliers_are_told_and_can_be_kept():

@@ -111,7 +111,7 @@ def examined(
     apart = not _has_parts_apart(found, tolerance)
     if not apart:
         found = examine(apart=False, blobs=False)
-    if found.measured.blobs:
+    if not all(_has_counterparts(found, blob, tolerance) for blob in found.measured.blobs):
         # What fills a volume beside a surface is taken for a clump only where it alone hides a symmetry.
         without = examine(apart=apart, blobs=True)
         if without.size(tolerance) > found.size(tolerance) and not _has_parts_apart(without, tolerance):
@@ -162,16 +162,34 @@ def _examined(
     )
 
 
+def _has_counterparts(found: Examined, blob: Array, tolerance: float) -> bool:
+    """Whether points that fill a volume beside the body are a part of it as others are, which they are carried to.
+
+    Most of their images have to leave them and their rim, lest a mirror passes through by chance, and to meet the body.
+    """
+    surface, cloud, moments = found.surface, found.surface.cloud.of_one_class(), found.measured.moments
+    points, margin = (blob - moments.center) / moments.scale, surface.far * surface.diagonal
+    elements = found.links[found.decided(tolerance).index].elements
+    motions = [m for element in elements for m in element.operations.motions(element.center)]
+    if not motions or found.doubt(tolerance):
+        return False
+    moved = np.concatenate([m.apply(points) for m in motions])
+    own = Tree(points).nearest(cloud.points)[0] <= 2.0 * cloud.reach
+    others = moved[~own[cloud.nearest(moved, None)[1]]]
+    met = disc_distances(cloud, others) <= margin
+    return 2 * len(others) > len(moved) and bool(met.mean() > 0.5)
+
+
 def _replaces(found: Examined, clump: Array, tolerance: float) -> bool:
     """Whether about as much of the surface has its image under points set apart as these are: a part out of place."""
-    surface, moments = found.surface, found.measured.moments
+    surface, cloud, moments = found.surface, found.surface.cloud.of_one_class(), found.measured.moments
     there, margin = Clump.of((clump - moments.center) / moments.scale), surface.far * surface.diagonal
-    own, hidden = surface.cloud.points, [0.0]
+    own, hidden = cloud.points, [0.0]
     for element in found.links[found.decided(tolerance).index].elements:
         for motion in element.operations.motions(element.center):
             moved = motion.apply(own)
             under = moved[there.covers(moved)]
-            hidden.append(float((disc_distances(surface.cloud, under) > margin).sum()) if len(under) else 0.0)
+            hidden.append(float((disc_distances(cloud, under) > margin).sum()) if len(under) else 0.0)
     return max(hidden) * found.measured.count >= COUNTERPART * len(clump) * len(own)
 
 
@@ -205,14 +223,14 @@ def _belongs(found: Examined, clump: Array, tolerance: float) -> bool:
     That is onto the surface, onto themselves or, where cameras are known, to where they could not see. Of many mirrors
     one passes through any clump by chance; a part of the object is carried by a third of the elements and more.
     """
-    surface, moments = found.surface, found.measured.moments
+    surface, cloud, moments = found.surface, found.surface.cloud.of_one_class(), found.measured.moments
     points, margin = (clump - moments.center) / moments.scale, surface.far * surface.diagonal
-    beside = disc_distances(surface.cloud, points) > margin
+    beside = disc_distances(cloud, points) > margin
     points = points[beside] if beside.any() else points  # what lies in the surface is carried with it
     own, carried = Tree(points), []
     for element in found.links[found.decided(tolerance).index].elements:
         moved = np.concatenate([m.apply(points) for m in element.operations.motions(element.center)])
-        off = (disc_distances(surface.cloud, moved) > margin) & (own.nearest(moved)[0] > margin)
+        off = (disc_distances(cloud, moved) > margin) & (own.nearest(moved)[0] > margin)
         for camera in () if surface.openings is None else surface.openings.cameras:
             off &= camera.sees_through(moved, margin)
         carried.append(off.mean() < 0.5)

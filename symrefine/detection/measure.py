@@ -52,7 +52,7 @@ class Measured:
         strays: indices of the points that were for being far from all others.
         clumps: of each group of points that was for standing apart from the body, or filling a volume beside it, and
             where they are.
-        blobs: whether some that fill a volume are still in it.
+        blobs: of each group of points still in it that fills a volume beside the body, where they are.
         classes: of its points or faces, that must match.
         moments: to order 8.
         vectors: the n-tuples of them.
@@ -63,7 +63,7 @@ class Measured:
     scan: Shape | None
     strays: Index
     clumps: tuple[tuple[Index, Array], ...]
-    blobs: bool
+    blobs: tuple[Array, ...]
     classes: Index | None
     moments: Moments
     vectors: NTuples
@@ -111,7 +111,8 @@ def measure(
         raise InputError(f"outliers is {outliers!r}; expected one of {list(get_args(Outliers))}")
     strays: Index = np.empty(0, dtype=np.int64)
     clumps: tuple[tuple[Index, Array], ...] = ()
-    scan, more = None, False
+    scan: Shape | None = None
+    more: tuple[Array, ...] = ()
     massive = np.arange(len(shape.points))
     if shape.faces is None and shape.weights is not None and not shape.weights.all():
         massive = np.flatnonzero(shape.weights > 0)
@@ -122,7 +123,7 @@ def measure(
         # What stands in front parts what a camera sees, and hides its counterparts.
         groups, rng = shape.viewpoint is None, np.random.default_rng(0)
         seen = sampling(shape.points, rng, outliers=auto, groups=groups, apart=apart, blobs=blobs)
-        more = bool(seen.blobs)
+        more = tuple(shape.points[b] for b in seen.blobs)
         strays, clumps = massive[seen.strays], tuple((massive[c], shape.points[c]) for c in seen.clumps)
         count = len(seen.kept)
         scan = shape.chosen(seen.kept) if shape.viewpoint is not None else None

@@ -89,6 +89,10 @@ class LocalPlanes(Planes):
         """Classes of some of the points."""
         return None if self.labels is None else self.labels[chosen]
 
+    def of_one_class(self) -> "LocalPlanes":
+        """The same surface, where any point may meet any other."""
+        return self if self.labels is None else replace(self, tree=Tree(self.points), labels=None)
+
     def nearest(self, queries: Array, classes: Index | None, *, bound: float = math.inf) -> tuple[Array, Index]:
         """Distance and index, both [Q], of the point nearest to each query [Q, 3] of the classes [Q]; see `Tree`."""
         return self.tree.nearest(_with_class(queries, classes), bound=bound)
