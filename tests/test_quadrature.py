@@ -1,5 +1,6 @@
 """Exact nodes against analytic integrals over triangles, and samples against the uniform law."""
 
+from dataclasses import replace
 from math import factorial
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from experiments.objects.shapes import box, join, mug
 from symrefine.errors import DegenerateShapeError
-from symrefine.moments.quadrature import mesh_nodes, sample_surface, triangle_areas_and_normals, triangle_rule
+from symrefine.moments.quadrature import mesh_nodes, repeated, sample_surface, triangle_areas_and_normals, triangle_rule
 from symrefine.shape import Shape
 
 # Two triangles of areas 1 and 3 in different planes, and a degenerate one between them.
@@ -112,3 +113,40 @@ def test_samples_depend_on_the_seed_and_on_nothing_else():
     for a, b in zip(first, again, strict=True):
         np.testing.assert_array_equal(a, b)
     assert np.abs(first[0] - other[0]).max() > 0.01
+
+
+def drawn_again(shape, rng):
+    """Some of its faces twice or three times, from either side, with corners of their own."""
+    some = rng.choice(len(shape.faces), len(shape.faces), replace=True)
+    corners = shape.points[shape.faces[some]][:, rng.permutation(3)]
+    points = np.concatenate([shape.points, corners.reshape(-1, 3)])
+    faces = np.concatenate([shape.faces, len(shape.points) + np.arange(3 * len(some)).reshape(-1, 3)])
+    return Shape(points=points, faces=faces), some
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_face_drawn_again_is_the_same_surface(seed):
+    shape, rng = mug(), np.random.default_rng(seed)
+    again, _ = drawn_again(shape, rng)
+    first = np.arange(len(again.faces)) >= len(shape.faces)
+    assert np.array_equal(repeated(again), first)
+    assert not repeated(shape).any()
+    drawn = [sample_surface(s, 500, np.random.default_rng(1)) for s in (again, shape)]
+    assert all(np.array_equal(got, right) for got, right in zip(*drawn, strict=True))
+    (nodes, weights), (_, once) = mesh_nodes(again, 4), mesh_nodes(shape, 4)
+    assert weights.sum() == pytest.approx(once.sum(), rel=1e-12)
+    assert nodes.shape == (len(weights), 3)
+
+
+def test_faces_of_different_labels_in_one_place_both_count():
+    shape, rng = mug(), np.random.default_rng(4)
+    again, some = drawn_again(shape, rng)
+    labels = np.arange(len(shape.faces)) % 2
+    same, other = (np.concatenate([labels, own]) for own in (labels[some], 2 + labels[some]))
+    assert repeated(replace(again, labels=same)).sum() == len(some)
+    assert repeated(replace(again, labels=other)).sum() == len(some) - len(np.unique(some))
+
+
+def test_a_zero_of_either_sign_is_one_place():
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-0.0, -0.0, 0], [1, -0.0, 0], [0, 1, -0.0]])
+    assert repeated(Shape(points=points, faces=np.arange(6).reshape(2, 3))).tolist() == [False, True]

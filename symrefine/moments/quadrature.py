@@ -3,9 +3,10 @@
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symrefine.errors import DegenerateShapeError
-from symrefine.geometry import Array
+from symrefine.geometry import Array, Mask
 from symrefine.shape import Index, Shape
 
 
@@ -18,10 +19,44 @@ def triangle_areas_and_normals(vertices: Array, faces: Index) -> tuple[Array, Ar
     return 0.5 * double_area, normals
 
 
+def repeated(shape: Shape) -> Mask:
+    """Which faces [F] of a mesh are there once more before them, in any order of their corners, with the same label.
+
+    Corners are the same where all bits of their coordinates are. Faces are told apart by sums of 64 bits of each
+    corner: of a million faces two that differ are taken for one with a chance of 3e-8.
+    """
+    assert shape.faces is not None
+    bits = np.ascontiguousarray(shape.points + 0.0).view(np.uint64)  # of -0.0 those of 0.0
+    corner = np.zeros(len(bits), dtype=np.uint64)
+    for column in bits.T:
+        corner = _mixed(corner ^ column)
+    key = _mixed(corner)[shape.faces].sum(axis=1, dtype=np.uint64)
+    if shape.labels is not None:
+        key = _mixed(key ^ shape.labels.astype(np.uint64))
+    order = np.argsort(key, kind="stable")
+    again = np.zeros(len(key), dtype=bool)
+    again[order[1:]] = key[order[1:]] == key[order[:-1]]
+    return again
+
+
+def _mixed(words: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Words whose every bit depends on all bits of those given: the finaliser of splitmix64 (Steele et al. 2014)."""
+    words = words + np.uint64(0x9E3779B97F4A7C15)
+    words = (words ^ (words >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    words = (words ^ (words >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return words ^ (words >> np.uint64(31))
+
+
 def _triangles(shape: Shape) -> tuple[Index, Array, Array]:
-    """Triangles of a mesh that has an area, with their areas and normals."""
+    """Triangles of a mesh that has an area, with their areas and normals.
+
+    A face that is there twice, as where both sides of a sheet are drawn, is the same surface: it weighs what one does.
+    Of a solid all count, as faces of either side cancel.
+    """
     assert shape.faces is not None
     areas, normals = triangle_areas_and_normals(shape.points, shape.faces)
+    if shape.measure == "surface":
+        areas = np.where(repeated(shape), 0.0, areas)
     if areas.sum() <= 0:
         raise DegenerateShapeError(f"{shape.source}: the mesh has no area; every triangle is degenerate")
     return shape.faces, areas, normals
