@@ -95,13 +95,14 @@ def about(evidence: Evidence, direction: Array) -> list[Placed]:
     beyond = max(evidence.harmonics) + 1  # a fold that no moment reaches: only those with m = 0 are invariant
     round_frame = polish_frame(evidence.harmonics, frame_with_z(direction), beyond)
     found = [placed("Cinfv", round_frame)]
-    folds = {2, 3, *(_counted(evidence.points, direction) if evidence.atoms else ())}
+    counted = _counted(evidence.points, direction) if evidence.atoms else ()
+    turns = dict.fromkeys((2, 3, *counted), frame_with_z(direction))
     for axis in apart(np.stack([round_frame[2], direction]), 0.2 * APART_RAD):
         for candidate in fold_candidates(evidence.points, evidence.weights, axis)[:FOLDS]:
-            folds.add(candidate.fold)
             frame = polish_frame(evidence.harmonics, candidate.frame, candidate.fold)
+            turns.setdefault(candidate.fold, frame)
             found.append(placed(f"C{candidate.fold}v", frame))
-    return [*found, *(placed(f"C{k}", frame_with_z(direction)) for k in sorted(folds, reverse=True))]
+    return [*found, *(placed(f"C{k}", turns[k]) for k in sorted(turns, reverse=True))]
 
 
 def _counted(points: Array, direction: Array) -> set[int]:
