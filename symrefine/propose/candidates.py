@@ -95,14 +95,17 @@ def about(evidence: Evidence, direction: Array) -> list[Placed]:
     beyond = max(evidence.harmonics) + 1  # a fold that no moment reaches: only those with m = 0 are invariant
     round_frame = polish_frame(evidence.harmonics, frame_with_z(direction), beyond)
     found = [placed("Cinfv", round_frame)]
+    given = frame_with_z(direction)
     counted = _counted(evidence.points, direction) if evidence.atoms else ()
-    turns = dict.fromkeys((2, 3, *counted), frame_with_z(direction))
+    turns = {(fold, False): given for fold in (2, 3, *counted)}
     for axis in apart(np.stack([round_frame[2], direction]), 0.2 * APART_RAD):
         for candidate in fold_candidates(evidence.points, evidence.weights, axis)[:FOLDS]:
             frame = polish_frame(evidence.harmonics, candidate.frame, candidate.fold)
-            turns.setdefault(candidate.fold, frame)
             found.append(placed(f"C{candidate.fold}v", frame))
-    return [*found, *(placed(f"C{k}", turns[k]) for k in sorted(turns, reverse=True))]
+            turns[candidate.fold, False] = given
+            if abs(frame[2] @ direction) < np.cos(0.2 * APART_RAD):  # the axis that told the fold may know it better
+                turns.setdefault((candidate.fold, True), frame)
+    return [*found, *(placed(f"C{fold}", turns[fold, polished]) for fold, polished in sorted(turns, reverse=True))]
 
 
 def _counted(points: Array, direction: Array) -> set[int]:
