@@ -313,9 +313,8 @@ def _surface(
     # Where noise alone needs all that is allowed, nobody sees what is open.
     if tree is not None and (surface.floor < tolerance or views):
         surface = replace(surface, openings=openings(cloud, local, tree, views, near, clumps=hiding))
-    # Where density differs, a window and its image hold more of chance than one window and itself; what a camera or a
-    # clump hides has no border that windows could be kept from.
-    if not (views or hiding) and whole.noisy and uneven is None:
+    # Where density differs, a window and its image hold more of chance than one window and itself.
+    if surface.openings is None and whole.noisy and uneven is None:
         surface = replace(surface, drift=Drift.of(local, whole.tree, WINDOWS, rng))
     return surface
 

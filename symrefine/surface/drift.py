@@ -4,8 +4,7 @@ Local planes tell where a surface is. Where noise is as thick as the parts of an
 that is out of place lies inside what noise makes of its image. But all of the part is out of place the same way, and
 the middle of what a window holds tells that to a fraction of the noise. So the middles of the same window in the cloud
 and in its image are compared, along directions in which the window is not filled: along a sheet, or inside a solid, it
-sees no end of them, and the middle is a matter of chance. Where a surface is open what is missing moves the middle as
-well, so windows that reach a border tell nothing.
+sees no end of them, and the middle is a matter of chance.
 """
 
 import math
@@ -107,23 +106,15 @@ class Drift(ReadOnly):
         noise = np.linalg.norm(_applied(_gains(one[1]), chance), axis=1) / math.sqrt(2.0)
         return cls(windows=windows, sources=sources, offsets=offsets, gains=_gains(spread), noise=np.sort(noise))
 
-    def misses(self, motions: Sequence[Isometry], sources: int, border: Array | None = None) -> Array:
-        """How far `sources` windows of each of K images lie from those of the cloud [K, .].
-
-        NaN of those that reach a `border` [B, 3], beyond which nobody looked, here or there.
-        """
+    def misses(self, motions: Sequence[Isometry], sources: int) -> Array:
+        """How far `sources` windows of each of K images lie from those of the cloud [K, .]."""
         stride = max(1, len(self.sources) // sources)
         points, offsets, gains = self.sources[::stride], self.offsets[::stride], self.gains[::stride]
         moved = np.concatenate([m.apply(points) for m in motions])
         there = self.windows.offsets(moved).reshape(len(motions), -1, 3)
         # Back where the image came from, the gains are those of the cloud itself.
         back = [_applied(gains, t @ m.matrix - offsets) for t, m in zip(there, motions, strict=True)]
-        found = np.asarray(np.linalg.norm(np.stack(back), axis=2))
-        if border is not None:
-            ends, reach = Tree(border), REACH * self.windows.width
-            reached = ends.nearest(moved)[0].reshape(found.shape) < reach
-            found[reached | (ends.nearest(points)[0] < reach)] = np.nan
-        return found
+        return np.linalg.norm(np.stack(back), axis=2)
 
 
 def _cells(points: Array, width: float, rng: np.random.Generator) -> int:

@@ -176,8 +176,7 @@ class Surface:
         """
         if self.drift is None:
             return np.zeros(len(motions)), 0.0
-        border = None if self.openings is None else self.cloud.points[self.openings.line]
-        misses = self.drift.misses(motions, max(WINDOWS_EACH, WINDOWS // len(motions)), border) / self.diagonal
+        misses = self.drift.misses(motions, max(WINDOWS_EACH, WINDOWS // len(motions))) / self.diagonal
         noise = self.drift.noise / self.diagonal
         return needs(misses, noise, tests), float(needs(misses.ravel(), noise))
 
