@@ -96,15 +96,15 @@ def about(evidence: Evidence, direction: Array) -> list[Placed]:
     round_frame = polish_frame(evidence.harmonics, frame_with_z(direction), beyond)
     found = [placed("Cinfv", round_frame)]
     given = frame_with_z(direction)
-    counted = _counted(evidence.points, direction) if evidence.atoms else ()
-    turns = {(fold, False): given for fold in (2, 3, *counted)}
+    anyway = (2, 3, *(_counted(evidence.points, direction) if evidence.atoms else ()))
+    turns = {(fold, False): given for fold in anyway}
     for axis in apart(np.stack([round_frame[2], direction]), 0.2 * APART_RAD):
         for candidate in fold_candidates(evidence.points, evidence.weights, axis)[:FOLDS]:
             frame = polish_frame(evidence.harmonics, candidate.frame, candidate.fold)
             found.append(placed(f"C{candidate.fold}v", frame))
             turns[candidate.fold, False] = given
-            if abs(frame[2] @ direction) < np.cos(0.2 * APART_RAD):  # the axis that told the fold may know it better
-                turns.setdefault((candidate.fold, True), frame)
+            if candidate.fold not in anyway and abs(frame[2] @ direction) < np.cos(0.2 * APART_RAD):
+                turns.setdefault((candidate.fold, True), frame)  # the axis that told the fold may know it better
     return [*found, *(placed(f"C{fold}", turns[fold, polished]) for fold, polished in sorted(turns, reverse=True))]
 
 
