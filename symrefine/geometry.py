@@ -40,6 +40,16 @@ def read_only(values: ArrayLike) -> Array:
     return array
 
 
+def rows(values: Array, chosen: NDArray[Any] | slice) -> Array:
+    """Some of the rows of an array [N, ...], by indices of any shape, a mask [N] or a slice.
+
+    What `values[chosen]` is, which takes four times as long where rows are short.
+    """
+    if isinstance(chosen, slice):
+        return values[chosen]
+    return values.compress(chosen, axis=0) if chosen.dtype == np.bool_ else values.take(chosen, axis=0)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ReadOnly:
     """Base of dataclasses that nobody can write to: every field declared as `Array` holds a private, read-only copy."""

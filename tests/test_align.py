@@ -788,6 +788,42 @@ def test_a_camera_that_saw_free_space_denies_what_borders_leave_open() -> None:
     assert denied[1] > 0.1
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_no_map_scores_more_than_a_look_says_is_within_reach(seed: int) -> None:
+    # Of two parts of one object, the true map and others at random.
+    rng = rng_of(86, seed)
+    points = [sample(asymmetric(), 8000, 0.0, rng) for _ in range(2)]
+    parts = points[0][points[0][:, 0] > -0.2], points[1][points[1][:, 0] < 0.2]
+    source, target = (side_of(Shape(points=p), 0) for p in parts)
+    shown = [Shown.of(side, 1.0, 0) for side in (source, target)]
+    judge = Judge(source=shown[0], target=shown[1], diagonal=asymmetric().diagonal, tolerance=0.02)
+    true = Similarity(matrix=np.eye(3), shift=source.moments.center - target.moments.center)
+    for motion in [true, *(Similarity(matrix=random_orthogonal(rng), shift=np.zeros(3)) for _ in range(8))]:
+        said = [judge.side(*way)[0] for way in ((*shown, motion), (*shown[::-1], motion.inverse))]
+        assert score(said) <= judge.within_reach(motion)
+    assert judge.within_reach(true) < 1.0
+
+
+def test_what_is_known_of_a_cleaned_side_is_what_a_look_at_it_says() -> None:
+    rng = rng_of(87)
+    points = sample(asymmetric(), 9000, 0.0, rng)
+    behind = (points[:, 0].max() - points[:, 0]) / np.ptp(points[:, 0])
+    points = points[rng.random(len(points)) < 10.0**-behind]
+    dirty = np.concatenate([points, 6.0 * (rng.random((40, 3)) - 0.5)])
+    side = side_of(Shape(points=dirty), 0).cleaned()
+    assert side.known is not None
+    seen = side.sampling
+    assert len(dirty) > len(side.shape.points) == len(seen.kept)
+    assert not len(seen.strays)
+    assert seen.shares is not None
+    assert len(seen.shares) == len(seen.even) < len(seen.kept)
+    # Where the points are sparse each of those that are even stands for itself; where they are dense, a few do for all.
+    even, every = side.shape.points[seen.even, 0], side.shape.points[:, 0]
+    true = sample(asymmetric(), 9000, 0.0, rng)[:, 0].mean()
+    assert even.mean() < every.mean()
+    assert abs(np.average(even, weights=seen.shares) - true) < 0.5 * abs(every.mean() - true)
+
+
 @pytest.mark.parametrize("seed", [55, 56, 57])
 def test_a_flat_part_in_common_says_that_it_slides_or_is_chance(seed: int) -> None:
     # All that a square plate and a round one share is a piece of a plane.

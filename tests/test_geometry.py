@@ -21,6 +21,7 @@ from symrefine.geometry import (
     read_only,
     rotation,
     rotoreflection,
+    rows,
     tight_diagonal,
     unit,
 )
@@ -270,3 +271,9 @@ def test_tight_diagonal_of_an_irregular_shape_does_not_depend_on_its_pose():
     found = [tight_diagonal(points @ random_orthogonal(rng, 3, d).T) for d in (1, -1) for _ in range(25)]
     # The search may end in a local minimum; its docstring promises three per cent.
     assert max(found) / min(found) < 1.04
+
+
+@pytest.mark.parametrize("chosen", [slice(1, None, 2), np.array([[3, 0], [1, 3]]), np.arange(5) % 2 == 0])
+def test_rows_are_those_that_an_index_chooses(chosen):
+    values = np.random.default_rng(7).normal(size=(5, 3))
+    np.testing.assert_array_equal(rows(values, chosen), values[chosen])

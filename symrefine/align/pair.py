@@ -35,11 +35,12 @@ REACH = 3.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Side:
-    """One of the two objects: its moments, and the weights of its points if it is a cloud."""
+    """One of the two objects: its moments, the weights of its points if it is a cloud, and how these were sampled."""
 
     shape: Shape
     moments: Moments
     weights: Array
+    known: Sampling | None = None
 
     @property
     def is_mesh(self) -> bool:
@@ -49,6 +50,8 @@ class Side:
     @cached_property
     def sampling(self) -> Sampling:
         """Which of the points of a cloud belong to a surface, and how evenly these were sampled."""
+        if self.known is not None:
+            return self.known
         return sampling(self.shape.points, np.random.default_rng(0), outliers=True, groups=False, asked=ASKED)
 
     def evened(self) -> "Side":
@@ -74,7 +77,7 @@ class Side:
         weights = self.weights[seen.kept]
         parts = len(self.moments.replicates)
         moments = central_moments(shape.points, weights, self.moments.order, parts=parts)
-        return Side(shape=shape, moments=moments, weights=weights / weights.sum())
+        return Side(shape=shape, moments=moments, weights=weights / weights.sum(), known=seen.without_strays)
 
     def skin(self, unit: float, samples: int, rng: np.random.Generator) -> Skin:
         """The surface about the centre, in units of `unit`: of a mesh, as so many samples show it.

@@ -13,12 +13,13 @@ import numpy as np
 
 from symrefine.align.alignment import OK, OPEN
 from symrefine.align.pair import THIN, Evidence, Side, sampled
-from symrefine.align.polish import Similarity, polish
+from symrefine.align.polish import Polished, Similarity, polish
 from symrefine.decide.maps import Merit, ahead, as_good, fits, said_by_both, score, well_met
 from symrefine.detection.measure import SAMPLES
 from symrefine.fit.matching import AGREE
 from symrefine.geometry import Array, Isometry, Mask, householder, tight_diagonal
 from symrefine.groups.orthogonal import chord_angles
+from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.propose.consensus import Matches, Proposal, consensus
 from symrefine.propose.signatures import mutual_matches, signatures
 from symrefine.propose.votes import mirror_votes
@@ -112,7 +113,7 @@ class Shown:
 
     @cached_property
     def moving(self) -> LocalPlanes:
-        """Some of the local planes, that stand for all in the polish."""
+        """Local planes that stand for all in the polish; of other points than those that judge, more maps come true."""
         pick = drawn(len(self.skin.points), len(self.cloud.points) // MOVED, self.rng, self.weights)
         return self.skin.local_planes(pick)
 
@@ -290,8 +291,13 @@ class Judge:
 
     def polished(self, start: Similarity) -> Met:
         """A map after the polish, judged from both sides."""
+        return self._judged(self._polish(start))
+
+    def _polish(self, start: Similarity) -> Polished:
         known = np.zeros((6, 6))
-        done = polish(self.source.moving, self.target.cloud, start, error=WITHIN * self.diagonal, known=known)
+        return polish(self.source.moving, self.target.cloud, start, error=WITHIN * self.diagonal, known=known)
+
+    def _judged(self, done: Polished) -> Met:
         there, back = (self.source, self.target, done.motion), (self.target, self.source, done.motion.inverse)
         (one, misses), (other, back_misses) = self.side(*there), self.side(*back)
         met = np.concatenate([misses, back_misses])
@@ -306,11 +312,25 @@ class Judge:
     def side(self, here: Shown, there: Shown, motion: Similarity) -> tuple[Merit, Array]:
         """What one side says of a map, and by how much its local planes miss the other where they meet, diagonals."""
         moved = motion.apply(here.cloud.points)
-        bound = HOPELESS * self.far * self.diagonal
-        misses = disc_distances(there.cloud, moved, here.cloud.labels, bound=bound) / self.diagonal
+        misses = self.misses(there, moved, here.cloud.labels)
         met, margin = (there.cloud, there.openings), self.far * self.diagonal
         unseen = here.openings.unseen(here.cloud, moved, misses > self.far, 1, margin, met=met, most=MOST)
         return Merit.of(misses, unseen, self.near, self.far), misses[~unseen & (misses <= self.far)]
+
+    def misses(self, there: Shown, moved: Array, classes: Index | None) -> Array:
+        """By how much points [N, 3] of some classes [N] miss one of the two surfaces, diagonals."""
+        bound = HOPELESS * self.far * self.diagonal
+        return disc_distances(there.cloud, moved, classes, bound=bound) / self.diagonal
+
+    def within_reach(self, motion: Similarity) -> float:
+        """What a map scores at best, as every so many local planes tell it: nobody looked where nothing is met."""
+        every, found = slice(None, None, LOOK), []
+        ways = (self.source, self.target, motion), (self.target, self.source, motion.inverse)
+        for here, there, way in ways:
+            misses = self.misses(there, way.apply(here.cloud.points[every]), here.cloud.classes(every))
+            merit = Merit.of(misses, misses > self.far, self.near, self.far)
+            found.append(merit.score + SIGNIFICANT * merit.sigma(len(misses)))
+        return max(found)
 
     def slid(self, met: Met) -> float:
         """The best score of a map that slides or turns to either side in the way that is known worst."""
@@ -325,12 +345,16 @@ class Judge:
         return score([self.side(*way)[0] for way in (there, back)])
 
     def polished_all(self, known: Sequence[Met], starts: Sequence[Similarity]) -> list[Met]:
-        """The maps that are known, and those that starts lead to and are none of them."""
+        """The maps that are known, and those that starts lead to and are none of them, nor far behind the best."""
         every = list(known)
         for start in starts:
-            if not any(self.same(start, m.motion) for m in every):
-                met = self.polished(start)
-                every += [] if any(self.same(met.motion, m.motion) for m in every) else [met]
+            if any(self.same(start, m.motion) for m in every):
+                continue
+            done = self._polish(start)
+            if any(self.same(done.motion, m.motion) for m in every):
+                continue
+            if not every or as_good(max(m.score for m in every), self.within_reach(done.motion)):
+                every.append(self._judged(done))
         return every
 
     def same(self, one: Similarity, other: Similarity) -> bool:

@@ -48,6 +48,11 @@ class Merit:
         """The more the better."""
         return self.well - LESS_WELL * self.less - NOTHING * self.nothing
 
+    def sigma(self, count: int) -> float:
+        """Standard deviation of the score as so many local planes, drawn at random, would tell it."""
+        squares = self.well + LESS_WELL**2 * self.less + NOTHING**2 * self.nothing
+        return float(np.sqrt(max(squares - self.score**2, 0.0) / count))
+
     @property
     def fits(self) -> float:
         """Probability that so much of a surface does not meet so well by chance."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from symrefine.geometry import Array, Isometry, Mask
+from symrefine.geometry import Array, Isometry, Mask, rows
 from symrefine.shape import Index
 from symrefine.surface.skin import LocalPlanes, Planes, Skin
 
@@ -57,9 +57,9 @@ def match(
         travel = moved - points
         keep &= _dot(travel, travel) > cloud.spacing**2
         target = np.where(keep, target, 0)
-        normals = cloud.normals[target]
+        normals = rows(cloud.normals, target)
         keep &= _facing(cloud.normals[source] @ turns, normals)
-        error = _dot(moved - cloud.points[target], normals)
+        error = _dot(moved - rows(cloud.points, target), normals)
         flat = worth(cloud.flatness[source], cloud.flatness[target])
 
     def weighted(off: Array, kept: Mask) -> Array:

@@ -18,37 +18,44 @@ SHELLS, BINS = 3, 6
 
 def signatures(cloud: LocalPlanes, radius: float) -> Array:
     """Histograms [M, SHELLS * 3 * BINS] of the neighbours within a radius of each local plane."""
-    count, points, normals = len(cloud.points), cloud.points, cloud.normals
-    one, other = pairs_within(points, radius).T
-    own = np.concatenate([one, other])
-    toward = points[other] - points[one]
-    length = np.maximum(np.linalg.norm(toward, axis=1), 1e-300)
+    count, points, normals = len(cloud.points), cloud.points.T.copy(), cloud.normals.T.copy()
+    one, other = pairs_within(cloud.points, radius).T.copy()
+    toward = points.take(other, axis=1) - points.take(one, axis=1)
+    near, far = normals.take(one, axis=1), normals.take(other, axis=1)
+    squares = _dot(toward, toward)
     # Of either end: how high the other stands over its plane.
-    ends = np.einsum("ki,ki->k", toward, normals[one]), -np.einsum("ki,ki->k", toward, normals[other])
-    bent = np.where(np.bincount(own, np.concatenate(ends), count) < 0.0, -1.0, 1.0)
-    slopes = ends[0] / length, ends[1] / length
-    height = 0.5 + 0.5 * bent[own] * np.concatenate(slopes)
-    turned = np.tile(np.abs(np.einsum("ki,ki->k", normals[one], normals[other])), 2)
-    leaning = np.abs(np.concatenate(slopes[::-1]))
-    shell = np.minimum((length / radius) ** 2 * SHELLS, SHELLS - 1).astype(np.int64)
-    shell = own * SHELLS + np.tile(shell, 2)
+    ends = np.concatenate([_dot(toward, near), -_dot(toward, far)])
+    owner = np.concatenate([one, other])
+    bent = np.where(np.bincount(owner, ends, count) < 0.0, -1.0, 1.0)
+    slopes = ends / np.tile(np.maximum(np.sqrt(squares), 1e-300), 2)
+    height = 0.5 + 0.5 * bent.take(owner) * slopes
+    turned = np.tile(np.abs(_dot(near, far)), 2)
+    leaning = np.abs(np.roll(slopes, len(one)))
+    shell = np.minimum(squares * (SHELLS / radius**2), SHELLS - 1).astype(np.int64)
+    shell = owner * SHELLS + np.tile(shell, 2)
     found = np.stack([_histograms(shell, v, count * SHELLS) for v in (height, turned, leaning)], axis=1)
-    return found.reshape(count, -1)
+    found /= np.maximum(np.bincount(shell, minlength=count * SHELLS), 1)[:, None, None]
+    return np.asarray(found.reshape(count, -1))
+
+
+def _dot(one: Array, other: Array) -> Array:
+    """Products [K] of vectors that stand side by side, [3, K] and [3, K]."""
+    return np.asarray(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
 
 
 def _histograms(owner: Index, values: Array, count: int) -> Array:
-    """Histograms [count, BINS] of the values [K] in 0 .. 1 of each owner [K]; they add up to 1, or are empty.
+    """How many [count, BINS] of the values [K] in 0 .. 1 each owner [K] has in each bin.
 
     A value counts in the two bins that it lies between.
     """
     place = values * (BINS - 1)
     low = np.minimum(place.astype(np.int64), BINS - 2)
-    part = place - low
-    at = owner * BINS + low
-    here, next_ = np.bincount(at, minlength=count * BINS), np.bincount(at, part, count * BINS)
-    found = (here - next_).reshape(count, BINS)
+    place -= low
+    low += owner * BINS
+    here, next_ = np.bincount(low, minlength=count * BINS), np.bincount(low, place, count * BINS)
+    found = np.asarray(here - next_, dtype=np.float64).reshape(count, BINS)
     found[:, 1:] += next_.reshape(count, BINS)[:, :-1]
-    return found / np.maximum(found.sum(axis=1, keepdims=True), 1.0)
+    return found
 
 
 def mutual_matches(source: Array, target: Array, classes: tuple[Index, Index] | None = None) -> tuple[Index, Index]:

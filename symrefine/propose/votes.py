@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.geometry import Array, unit
+from symrefine.geometry import Array, rows, unit
 from symrefine.shape import Index
 
 # Local planes whose pairs vote, the largest angle between the normals of a pair, and the candidates that are told: of 9
@@ -42,32 +42,32 @@ def mirror_votes(points: Array, normals: Array, rng: np.random.Generator, *, tol
     turn.
     """
     x, n, i, j = _pairs(points, normals, VOTERS, rng)
-    across = unit_rows(x[j] - x[i])
-    along = np.einsum("ki,ki->k", across, n[i])
-    image = n[i] - 2.0 * along[:, None] * across
-    agree = np.abs(np.einsum("ki,ki->k", image, n[j])) > np.cos(AGREE_RAD)
-    i, j, m, worth = i[agree], j[agree], across[agree], np.abs(along[agree])
-    return _densest(m, 0.5 * np.einsum("ki,ki->k", m, x[i] + x[j])[:, None] * m, worth, told)
+    across, own = unit_rows(rows(x, j) - rows(x, i)), rows(n, i)
+    along = np.einsum("ki,ki->k", across, own)
+    image = own - 2.0 * along[:, None] * across
+    agree = np.abs(np.einsum("ki,ki->k", image, rows(n, j))) > np.cos(AGREE_RAD)
+    i, j, m, worth = i[agree], j[agree], rows(across, agree), np.abs(along[agree])
+    return _densest(m, 0.5 * np.einsum("ki,ki->k", m, rows(x, i) + rows(x, j))[:, None] * m, worth, told)
 
 
 def turn_votes(points: Array, normals: Array, rng: np.random.Generator) -> list[tuple[Vote, int]]:
     """Axes that turn many local planes [N, 3] into others, with the smallest prime order that their angles suggest."""
     x, n, i, j = _pairs(points, normals, VOTERS // 2, rng)
     i, j, sign = np.tile(i, 2), np.tile(j, 2), np.repeat([1.0, -1.0], len(i))
-    moved, turned = x[j] - x[i], sign[:, None] * n[j] - n[i]
+    moved, turned = rows(x, j) - rows(x, i), sign[:, None] * rows(n, j) - rows(n, i)
     axis = np.cross(moved, turned)
     worth = np.linalg.norm(axis, axis=1) / np.linalg.norm(moved, axis=1)
     kept = worth > np.sin(AGREE_RAD)
     i, j, moved, u, worth = i[kept], j[kept], moved[kept], unit_rows(axis[kept]), worth[kept]
-    a, b = n[i], sign[kept][:, None] * n[j]
-    a, b = (v - np.einsum("ki,ki->k", v, u)[:, None] * u for v in (a, b))
+    own, image = rows(n, i), sign[kept][:, None] * rows(n, j)
+    a, b = (v - np.einsum("ki,ki->k", v, u)[:, None] * u for v in (own, image))
     angle = np.arctan2(np.einsum("ki,ki->k", np.cross(a, b), u), np.einsum("ki,ki->k", a, b))
     # The axis lies across the difference, as far off its middle as the angle says.
     off = 0.5 / np.tan(0.5 * np.where(np.abs(angle) < AGREE_RAD, AGREE_RAD, angle))
-    through = 0.5 * (x[i] + x[j]) + off[:, None] * np.cross(u, moved)
+    through = 0.5 * (rows(x, i) + rows(x, j)) + off[:, None] * np.cross(u, moved)
     foot = through - np.einsum("ki,ki->k", through, u)[:, None] * u
     near = (np.abs(angle) > AGREE_RAD) & (np.linalg.norm(foot, axis=1) < 3.0)
-    found = _densest(u[near], foot[near], worth[near])
+    found = _densest(rows(u, near), rows(foot, near), worth[near])
     return [(v, _order(angle[near][v.votes])) for v in found]
 
 
@@ -86,7 +86,7 @@ def _pairs(points: Array, normals: Array, count: int, rng: np.random.Generator) 
     some = rng.permutation(len(points))[:count]
     x, n = points[some], normals[some]
     i, j = np.triu_indices(len(some), 1)
-    far = np.linalg.norm(x[j] - x[i], axis=1) > 1.0 / FEET
+    far = ((rows(x, j) - rows(x, i)) ** 2).sum(axis=1) > FEET**-2.0
     return x, n, i[far], j[far]
 
 
@@ -98,7 +98,7 @@ def unit_rows(vectors: Array) -> Array:
 def _densest(directions: Array, feet: Array, worth: Array, told: int = TOLD) -> list[Vote]:
     """The densest spots of votes for planes or lines: unit vectors [K, 3] without a sign, with their feet [K, 3]."""
     some = worth > 0.0
-    directions, feet, worth = directions[some], feet[some], worth[some]
+    directions, feet, worth = rows(directions, some), rows(feet, some), worth[some]
     if not some.any():
         return []
     cells, volume = _cells(directions, feet)
@@ -111,12 +111,12 @@ def _densest(directions: Array, feet: Array, worth: Array, told: int = TOLD) -> 
     for cell in np.argsort(-density)[: 8 * told]:
         votes = order[ends[cell] : ends[cell + 1]]
         for _ in range(2):
-            sign = np.where(directions[votes] @ directions[votes[0]] < 0.0, -1.0, 1.0)
-            u = unit((worth[votes] * sign) @ directions[votes])
-            foot = np.average(feet[votes], axis=0, weights=worth[votes])
+            voted, count = rows(directions, votes), worth[votes]
+            sign = np.where(voted @ voted[0] < 0.0, -1.0, 1.0)
+            u, foot = unit((count * sign) @ voted), count @ rows(feet, votes) / count.sum()
             # One sweep over all is quicker than a tree of directions and feet would be made.
             along = np.flatnonzero(np.abs(directions @ u) > np.cos(AGREE_RAD))
-            votes = along[((feet[along] - foot) ** 2).sum(axis=1) < FEET**-2.0]
+            votes = along[((rows(feet, along) - foot) ** 2).sum(axis=1) < FEET**-2.0]
             if not votes.size:
                 break
         known = (abs(v.direction @ u) > np.cos(AGREE_RAD) and np.linalg.norm(v.foot - foot) < 1.0 / FEET for v in found)

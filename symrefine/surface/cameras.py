@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.geometry import Array, Mask, unit
+from symrefine.geometry import Array, Mask, rows, unit
 from symrefine.surface.tree import Tree
 
 # Rays around a point that tell how far the camera saw there, and spacings of rays up to which one is around.
@@ -63,7 +63,7 @@ class Camera:
             return np.zeros(len(rays), dtype=bool)
         near = self.directions.query(rays, BESIDE, skip=1)[1]
         front = self.ranges[near] < (self.ranges * (1.0 - WITHIN * self.spacing))[:, None]
-        aside = rays[near] - rays[:, None]
+        aside = rows(rays, near) - rays[:, None]
         weight = front / np.maximum(np.linalg.norm(aside, axis=2), 1e-300)
         aside = np.einsum("nk,nki->ni", weight, aside)
         # Of directions on one side the mean is 2 / pi long, of those on all sides nothing is left.

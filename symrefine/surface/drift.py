@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.geometry import Array, Isometry, ReadOnly
+from symrefine.geometry import Array, Isometry, ReadOnly, rows
 from symrefine.surface.neighbourhoods import NEIGHBOURS, in_cells
 from symrefine.surface.tree import Tree
 
@@ -51,7 +51,7 @@ class Windows(ReadOnly):
         """What windows at queries [Q, 3] hold: cells from there [Q, CELLS, 3], their weights [Q, CELLS] (sum 1)."""
         away, near = self.tree.query(queries, min(CELLS, len(self.counts)))
         weights = self.counts[near] * np.exp(-0.5 * ((away - away[:, :1]) * (away + away[:, :1])) / self.width**2)
-        return self.middles[near] - queries[:, None], weights / weights.sum(axis=1, keepdims=True)
+        return rows(self.middles, near) - queries[:, None], weights / weights.sum(axis=1, keepdims=True)
 
     def offsets(self, queries: Array) -> Array:
         """Where the middle of each window lies, seen from where it is centred [Q, 3]."""

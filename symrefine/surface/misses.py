@@ -11,7 +11,7 @@ from functools import reduce
 
 import numpy as np
 
-from symrefine.geometry import Array, Isometry
+from symrefine.geometry import Array, Isometry, rows
 from symrefine.shape import Index
 from symrefine.surface.skin import LocalPlanes
 from symrefine.units import TOLERANCE as TOLERANCE
@@ -156,7 +156,7 @@ def _to_discs(cloud: LocalPlanes, queries: Array, away: Array, near: Index, clas
     seen = np.isfinite(away)
     if not (all_seen := bool(seen.all())):
         away, near = np.where(seen, away, 0.0), np.where(seen, near, 0)
-    across = np.einsum("ni,nki->nk", queries, cloud.normals[near])
+    across = np.einsum("ni,nki->nk", queries, rows(cloud.normals, near))
     across -= cloud.offsets[near]
     across *= across
     along = np.sqrt(np.maximum(away * away - across, 0.0))

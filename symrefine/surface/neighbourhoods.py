@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from symrefine.geometry import Array
+from symrefine.geometry import Array, rows
 from symrefine.shape import Index
 from symrefine.surface.tree import Tree
 
@@ -191,7 +191,7 @@ def choose_neighbours(
 def planes_of(points: Array, near: Index) -> tuple[Array, Array, Array]:
     """Means, normals and variances (across first), all [M, 3], of neighbourhoods [M, k] of points [N, 3]."""
     members, own = renumbered(near, len(points)) if near.size < len(points) else (slice(None), near)
-    return fit_planes(_added(sums_of(points[members]), own.ravel(), np.arange(0, near.size + 1, near.shape[1])))
+    return fit_planes(_added(sums_of(rows(points, members)), own.ravel(), np.arange(0, near.size + 1, near.shape[1])))
 
 
 def blobness(variances: Array, k: int) -> Array:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from symrefine.geometry import Array, Mask, unit
+from symrefine.geometry import Array, Mask, rows, unit
 from symrefine.shape import Index
 from symrefine.surface.cameras import Camera, unclosed
 from symrefine.surface.clumps import Clump
@@ -208,7 +208,7 @@ def _aside(cloud: LocalPlanes, points: Array, tree: Tree, near: Index | None) ->
     aside = mean - cloud.points
     # The normals of as wide a neighbourhood.
     count = min(max(LINKS, round(NEIGHBOURS * len(cloud.points) / len(points))), len(cloud.points))
-    normals = cloud.normals[cloud.around(cloud.points, cloud.labels, count)[1]]
+    normals = rows(cloud.normals, cloud.around(cloud.points, cloud.labels, count)[1])
     bends = BENDS / count * size[:, None, None] * (normals.transpose(0, 2, 1) @ normals)
     along = np.linalg.solve(spread + ROUNDING * np.eye(3) + bends, aside[:, :, None])[:, :, 0]
     sheet = variances[:, 1] > WIRE**2 * variances[:, 2]
@@ -229,7 +229,7 @@ def _folded(at: Array, points: Array, tree: Tree, near: Index | None) -> Mask:
     middle, across, _ = planes_of(points, near)
     aside = middle - at
     inwards = unit(aside - across * np.einsum("ni,ni->n", aside, across)[:, None])
-    offset = points[near] - middle[:, None]
+    offset = rows(points, near) - middle[:, None]
     height, depth, along = (np.einsum("nki,ni->nk", offset, v) for v in (across, inwards, np.cross(across, inwards)))
     sheet, _ = np.linalg.qr(np.stack([np.ones_like(depth), depth, along, depth**2, depth * along, along**2], axis=2))
     off = np.abs(height - np.einsum("nkp,np->nk", sheet, np.einsum("nkp,nk->np", sheet, height)))

@@ -53,6 +53,12 @@ class Sampling:
     blobs: tuple[Index, ...] = ()
     shares: Array | None = None
 
+    @property
+    def without_strays(self) -> "Sampling":
+        """The same of the points that are kept, if nothing else than strays was set apart."""
+        every = np.arange(len(self.kept))
+        return Sampling(kept=every, even=np.searchsorted(self.kept, self.even), strays=every[:0], shares=self.shares)
+
 
 def sampling(
     points: Array,

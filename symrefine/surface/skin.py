@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from symrefine.geometry import Array, ReadOnly
+from symrefine.geometry import Array, ReadOnly, rows
 from symrefine.shape import Index
 from symrefine.surface.neighbourhoods import (
     NEIGHBOURS,
@@ -48,8 +48,8 @@ class Planes(ReadOnly):
     def chosen(self, index: Index | NDArray[np.bool_] | slice) -> "Planes":
         """Some of the planes."""
         return Planes(
-            points=self.points[index],
-            normals=self.normals[index],
+            points=rows(self.points, index),
+            normals=rows(self.normals, index),
             thickness=self.thickness[index],
             flatness=self.flatness[index],
         )
@@ -216,7 +216,7 @@ class Skin:
 
     def denoised(self, pick: Index, near: Index | None = None) -> Planes:
         """Some of the points, each moved onto the plane of its neighbours (`near`, if known), and these planes."""
-        points = self.points[pick]
+        points = rows(self.points, pick)
         fitted = self._planes(points, pick, near)
         if self.neighbours == 1:
             return fitted
@@ -225,13 +225,13 @@ class Skin:
 
     def near(self, pick: Index, most: int) -> Index | None:
         """The neighbours [M, most] of some of the points, or None where planes are made of other things or more."""
-        return self.tree.query(self.points[pick], most)[1] if 1 < self.neighbours <= most else None
+        return self.tree.query(rows(self.points, pick), most)[1] if 1 < self.neighbours <= most else None
 
     def _planes(self, queries: Array, nearest: Index, near: Index | None = None) -> Planes:
-        normals = None if self.normals is None else self.normals[nearest]
+        normals = None if self.normals is None else rows(self.normals, nearest)
         if self.neighbours == 1 and normals is not None:
             none = np.zeros(len(nearest))
-            return Planes(points=self.points[nearest], normals=normals, thickness=none, flatness=none)
+            return Planes(points=rows(self.points, nearest), normals=normals, thickness=none, flatness=none)
         mean, normals, values = fit_planes(self._neighbourhoods.around(queries, near), normals)
         return Planes(points=mean, normals=normals, thickness=np.sqrt(values[:, 0]), flatness=flatness_of(values))
 
