@@ -14,9 +14,10 @@ from experiments.objects.household import camera
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
 from symrefine.align.landscape import grid_rotations, harmonic_pair, hills, landscape, least_misfit
 from symrefine.align.moment_fit import as_good, best_fits, covariance, exact, fit, misfit
-from symrefine.align.partial import Judge, Shown
+from symrefine.align.partial import Judge
 from symrefine.align.polish import Similarity, polish
 from symrefine.align.procrustes import procrustes
+from symrefine.align.shown import Shown
 from symrefine.align.sides import side_of
 from symrefine.align.span import monomial_pair, span_fit
 from symrefine.align.story import Alignment, align

@@ -69,11 +69,11 @@ KIND_OF = {
         "align.landscape": "GRID GRID_DEGREE",
         "align.moment_fit": "LONGEST",
         "align.pair": "SOURCE_PLANES TARGET_PLANES THIN ASKED REACH",
-        "align.partial": "PLANES AROUND WITHIN MATCHES COARSER MOST_PLANES MOVED LOOK POLISHED WORTH APART "
-        "MOST_MAPS VOTERS MIRRORS",
+        "align.partial": "AROUND WITHIN MATCHES LOOK POLISHED WORTH APART MOST_MAPS VOTERS MIRRORS",
         "align.polish": "COARSE ENOUGH",
         "align.rivals": "RIVALS",
         "align.scaled": "WIDEST STEP POLISHED",
+        "align.shown": "PLANES COARSER MOST_PLANES MOVED",
         "align.sides": "ORDERS",
         "align.witnesses": "ASKED",
         "complete": "ROUND",

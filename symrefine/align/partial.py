@@ -12,10 +12,10 @@ from functools import cached_property
 import numpy as np
 
 from symrefine.align.alignment import OK, OPEN
-from symrefine.align.pair import THIN, Evidence, Side, sampled
+from symrefine.align.pair import Evidence
 from symrefine.align.polish import Polished, Similarity, polish
+from symrefine.align.shown import Shown
 from symrefine.decide.maps import Merit, ahead, as_good, fits, said_by_both, score, well_met
-from symrefine.detection.measure import SAMPLES
 from symrefine.fit.matching import AGREE
 from symrefine.geometry import Array, Isometry, Mask, householder, tight_diagonal
 from symrefine.groups.orthogonal import chord_angles
@@ -24,20 +24,14 @@ from symrefine.propose.consensus import Matches, Proposal, consensus
 from symrefine.propose.signatures import mutual_matches, signatures
 from symrefine.propose.votes import mirror_votes
 from symrefine.shape import Index
-from symrefine.surface.cameras import cameras
 from symrefine.surface.misses import LIMITS, disc_distances
-from symrefine.surface.neighbourhoods import fills_volume
-from symrefine.surface.openings import NEIGHBOURS, Openings, openings
-from symrefine.surface.skin import LocalPlanes, Skin, drawn, make_skin
 from symrefine.surface.surface import HOPELESS
 
-# Local planes of either side, how far around themselves they look and how near matches come, in diagonals, and matches
-# that are asked: more cost time, and no more maps were found.
-PLANES, AROUND, WITHIN, MATCHES = 1500, 0.1, 0.04, 500
-# A side with so many times the surface gets as many more local planes, up to a number.
-COARSER, MOST_PLANES = 1.5, 6000
-# One in so many local planes is moved by the polish, and by the first look at the maps that are proposed.
-MOVED, LOOK = 2, 3
+# How far around themselves local planes look and how near matches come, in diagonals, and matches that are asked: more
+# cost time, and no more maps were found.
+AROUND, WITHIN, MATCHES = 0.1, 0.04, 500
+# One in so many local planes is asked by the looks at maps that are proposed, or polished.
+LOOK = 3
 # Maps of each determinant that are polished, if they meet at least such a share of what the best does.
 POLISHED, WORTH = 4, 0.5
 # A patch is unseen if one in so many of the places where it begins is at a border. Of true maps at least one in four
@@ -54,88 +48,6 @@ VOTERS, MIRRORS = 300, 12
 ITS_OWN = 0.8
 # A turn and a shift so small that what they do to points is linear in them.
 SMALL = 1e-3
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Shown:
-    """What one side shows of its surface, about the centre of its moments, in units of the target.
-
-    Attributes:
-        skin: its points without strays.
-        weights: [N] by which local planes are drawn, so that they are even; None where the points are.
-        cloud: local planes.
-        near: [M, NEIGHBOURS] of the points near each of them, if they are known.
-        views: [N, 3] where the points were seen from, if that is known.
-        closed: whether nothing can be missing, as of a mesh.
-    """
-
-    skin: Skin
-    weights: Array | None
-    cloud: LocalPlanes
-    near: Index | None
-    views: Array | None
-    closed: bool
-    rng: np.random.Generator
-
-    @classmethod
-    def of(cls, side: Side, unit: float, seed: int) -> "Shown | None":
-        """What a mesh or cloud shows; None if its points fill a volume."""
-        rng = np.random.default_rng(seed)
-        shape, weights = side.shape, None
-        if side.is_mesh:
-            shape = sampled(shape, SAMPLES, rng)
-        else:
-            seen = side.sampling
-            shape, weights = shape.chosen(seen.even), seen.shares
-        local, normals, views = (shape.points - side.moments.center) / unit, shape.normals, shape.viewpoint
-        skin = make_skin(local, rng, normals=normals, labels=shape.labels, thin=THIN)
-        if not side.is_mesh and normals is None and fills_volume(local, skin.tree, np.random.default_rng(0)):
-            return None
-        cloud, near = _planes(skin, drawn(len(local), PLANES, rng, weights))
-        views = None if views is None else (views - side.moments.center) / unit
-        return cls(skin=skin, weights=weights, cloud=cloud, near=near, views=views, closed=side.is_mesh, rng=rng)
-
-    def as_fine_as(self, spacing: float) -> "Shown":
-        """The same with as many local planes as it takes to lie about so near to one another."""
-        finer = (self.cloud.spacing / spacing) ** 2
-        if finer < COARSER:
-            return self
-        count = min(round(finer * PLANES), MOST_PLANES)
-        pick = drawn(len(self.skin.points), count, self.rng, self.weights)
-        cloud, near = _planes(self.skin, pick)
-        return replace(self, cloud=cloud, near=near)
-
-    def scaled(self, factor: float) -> "Shown":
-        """The same about the same centre, so many times as large."""
-        skin = replace(self.skin, points=factor * self.skin.points, given=None)
-        views = None if self.views is None else factor * self.views
-        return replace(self, skin=skin, cloud=self.cloud.scaled(factor), views=views)
-
-    @cached_property
-    def moving(self) -> LocalPlanes:
-        """Local planes that stand for all in the polish; of other points than those that judge, more maps come true."""
-        pick = drawn(len(self.skin.points), len(self.cloud.points) // MOVED, self.rng, self.weights)
-        return self.skin.local_planes(pick)
-
-    @cached_property
-    def openings(self) -> Openings:
-        """Where the surface ends without a reason, and what saw it."""
-        none = np.zeros(len(self.cloud.points), dtype=bool)
-        eyes = () if self.views is None else cameras(self.skin.points, self.views)
-        given = (self.cloud, self.skin.points, self.skin.tree, eyes, self.near)
-        open_ = None if self.closed else openings(*given, least=0.0)
-        return open_ or Openings(line=none, border=none, evident=False)
-
-    @cached_property
-    def noise(self) -> Array:
-        """Distances [M] of the local planes to the discs of all others: what sampling alone misses by."""
-        return disc_distances(self.cloud, self.cloud.points, self.cloud.labels, skip_self=True)
-
-
-def _planes(skin: Skin, pick: Index) -> tuple[LocalPlanes, Index | None]:
-    """The local planes of some points, and what is near these: their borders are told from the same points."""
-    near = skin.near(pick, NEIGHBOURS) if len(skin.points) >= NEIGHBOURS else None
-    return skin.local_planes(pick, near=near), near
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symrefine.align.pair import Evidence
-from symrefine.align.partial import WITHIN, Judge, Shown, proposals
+from symrefine.align.partial import WITHIN, Judge, proposals
 from symrefine.align.polish import Similarity, polish
+from symrefine.align.shown import Shown
 from symrefine.decide.maps import said_by_both
 from symrefine.geometry import tight_diagonal
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from symrefine.align.kinds import nearest_both_ways, with_one_set_of_classes
 from symrefine.align.pair import Side, few
-from symrefine.align.partial import MOST, Shown
+from symrefine.align.partial import MOST
+from symrefine.align.shown import Shown
 from symrefine.geometry import Array, Isometry, tight_diagonal
 from symrefine.moments.moments import shape_moments
 from symrefine.shape import Index, Shape

@@ -184,9 +184,10 @@ def _is_uneven(around: Surroundings, points: Array) -> bool:
     area = _area(around)
     if not area.all():
         return False  # points are repeated
+    if _trend(around.points, np.log(area)) <= UNEVEN:
+        return False
     flat = around.thickness < FLAT
-    told = [np.ones_like(flat), flat] if flat.sum() > AROUND else [np.ones_like(flat)]
-    if not all(_trend(around.points[some], np.log(area[some])) > UNEVEN for some in told):
+    if flat.sum() > AROUND and _trend(around.points[flat], np.log(area[flat])) <= UNEVEN:
         return False
     if np.median(around.away[:, -1]) <= WIDEST:
         return True

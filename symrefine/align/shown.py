@@ -1,0 +1,105 @@
+"""What one of two objects shows of its surface, where they may share a part only: local planes, and where it ends."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from symrefine.align.pair import THIN, Side, sampled
+from symrefine.detection.measure import SAMPLES
+from symrefine.geometry import Array
+from symrefine.shape import Index
+from symrefine.surface.cameras import cameras
+from symrefine.surface.misses import disc_distances
+from symrefine.surface.neighbourhoods import fills_volume
+from symrefine.surface.openings import NEIGHBOURS, Openings, openings
+from symrefine.surface.skin import LocalPlanes, Skin, drawn, make_skin
+
+# Local planes of either side: more cost time, and no more maps were found.
+PLANES = 1500
+# A side with so many times the surface gets as many more local planes, up to a number.
+COARSER, MOST_PLANES = 1.5, 6000
+# One in so many local planes is moved by the polish.
+MOVED = 2
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shown:
+    """What one side shows of its surface, about the centre of its moments, in units of the target.
+
+    Attributes:
+        skin: its points without strays.
+        weights: [N] by which local planes are drawn, so that they are even; None where the points are.
+        cloud: local planes.
+        near: [M, NEIGHBOURS] of the points near each of them, if they are known.
+        views: [N, 3] where the points were seen from, if that is known.
+        closed: whether nothing can be missing, as of a mesh.
+    """
+
+    skin: Skin
+    weights: Array | None
+    cloud: LocalPlanes
+    near: Index | None
+    views: Array | None
+    closed: bool
+    rng: np.random.Generator
+
+    @classmethod
+    def of(cls, side: Side, unit: float, seed: int) -> "Shown | None":
+        """What a mesh or cloud shows; None if its points fill a volume."""
+        rng = np.random.default_rng(seed)
+        shape, weights = side.shape, None
+        if side.is_mesh:
+            shape = sampled(shape, SAMPLES, rng)
+        else:
+            seen = side.sampling
+            shape, weights = shape.chosen(seen.even), seen.shares
+        local, normals, views = (shape.points - side.moments.center) / unit, shape.normals, shape.viewpoint
+        skin = make_skin(local, rng, normals=normals, labels=shape.labels, thin=THIN)
+        if not side.is_mesh and normals is None and fills_volume(local, skin.tree, np.random.default_rng(0)):
+            return None
+        cloud, near = _planes(skin, drawn(len(local), PLANES, rng, weights))
+        views = None if views is None else (views - side.moments.center) / unit
+        return cls(skin=skin, weights=weights, cloud=cloud, near=near, views=views, closed=side.is_mesh, rng=rng)
+
+    def as_fine_as(self, spacing: float) -> "Shown":
+        """The same with as many local planes as it takes to lie about so near to one another."""
+        finer = (self.cloud.spacing / spacing) ** 2
+        if finer < COARSER:
+            return self
+        count = min(round(finer * PLANES), MOST_PLANES)
+        pick = drawn(len(self.skin.points), count, self.rng, self.weights)
+        cloud, near = _planes(self.skin, pick)
+        return replace(self, cloud=cloud, near=near)
+
+    def scaled(self, factor: float) -> "Shown":
+        """The same about the same centre, so many times as large."""
+        skin = replace(self.skin, points=factor * self.skin.points, given=None)
+        views = None if self.views is None else factor * self.views
+        return replace(self, skin=skin, cloud=self.cloud.scaled(factor), views=views)
+
+    @cached_property
+    def moving(self) -> LocalPlanes:
+        """Local planes that stand for all in the polish; of other points than those that judge, more maps come true."""
+        pick = drawn(len(self.skin.points), len(self.cloud.points) // MOVED, self.rng, self.weights)
+        return self.skin.local_planes(pick)
+
+    @cached_property
+    def openings(self) -> Openings:
+        """Where the surface ends without a reason, and what saw it."""
+        none = np.zeros(len(self.cloud.points), dtype=bool)
+        eyes = () if self.views is None else cameras(self.skin.points, self.views)
+        given = (self.cloud, self.skin.points, self.skin.tree, eyes, self.near)
+        open_ = None if self.closed else openings(*given, least=0.0)
+        return open_ or Openings(line=none, border=none, evident=False)
+
+    @cached_property
+    def noise(self) -> Array:
+        """Distances [M] of the local planes to the discs of all others: what sampling alone misses by."""
+        return disc_distances(self.cloud, self.cloud.points, self.cloud.labels, skip_self=True)
+
+
+def _planes(skin: Skin, pick: Index) -> tuple[LocalPlanes, Index | None]:
+    """The local planes of some points, and what is near these: their borders are told from the same points."""
+    near = skin.near(pick, NEIGHBOURS) if len(skin.points) >= NEIGHBOURS else None
+    return skin.local_planes(pick, near=near), near
