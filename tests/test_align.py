@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from experiments.objects import damage
 from experiments.objects.household import camera
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
+from experiments.studies import partial_alignment
 from symrefine.align.landscape import grid_rotations, harmonic_pair, hills, landscape, least_misfit
 from symrefine.align.moment_fit import as_good, best_fits, covariance, exact, fit, misfit
 from symrefine.align.partial import Judge
@@ -582,6 +583,14 @@ def test_strays_on_both_sides_cost_no_confidence(det: int) -> None:
     found = align(strewn(), strewn() @ matrix.T)
     assert angle_deg(found.matrix, matrix) < 0.3
     assert found.confidence > 0.95
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+@pytest.mark.parametrize("seed", [63, 65])
+def test_a_hand_that_strays_hide_is_not_told_for_sure(det: int, seed: int) -> None:
+    # What makes a coffee grinder differ from its mirror image is a crank, which 40 % of strays may hide.
+    found = partial_alignment.run(partial_alignment.Case(name="grinder", condition="outliers 40 %", det=det, seed=seed))
+    assert found.covered or found.confidence <= 0.5
 
 
 def test_no_map_comes_below_what_lengths_allow() -> None:

@@ -26,7 +26,7 @@ class Miss:
         excess: what the map misses by over what the tolerance, or the noise of the moments, allows.
         overlap: share of the source that the map lays on the target, and share of the target that is met.
         determinant_confidence: probability that the determinant is right.
-        hand_is_open: whether neither hand misses by so little as true maps do, and both by about as much.
+        hand_is_open: whether the other hand misses by about as much: right where the object is its own mirror image.
         confidence: probability that the map is, where it was not told from the excess.
     """
 
@@ -141,7 +141,8 @@ class Alignment(ReadOnly):
         if self.exact:
             return 1.0
         agree = meant(Link(need=self._fit.excess), 1.0)
-        # Where the other hand does about as well though the target has no mirror, either may be right.
+        # Where the other hand does about as well though the target has no mirror, either may be right: its details are
+        # lost in noise or strays.
         if self._fit.hand_is_open and len(set(np.sign(np.linalg.det(self.equivalents)))) == 1:
             return min(agree, self.determinant_confidence)
         return agree

@@ -60,8 +60,8 @@ class Choice:
 
     @property
     def hand_is_open(self) -> bool:
-        """Whether neither hand misses by so little as true maps do, and both by about as much."""
-        return self.lead < GOOD < self.excess
+        """Whether the other hand misses by about as much: right where the object is its own mirror image."""
+        return self.lead < GOOD
 
     @property
     def merit(self) -> tuple[float, float]:
