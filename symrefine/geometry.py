@@ -263,6 +263,16 @@ class Isometry(ReadOnly):
         """Images [N, n] of directions [N, n]."""
         return vectors @ self.matrix.T
 
+    @property
+    def inverse(self) -> "Isometry":
+        """The way back."""
+        return Isometry(matrix=self.matrix.T, shift=-(self.shift @ self.matrix))
+
+    @property
+    def is_involution(self) -> bool:
+        """Whether it is its own inverse, up to rounding, where it leaves a point in place."""
+        return np.allclose(self.matrix, self.matrix.T, rtol=0.0, atol=1e-12)
+
 
 @lru_cache(maxsize=1)
 def _box_trials() -> tuple[Array, Array, Array]:

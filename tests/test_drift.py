@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from experiments.studies import groups
+from symrefine.detection.story import detect
 from symrefine.geometry import Array, Isometry, Plane
 from symrefine.surface.drift import Drift
 from symrefine.surface.misses import needs
@@ -67,3 +69,23 @@ def test_what_is_found_turns_with_the_cloud() -> None:
 def test_fewer_windows_are_some_of_them() -> None:
     found = drift(rods(np.random.default_rng(2), AWAY))
     np.testing.assert_allclose(found.misses([MIRROR], 500), found.misses([MIRROR], 1500)[:, ::3], atol=1e-12)
+
+
+def test_windows_that_reach_what_nobody_saw_are_those_that_what_is_missing_moves() -> None:
+    points = rods(np.random.default_rng(3))
+    whole, cut = drift(points), drift(points[(points[:, 0] < 0.0) | (points[:, 2] < 0.5)])
+    height, side = cut.sources[:, 2], cut.sources[:, 0]
+    # Of the rod that is whole the upper half is carried to where the other is cut off.
+    hidden = cut.sources[(side < 0.0) & (height > 0.5)]
+    seen, misses = ~cut.reach([MIRROR], 1500, [(hidden, hidden)])[0], cut.misses([MIRROR], 1500)[0]
+    assert seen[height < 0.0].all()
+    assert not seen[np.abs(height - 0.5) < 0.05].any()
+    assert misses[seen].max() < 2.0 * whole.misses([MIRROR], 1500).max() < misses.max()
+
+
+@pytest.mark.parametrize("seed", [41, 61])
+def test_a_tooth_out_of_place_is_told_though_noise_makes_teeth_look_open(seed: int) -> None:
+    made, _ = groups.posed(groups.Case(shape="gear24", sibling=True, noise_rel=0.01, seed=seed))
+    found = detect(made)
+    assert found.surface.openings is not None
+    assert found.point_group == "Cs"

@@ -322,7 +322,7 @@ def _moved_each(operations: int, least: int) -> int:
 def _judged(surface: Surface, parts: _Parts, misses: Array) -> tuple[tuple[Element, ...], float]:
     """The elements of a group from the misses [K, N] of its operations, and what all of them need."""
     tests = len(parts.operations)
-    drifted, all_drifted = surface.drifted(parts.motions, tests)
+    drifted, all_drifted = surface.drifted(misses, parts.motions, tests, sources=parts.sources)
     needs = np.maximum(surface.needed(misses, parts.motions, tests), drifted)
     found = tuple(
         Element(

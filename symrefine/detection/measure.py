@@ -313,8 +313,9 @@ def _surface(
     # Where noise alone needs all that is allowed, nobody sees what is open.
     if tree is not None and (surface.floor < tolerance or views):
         surface = replace(surface, openings=openings(cloud, local, tree, views, near, clumps=hiding))
-    # Where density differs, a window and its image hold more of chance than one window and itself.
-    if surface.openings is None and whole.noisy and uneven is None:
+    # Where density differs, as between what cameras saw from far and near or where a clump adds to it, a window and its
+    # image hold more of chance than one window and itself.
+    if whole.noisy and uneven is None and not (views or hiding):
         surface = replace(surface, drift=Drift.of(local, whole.tree, WINDOWS, rng))
     return surface
 

@@ -4,7 +4,8 @@ Local planes tell where a surface is. Where noise is as thick as the parts of an
 that is out of place lies inside what noise makes of its image. But all of the part is out of place the same way, and
 the middle of what a window holds tells that to a fraction of the noise. So the middles of the same window in the cloud
 and in its image are compared, along directions in which the window is not filled: along a sheet, or inside a solid, it
-sees no end of them, and the middle is a matter of chance.
+sees no end of them, and the middle is a matter of chance. What nobody saw is missing in the middle, so windows that
+reach that far tell nothing.
 """
 
 import math
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.geometry import Array, Isometry, ReadOnly, rows
+from symrefine.geometry import Array, Isometry, Mask, ReadOnly, rows
 from symrefine.surface.neighbourhoods import NEIGHBOURS, in_cells
 from symrefine.surface.tree import Tree
 
@@ -108,13 +109,35 @@ class Drift(ReadOnly):
 
     def misses(self, motions: Sequence[Isometry], sources: int) -> Array:
         """How far `sources` windows of each of K images lie from those of the cloud [K, .]."""
-        stride = max(1, len(self.sources) // sources)
-        points, offsets, gains = self.sources[::stride], self.offsets[::stride], self.gains[::stride]
+        some = self._some(sources)
+        points, offsets, gains = self.sources[some], self.offsets[some], self.gains[some]
         moved = np.concatenate([m.apply(points) for m in motions])
         there = self.windows.offsets(moved).reshape(len(motions), -1, 3)
         # Back where the image came from, the gains are those of the cloud itself.
         back = [_applied(gains, t @ m.matrix - offsets) for t, m in zip(there, motions, strict=True)]
         return np.linalg.norm(np.stack(back), axis=2)
+
+    def reach(self, motions: Sequence[Isometry], sources: int, unseen: Sequence[tuple[Array, Array]]) -> Mask:
+        """Which of these windows reach what nobody saw, here or there [K, .]: what is missing moves a middle as well.
+
+        `unseen` is, of each operation, what it and what its inverse takes to where nobody looked, [., 3] each.
+        """
+        points, reach = self.sources[self._some(sources)], REACH * self.windows.width
+
+        def near(queries: Array, places: Array) -> Mask:
+            return np.isfinite(Tree(places).nearest(queries, bound=reach)[0])
+
+        each = zip(motions, unseen, strict=True)
+        return np.stack([near(points, here) | near(m.apply(points), there) for m, (here, there) in each])
+
+    def _some(self, sources: int) -> slice:
+        return slice(None, None, max(1, len(self.sources) // sources))
+
+    def redundancy(self, count: int) -> float:
+        """How many of `count` windows are as good as one, as they overlap."""
+        # Of the cells that a window reaches in a sheet, so many count as if they had all of its weight.
+        alone = CELLS * (2.0 / REACH) ** 2
+        return max(1.0, count * alone / len(self.windows.counts))
 
 
 def _cells(points: Array, width: float, rng: np.random.Generator) -> int:

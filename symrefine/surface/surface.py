@@ -169,16 +169,43 @@ class Surface:
         chance = 2.0 * np.mean([spread_distance(own, part) ** 2 for part in parts]) / (PIECES - 1)
         return own, float(chance * (1.0 + SURE * math.sqrt(2.0 / own[np.triu_indices(3)].size)))
 
-    def drifted(self, motions: Sequence[Isometry], tests: int = 1) -> tuple[Array, float]:
+    def drifted(
+        self, misses: Array, motions: Sequence[Isometry], tests: int = 1, *, sources: int = 10**9
+    ) -> tuple[Array, float]:
         """The smallest tolerances [K] at which operations hold by where windows lie, and that of all of them together.
 
-        `tests` as of `needs`.
+        Args:
+            misses: of the local planes [K, N], NaN for what operations carry to where nobody looked.
+            motions: the operations.
+            tests: as of `needs`.
+            sources: local planes that were moved.
         """
         if self.drift is None:
             return np.zeros(len(motions)), 0.0
-        misses = self.drift.misses(motions, max(WINDOWS_EACH, WINDOWS // len(motions))) / self.diagonal
-        noise = self.drift.noise / self.diagonal
-        return needs(misses, noise, tests), float(needs(misses.ravel(), noise))
+        count = max(WINDOWS_EACH, WINDOWS // len(motions))
+        found = self.drift.misses(motions, count) / self.diagonal
+        told = self._told(found, tests)
+        if self.openings is None or max(told[0].max(), told[1]) == 0.0:
+            return told
+        found[self.drift.reach(motions, count, self._unseen(misses, motions, sources))] = np.nan
+        return self._told(found, tests)
+
+    def _told(self, drifts: Array, tests: int) -> tuple[Array, float]:
+        """What operations need, each [K] and together, whose windows lie elsewhere by so much [K, S]."""
+        assert self.drift is not None
+        noise, redundancy = self.drift.noise / self.diagonal, self.drift.redundancy(drifts.shape[1])
+        together = needs(drifts.ravel(), noise, redundancy=redundancy)
+        return needs(drifts, noise, tests, redundancy), float(together)
+
+    def _unseen(self, misses: Array, motions: Sequence[Isometry], sources: int) -> list[tuple[Array, Array]]:
+        """Of each operation what it, and what its inverse, takes to where nobody looked, [., 3] each."""
+        points = self.cloud.points[:: self.stride(sources)]
+        unseen = np.isnan(misses)
+        back, turns = unseen.copy(), [k for k, m in enumerate(motions) if not m.is_involution]
+        if turns:
+            ways = [motions[k].inverse for k in turns]
+            back[turns] = np.isnan(self.seen(self.misses(ways, sources=sources), ways, sources=sources))
+        return [(points[a], points[b]) for a, b in zip(unseen, back, strict=True)]
 
     def needed_by_all(self, misses: Array) -> float:
         """The smallest tolerance at which a surface holds that operations together miss so [K, N]."""
