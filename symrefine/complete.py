@@ -13,6 +13,7 @@ from symrefine.geometry import Array, Isometry
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.tree import Tree
+from symrefine.threads import one_thread
 
 # Turns that stand for those of a surface of revolution.
 ROUND = 36
@@ -48,6 +49,7 @@ class Verdicts:
     inferred: Array
 
 
+@one_thread()
 def complete(
     shape: Shape,
     found: Detection | None = None,

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from symrefine.align.coset import Coset
 from symrefine.decide.posterior import Link, meant
 from symrefine.geometry import Array, ReadOnly
+from symrefine.threads import one_thread
 
 OK = "ok"
 # How a status begins that leaves open whether the objects agree.
@@ -84,6 +85,7 @@ class Alignment(ReadOnly):
         return np.asarray(self.scale * (np.asarray(points, dtype=np.float64) @ self.matrix.T) + self.translation)
 
     @cached_property
+    @one_thread()
     def coset(self) -> Coset:
         """All maps that do equally well; in 3-space from what `detect` finds in the target, on first use."""
         return self._coset()
@@ -111,6 +113,7 @@ class Alignment(ReadOnly):
         return np.cross(free[0], free[1])[None] if free.shape == (2, 3) else np.zeros((0, self.matrix.shape[0]))
 
     @cached_property
+    @one_thread()
     def _fit(self) -> Miss:
         return self._miss()
 

@@ -47,10 +47,12 @@ from symrefine.plane import detect_planar
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.skin import drawn
+from symrefine.threads import one_thread
 
 __all__ = ["Alignment", "align"]
 
 
+@one_thread()
 def align(
     source: Shape | ArrayLike,
     target: Shape | ArrayLike,

@@ -18,6 +18,7 @@ from symrefine.shape import Index, Shape
 from symrefine.stream import Stream
 from symrefine.surface.sampling import strays_beside
 from symrefine.surface.surroundings import Surroundings
+from symrefine.threads import one_thread
 
 # Points of a cloud from which on a sample stands for its surface, and points of that: with 1 % noise planes are then
 # known to 0.07 degrees instead of 0.05, at a tenth of the cost for a million points.
@@ -74,6 +75,7 @@ def sampled(shape: Shape, seed: int = 0) -> Shape:
     return shape.chosen(_picked(len(shape.points), np.random.default_rng(seed)))
 
 
+@one_thread()
 def sketched(given: Shape | Stream, seed: int = 0) -> Sketch:
     """Sample and moments of a cloud, in one pass over its chunks.
 

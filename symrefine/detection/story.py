@@ -22,11 +22,13 @@ from symrefine.fit.vertices import OnVertices
 from symrefine.geometry import Array, Axis, Plane, cross_matrix, positive
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
+from symrefine.threads import one_thread
 
 # Tolerances of the staircase that the command line tells.
 LADDER = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08)
 
 
+@one_thread()
 def detect(
     shape: Shape | Sketch | ArrayLike,
     *,
@@ -83,6 +85,7 @@ def told(found: Examined, *, tolerance: float = TOLERANCE, ladder: Sequence[floa
     return _report(found, decision, 0 if reason else decision.index, reason, tolerance, steps, clock)
 
 
+@one_thread()
 def chosen(detection: Detection, point_group: str) -> Detection:
     """What is told if a person says that another group of the chain is meant: its elements, where it fits best.
 

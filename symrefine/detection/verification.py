@@ -14,11 +14,13 @@ from symrefine.fit.placed import elements
 from symrefine.geometry import Array, Isometry
 from symrefine.stream import Stream
 from symrefine.surface.misses import LIMITS, Deviation, disc_distances
+from symrefine.threads import one_thread
 
 # Misses end at so many tolerances, and are counted in so many bins up to there: percentiles to 3 % of the tolerance.
 MOST, BINS = 3.0 * LIMITS[-1], 200
 
 
+@one_thread()
 def verified(found: Detection, points: Stream) -> Detection:
     """A detection with the misses of all points.
 

@@ -20,6 +20,7 @@ from symrefine.ntuples.rank import FLOOR, FixedSubspace, fixed_subspace
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.skin import FEW
+from symrefine.threads import one_thread
 
 # Parts of the jackknife, and dimensions up to which moments of order 5 are few enough.
 PARTS = 16
@@ -72,6 +73,7 @@ class SubspaceDetection(ReadOnly):
     timings: dict[str, float] = field(default_factory=dict)
 
 
+@one_thread()
 def detect_nd(
     shape: Shape | ArrayLike, *, tolerance: float = TOLERANCE, sampled: bool | None = None, seed: int = 0
 ) -> SubspaceDetection:

@@ -19,6 +19,7 @@ from symrefine.plane.doublets import ORDER, PLANAR_ORDERS, DoubletClass, classif
 from symrefine.plane.outline import NOISES, Outlines, make_outlines
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE, Deviation
+from symrefine.threads import one_thread
 
 # Parts of the jackknife.
 PARTS = 32
@@ -94,6 +95,7 @@ class PlanarDetection(ReadOnly):
     timings: dict[str, float] = field(default_factory=dict)
 
 
+@one_thread()
 def detect_planar(
     shape: Shape | ArrayLike, *, weights: ArrayLike | None = None, tolerance: float = TOLERANCE, seed: int = 0
 ) -> PlanarDetection:

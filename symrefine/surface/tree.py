@@ -1,15 +1,14 @@
 """Nearest neighbours: the kd-tree that all of detection asks, about twice as quick as scipy's."""
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from symrefine.geometry import Array
 from symrefine.shape import Index
+from symrefine.threads import one_thread
 
 # Points in a leaf: of 6 to 32 the quickest for 1 to 12 neighbours. Of more neighbours than so many scipy's tree is
 # quicker, which keeps them in a heap and not in a row.
@@ -23,7 +22,7 @@ class Tree:
         from pykdtree.kdtree import KDTree
 
         self.points = np.ascontiguousarray(points, dtype=np.float64)
-        with _one_thread():
+        with one_thread():
             self._tree: Any = KDTree(self.points, leafsize=LEAF) if len(self.points) else None
 
     def query(self, queries: Array, count: int, *, skip: int = 0, bound: float = math.inf) -> tuple[Array, Index]:
@@ -41,7 +40,7 @@ class Tree:
             return np.asarray(away), np.asarray(near)
         if self._tree is None:
             return np.full((len(queries), count), np.inf), np.zeros((len(queries), count), dtype=np.int64)
-        with _one_thread():
+        with one_thread():
             limit = None if math.isinf(bound) else bound
             away, near = self._tree.query(np.ascontiguousarray(queries), k=last, distance_upper_bound=limit)
         away, near = away.reshape(-1, last)[:, skip:], near.reshape(-1, last)[:, skip:].astype(np.int64)
@@ -60,27 +59,6 @@ class Tree:
         """Distance and index, both [Q], of the point nearest to each query; see `query`."""
         away, near = self.query(queries, 1, bound=bound)
         return away[:, 0], near[:, 0]
-
-
-@cache
-def _threads() -> tuple[Any, ...]:
-    """What sets how many threads the tree's OpenMP makes."""
-    from threadpoolctl import ThreadpoolController
-
-    return tuple(lib for lib in ThreadpoolController().lib_controllers if lib.user_api == "openmp")
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """No threads of OpenMP within: GNU's hang in every process that is forked after it made some."""
-    before = [(lib, lib.get_num_threads()) for lib in _threads()]
-    for lib, _ in before:
-        lib.set_num_threads(1)
-    try:
-        yield
-    finally:
-        for lib, count in before:
-            lib.set_num_threads(count)
 
 
 def side_by_side(points: Array) -> Index:
