@@ -20,16 +20,13 @@ from symrefine.fit.matching import AGREE
 from symrefine.geometry import Array, Isometry, Mask, householder, tight_diagonal
 from symrefine.groups.orthogonal import chord_angles
 from symrefine.ntuples.rank import SIGNIFICANT
-from symrefine.propose.consensus import Matches, Proposal, consensus
-from symrefine.propose.signatures import mutual_matches, signatures
+from symrefine.propose.consensus import Proposal
+from symrefine.propose.maps import WITHIN, maps_between
 from symrefine.propose.votes import mirror_votes
 from symrefine.shape import Index
 from symrefine.surface.misses import LIMITS, disc_distances
 from symrefine.surface.surface import HOPELESS
 
-# How far around themselves local planes look and how near matches come, in diagonals, and matches that are asked: more
-# cost time, and no more maps were found.
-AROUND, WITHIN, MATCHES = 0.1, 0.04, 500
 # One in so many local planes is asked by the looks at maps that are proposed, or polished.
 LOOK = 3
 # Maps of each determinant that are polished, if they meet at least such a share of what the best does.
@@ -124,7 +121,7 @@ def partial_meeting(evidence: Evidence, *, reflections: bool, factor: float = 1.
         diagonal=min(tight_diagonal(s.cloud.points) for s in (source, target)),
         tolerance=evidence.tolerance,
     )
-    promising = judge.promising(proposals(source, target, judge.diagonal))
+    promising = judge.promising(maps_between(source.cloud, target.cloud, judge.diagonal))
     found = judge.polished_all([], [Similarity(matrix=p.matrix, shift=p.shift) for p in promising])
     admitted = [m for m in found if reflections or m.determinant > 0]
     if not admitted:
@@ -135,16 +132,6 @@ def partial_meeting(evidence: Evidence, *, reflections: bool, factor: float = 1.
     rivals = sorted((m for m in found if m is not best), key=lambda m: -m.score)
     open_ = source.openings.evident or target.openings.evident
     return _weighed(best, rivals, judge.slid(best), reflections=reflections, open_=open_)
-
-
-def proposals(source: Shown, target: Shown, diagonal: float) -> list[Proposal]:
-    """Maps of either determinant that local planes which look alike agree upon."""
-    a, b = source.cloud, target.cloud
-    source_looks, target_looks = (signatures(cloud, AROUND * diagonal) for cloud in (a, b))
-    classes = None if a.labels is None or b.labels is None else (a.labels, b.labels)
-    i, j = (m[:MATCHES] for m in mutual_matches(source_looks, target_looks, classes))
-    matches = Matches(source=a.points[i], source_normals=a.normals[i], target=b.points[j], target_normals=b.normals[j])
-    return consensus(matches, WITHIN * diagonal)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

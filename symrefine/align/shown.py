@@ -8,6 +8,7 @@ import numpy as np
 from symrefine.align.pair import THIN, Side, sampled
 from symrefine.detection.measure import SAMPLES
 from symrefine.geometry import Array
+from symrefine.propose.maps import PLANES
 from symrefine.shape import Index
 from symrefine.surface.cameras import cameras
 from symrefine.surface.misses import disc_distances
@@ -15,8 +16,6 @@ from symrefine.surface.neighbourhoods import fills_volume
 from symrefine.surface.openings import NEIGHBOURS, Openings, openings
 from symrefine.surface.skin import LocalPlanes, Skin, drawn, make_skin
 
-# Local planes of either side: more cost time, and no more maps were found.
-PLANES = 1500
 # A side with so many times the surface gets as many more local planes, up to a number.
 COARSER, MOST_PLANES = 1.5, 6000
 # One in so many local planes is moved by the polish.

@@ -34,9 +34,9 @@ from symrefine.propose.candidates import (
     beside,
     prime_axes,
     proposals,
+    repeated,
     turned_over,
     voted_mirrors,
-    voted_turns,
 )
 from symrefine.propose.votes import AGREE_RAD
 from symrefine.surface.misses import LIMITS
@@ -138,9 +138,7 @@ def _of_part(surface: Surface, whole: Pool) -> Pool:
     pool = Pool(nothing=whole.nothing, limit=whole.limit)
     for known in (whole.largest, *whole.small):
         pool = _grown(surface, pool, fitted(surface, known.placed)) if known.elements else pool
-    pool = _with(surface, pool, voted_mirrors(surface.cloud))
-    # Two mirrors tell the axis that they share, and what may stand beside it; of turns alone only votes know.
-    return pool if _size(pool.largest.placed) > 2 else _with(surface, pool, voted_turns(surface.cloud))
+    return _with(surface, pool, [*voted_mirrors(surface.cloud), *repeated(surface.cloud, surface.diagonal)])
 
 
 def _with(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:

@@ -14,14 +14,15 @@ from symrefine.fit.frame import polish_frame
 from symrefine.fit.placed import Placed
 from symrefine.geometry import Array, frame_with_z
 from symrefine.groups import MAX_FOLD as MAX_ORDER
-from symrefine.groups import PointGroup
+from symrefine.groups import PointGroup, close
 from symrefine.moments.harmonics import harmonic_moments
 from symrefine.moments.moments import Moments
 from symrefine.ntuples.rank import FixedSubspace
-from symrefine.propose.folds import MAX_FOLD, fold_candidates, frames_across
+from symrefine.propose.folds import MAX_FOLD, ROUNDING, fold_candidates, frames_across
+from symrefine.propose.maps import WITHIN, maps_onto_itself
 from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candidates, whitened
-from symrefine.propose.votes import mirror_votes, revolution, turn_votes
-from symrefine.surface.skin import Planes
+from symrefine.propose.votes import AGREE_RAD, mirror_votes, revolution
+from symrefine.surface.skin import LocalPlanes, Planes
 
 # Directions nearer than this to an earlier one are the same start: half of what order 8 resolves is 5.6 degrees.
 APART_RAD = np.radians(3.0)
@@ -70,10 +71,21 @@ def voted_mirrors(planes: Planes) -> list[Placed]:
     return [*round_it, *(placed("Cs", frame_with_z(v.direction), v.foot) for v in mirrors)]
 
 
-def voted_turns(planes: Planes) -> list[Placed]:
-    """Turns of prime order that they vote for."""
-    turns = turn_votes(planes.points, planes.normals, np.random.default_rng(0))
-    return [placed(f"C{order}", frame_with_z(v.direction), v.foot) for v, order in turns]
+def repeated(cloud: LocalPlanes, diagonal: float) -> list[Placed]:
+    """What single maps of a surface onto itself generate that its local planes agree upon: mirrors, turns, all else.
+
+    A map that also slides along the axis that it turns about, or along its mirror, is no symmetry of a finite body, nor
+    is one about something that the body is all on one side of.
+    """
+    found = []
+    for m in maps_onto_itself(cloud, diagonal, np.random.default_rng(0)):
+        still = np.eye(3) - m.matrix
+        center = np.linalg.pinv(still, rcond=ROUNDING) @ m.shift
+        if np.linalg.norm(m.shift - still @ center) > WITHIN * diagonal or np.linalg.norm(center) > diagonal:
+            continue
+        group = close(m.matrix[None], 0.5 * AGREE_RAD, max_fold=MAX_FOLD).group
+        found += [Placed(group=group, center=center)] if group.order > 1 else []
+    return found
 
 
 def prime_axes(evidence: Evidence) -> list[Placed]:

@@ -1,9 +1,8 @@
-"""Mirrors, turns and revolutions that pairs of local planes vote for: no centroid, so that missing parts bias nothing.
+"""Mirrors and revolutions that pairs of local planes vote for: no centroid, so that missing parts bias nothing.
 
 A mirror that carries one local plane onto another has its normal along their difference and passes half way between
-them; what decides is whether it turns the one normal into the other. A turn has its axis across both differences, that
-of the places and that of the normals (Mitra, Guibas, Pauly, 2006, in small). The axis of a revolution meets all
-normals, which is linear in its Pluecker coordinates (Pottmann, Randrup, 1998).
+them; what decides is whether it turns the one normal into the other (Mitra, Guibas, Pauly, 2006, in small). The axis of
+a revolution meets all normals, which is linear in its Pluecker coordinates (Pottmann, Randrup, 1998).
 """
 
 from dataclasses import dataclass
@@ -25,8 +24,8 @@ class Vote:
     """A place where votes are dense.
 
     Attributes:
-        direction: [3] normal of a mirror or direction of an axis, without a sign.
-        foot: [3] point of the plane or axis nearest to the origin.
+        direction: [3] normal of a mirror, without a sign.
+        foot: [3] point of the plane nearest to the origin.
         votes: indices of the pairs that vote for it.
     """
 
@@ -50,37 +49,6 @@ def mirror_votes(points: Array, normals: Array, rng: np.random.Generator, *, tol
     return _densest(m, 0.5 * np.einsum("ki,ki->k", m, rows(x, i) + rows(x, j))[:, None] * m, worth, told)
 
 
-def turn_votes(points: Array, normals: Array, rng: np.random.Generator) -> list[tuple[Vote, int]]:
-    """Axes that turn many local planes [N, 3] into others, with the smallest prime order that their angles suggest."""
-    x, n, i, j = _pairs(points, normals, VOTERS // 2, rng)
-    i, j, sign = np.tile(i, 2), np.tile(j, 2), np.repeat([1.0, -1.0], len(i))
-    moved, turned = rows(x, j) - rows(x, i), sign[:, None] * rows(n, j) - rows(n, i)
-    axis = np.cross(moved, turned)
-    worth = np.linalg.norm(axis, axis=1) / np.linalg.norm(moved, axis=1)
-    kept = worth > np.sin(AGREE_RAD)
-    i, j, moved, u, worth = i[kept], j[kept], moved[kept], unit_rows(axis[kept]), worth[kept]
-    own, image = rows(n, i), sign[kept][:, None] * rows(n, j)
-    a, b = (v - np.einsum("ki,ki->k", v, u)[:, None] * u for v in (own, image))
-    angle = np.arctan2(np.einsum("ki,ki->k", np.cross(a, b), u), np.einsum("ki,ki->k", a, b))
-    # The axis lies across the difference, as far off its middle as the angle says.
-    off = 0.5 / np.tan(0.5 * np.where(np.abs(angle) < AGREE_RAD, AGREE_RAD, angle))
-    through = 0.5 * (rows(x, i) + rows(x, j)) + off[:, None] * np.cross(u, moved)
-    foot = through - np.einsum("ki,ki->k", through, u)[:, None] * u
-    near = (np.abs(angle) > AGREE_RAD) & (np.linalg.norm(foot, axis=1) < 3.0)
-    found = _densest(rows(u, near), rows(foot, near), worth[near])
-    return [(v, _order(angle[near][v.votes])) for v in found]
-
-
-def _order(angles: Array) -> int:
-    """The prime order whose multiples most of the angles are near, over what chance would bring."""
-    shares = {}
-    for order in (2, 3, 5, 7):
-        turns = np.abs(angles) * order / (2.0 * np.pi)
-        close = np.abs(turns - np.round(turns)) * 2.0 * np.pi / order < AGREE_RAD
-        shares[order] = float((close & (np.round(turns) > 0)).mean()) / (order * AGREE_RAD / np.pi)
-    return max(shares, key=lambda k: shares[k])
-
-
 def _pairs(points: Array, normals: Array, count: int, rng: np.random.Generator) -> tuple[Array, Array, Index, Index]:
     """Some local planes, and the pairs of them that are not next to one another."""
     some = rng.permutation(len(points))[:count]
@@ -96,7 +64,7 @@ def unit_rows(vectors: Array) -> Array:
 
 
 def _densest(directions: Array, feet: Array, worth: Array, told: int = TOLD) -> list[Vote]:
-    """The densest spots of votes for planes or lines: unit vectors [K, 3] without a sign, with their feet [K, 3]."""
+    """The densest spots of votes for planes: unit vectors [K, 3] without a sign, with their feet [K, 3]."""
     some = worth > 0.0
     directions, feet, worth = rows(directions, some), rows(feet, some), worth[some]
     if not some.any():

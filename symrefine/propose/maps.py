@@ -1,0 +1,45 @@
+"""Maps of one surface onto another, or onto itself, that local planes which look alike agree upon.
+
+Neither centroid nor moments are asked, so that missing parts bias nothing; either determinant is as likely. What a
+surface is carried onto itself by is a symmetry of what was seen: a mirror, a turn, the inversion, a rotoreflection.
+"""
+
+import numpy as np
+
+from symrefine.propose.consensus import Matches, Proposal, consensus
+from symrefine.propose.signatures import mutual_matches, own_matches, signatures
+from symrefine.shape import Index
+from symrefine.surface.skin import LocalPlanes, Planes
+
+# How far around themselves local planes look and how near matches come, in diagonals; local planes of either side, and
+# matches that are asked: more cost time, and no more maps were found.
+AROUND, WITHIN, PLANES, MATCHES = 0.1, 0.04, 1500, 500
+
+
+def maps_between(source: LocalPlanes, target: LocalPlanes, diagonal: float) -> list[Proposal]:
+    """Maps of either determinant from one surface onto another, best first; `diagonal` is that of the smaller one."""
+    source_looks, target_looks = (signatures(cloud, AROUND * diagonal) for cloud in (source, target))
+    classes = None if source.labels is None or target.labels is None else (source.labels, target.labels)
+    return _agreed(source, target, mutual_matches(source_looks, target_looks, classes), diagonal)
+
+
+def maps_onto_itself(cloud: LocalPlanes, diagonal: float, rng: np.random.Generator) -> list[Proposal]:
+    """Maps of either determinant of a surface onto itself, but for the identity and what is next to it, best first."""
+    some = np.sort(rng.permutation(len(cloud.points))[:PLANES])
+    chosen = cloud.chosen(some)
+    looks = signatures(chosen, AROUND * diagonal)
+    matches = own_matches(looks, chosen.points, 2.0 * WITHIN * diagonal, cloud.classes(some))
+    return _agreed(chosen, chosen, matches, diagonal)
+
+
+def _agreed(source: Planes, target: Planes, matches: tuple[Index, Index], diagonal: float) -> list[Proposal]:
+    i, j = (m[:MATCHES] for m in matches)
+    return consensus(
+        Matches(
+            source=source.points[i],
+            source_normals=source.normals[i],
+            target=target.points[j],
+            target_normals=target.normals[j],
+        ),
+        WITHIN * diagonal,
+    )
