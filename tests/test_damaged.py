@@ -18,11 +18,14 @@ from experiments.objects.shapes import bottle, box, join, mug, revolve, sample, 
 from experiments.studies import damaged, groups, single_views
 from symrefine.cli import invoke
 from symrefine.complete import complete
+from symrefine.decide.hypotheses import looked_at
 from symrefine.detection import examination
 from symrefine.detection.measure import HIDDEN, gather, measure
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
-from symrefine.geometry import Isometry, householder, line_angle_rad, random_orthogonal, rotation
+from symrefine.fit.placed import Placed
+from symrefine.geometry import Isometry, frame_with_z, householder, line_angle_rad, random_orthogonal, rotation
+from symrefine.groups import PointGroup
 from symrefine.load import load
 from symrefine.picture.words import scanned
 from symrefine.propose.candidates import repeated
@@ -426,6 +429,28 @@ def test_a_box_of_parallel_sides_with_a_corner_gone_keeps_its_inversion():
         assert found.point_group == "Ci" or found.confidence < 0.95 or found.at_least
         right += found.point_group == "Ci"
     assert right >= 2
+
+
+@pytest.mark.parametrize(("family", "name"), [("household", "sofa"), ("household", "chair"), ("shape", "chair")])
+def test_edges_tell_where_the_mirror_is_of_which_one_view_shows_one_side(family, name):
+    """Of the sides that face along the normal one is seen; how far the mirror is from it, only the seat's edges say."""
+    row = single_views.run(single_views.Case(family=family, name=name, clean=False, seed=17))
+    assert [t.is_true for t in row.told if t.confidence >= 0.5] == [0]
+    assert row.told[0].error_deg < 1.0
+
+
+@pytest.mark.parametrize("aside", [-0.08, 0.08])
+@pytest.mark.parametrize("seed", [5, 6, 7, 8])
+def test_a_mirror_put_aside_comes_back_to_where_edges_tell(aside, seed):
+    mesh, truth = specimen("household", "sofa")
+    made = damage.views(mesh, 1.0, np.random.default_rng(seed))
+    given = {"points": made.points, "viewpoint": made.viewpoint}
+    measured, surface = measure(Shape(**given)), surface_of(**given)
+    normal, center = truth.group.mirrors()[0], (truth.center - measured.moments.center) / measured.moments.scale
+    group = PointGroup(name="Cs", frame=frame_with_z(normal))
+    look = looked_at(surface, Placed(group=group, center=center + aside * normal), 1.0)
+    assert abs((look.placed.center - center) @ normal) < 0.5 * abs(aside)
+    assert look.needs < 0.25 * surface.tolerance
 
 
 def test_the_axis_of_a_revolution_meets_its_normals():

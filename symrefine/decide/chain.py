@@ -258,9 +258,13 @@ def _generated(
     return fitted(surface, look.placed, error_rad=look.error_rad, before=before)
 
 
-def _worst(found: Hypothesis, hidden: float) -> tuple[float, float]:
-    """What a group needs; of those that need no more than is hidden, the mean miss of its worst element."""
-    return max(found.need, hidden), max((e.deviation.mean for e in found.elements), default=0.0)
+def _worst(found: Hypothesis, hidden: float) -> tuple[float, float, float]:
+    """What a group needs; of those that need no more than is hidden first the largest, as most of it would be chance.
+
+    Of those as large the one whose worst element misses least in the mean.
+    """
+    mean = max((e.deviation.mean for e in found.elements), default=0.0)
+    return max(found.need, hidden), -_size(found.placed), mean
 
 
 def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:

@@ -153,10 +153,55 @@ def looked_at(surface: Surface, start: Placed, most: float, known: Callable[[Pla
         needs = _seems(surface, start.moved(iterate.state), LOOK)
         # Where noise is as thick as a surface it may draw a fit away, step by step.
         if not iterate.converged and (stayed := _seems(surface, start, LOOK)) < needs:
-            return Look(placed=start, history=tuple(history[:1]), needs=stayed, error_rad=error)
+            aside, needs = _slid(surface, start, stayed)
+            return Look(placed=aside, history=tuple(history[:1]), needs=needs, error_rad=error)
     off = max(iterate.step, math.sqrt(max(float(np.diag(iterate.covariance).max()), 0.0)))
-    placed = start.moved(iterate.state)
-    return Look(placed=placed, history=tuple(history), needs=needs, error_rad=min(error, SPREAD * off))
+    aside, needs = _slid(surface, start.moved(iterate.state), needs)
+    return Look(placed=aside, history=tuple(history), needs=needs, error_rad=min(error, SPREAD * off))
+
+
+def _slid(surface: Surface, placed: Placed, needs: float) -> tuple[Placed, float]:
+    """A group that seems to need so much, moved sideways to where it needs least; of surfaces with openings only.
+
+    Of a sofa one view shows no two sides that a mirror exchanges, and where their middle is no pair of local planes
+    tells: the edges of the seat do, which have to meet one another.
+    """
+    farthest = start_error(surface)
+    mends = 2.0 * farthest / (LIMITS[1] * surface.diagonal)  # a mirror takes what it is off by twice
+    if surface.openings is None or not exact_need(surface.floor) < needs <= mends:
+        return placed, needs
+    steps = np.linspace(-farthest, farthest, 2 * math.ceil(farthest / surface.cloud.spacing) + 1)
+    for way in _sideways(placed):
+        tried = [replace(placed, center=placed.center + step * way) for step in steps]
+        found = _lowest(steps, np.array(glances(surface, tried)), surface.tolerance)
+        moved = replace(placed, center=placed.center + found * way)
+        if (least := _seems(surface, moved, LOOK)) < needs:
+            placed, needs = moved, least
+    return placed, needs
+
+
+def _lowest(places: Array, needs: Array, level: float) -> float:
+    """The middle of the valley of needs [N] along places [N], by where its slopes pass a level above its ground.
+
+    The ground itself is flat, as what noise explains needs nothing.
+    """
+    least = int(needs.argmin())
+    high = np.flatnonzero(needs > needs[least] + level)
+    ends = []
+    for last, inner in ((high[high < least][-1:], 1), (high[high > least][:1], -1)):
+        if not last.size:
+            return float(places[least])
+        rim = int(last[0])
+        part = (needs[rim] - needs[least] - level) / (needs[rim] - needs[rim + inner])
+        ends.append(places[rim] + part * (places[rim + inner] - places[rim]))
+    return float(0.5 * (ends[0] + ends[1]))
+
+
+def _sideways(placed: Placed) -> Array:
+    """Directions [k, 3] in which the centre of a group moves its elements, and does not glide along them."""
+    moves = [np.eye(3) - m.matrix for m in _few_motions(placed)]
+    values, vectors = np.linalg.eigh(sum((m.T @ m for m in moves), np.zeros((3, 3))))
+    return np.asarray(vectors[:, values > ROUNDED * values[-1]].T)
 
 
 def _seems(surface: Surface, placed: Placed, sources: int) -> float:
@@ -173,7 +218,7 @@ def fitted(surface: Surface, start: Placed, *, error_rad: float = START_ERROR, b
     """The group fitted as a whole from where it stands, which may be off by `error_rad`, and judged.
 
     It may stay where it stands if the fit does not settle, or if the surface has openings: what lies behind them is
-    matched with what does not.
+    matched with what does not. There it is moved sideways, too, to where edges say that it belongs.
     """
     state = start.framed()
     stride = surface.stride(_moved_each(len(state.standard), GLANCE))
@@ -182,7 +227,11 @@ def fitted(surface: Surface, start: Placed, *, error_rad: float = START_ERROR, b
     drawn = surface.openings is not None or not history[-1].converged
     if not drawn or found.need <= exact_need(surface.floor):
         return found
-    return min(found, _placed(surface, start, history[:1], before), key=lambda h: h.need)
+    found = min(found, _placed(surface, start, history[:1], before), key=lambda h: h.need)
+    aside, _ = _slid(surface, found.placed, found.need)
+    if aside is found.placed:
+        return found
+    return min(found, _placed(surface, aside, found.history, before), key=lambda h: h.need)
 
 
 def judged(surface: Surface, placed: Placed) -> Hypothesis:

@@ -26,12 +26,10 @@ class Vote:
     Attributes:
         direction: [3] normal of a mirror, without a sign.
         foot: [3] point of the plane nearest to the origin.
-        votes: indices of the pairs that vote for it.
     """
 
     direction: Array
     foot: Array
-    votes: Index
 
 
 def mirror_votes(points: Array, normals: Array, rng: np.random.Generator, *, told: int = TOLD) -> list[Vote]:
@@ -76,20 +74,25 @@ def _densest(directions: Array, feet: Array, worth: Array, told: int = TOLD) -> 
     density = np.add.reduceat((worth / volume)[order], starts)
     ends = np.append(starts, len(order))
     found: list[Vote] = []
+
+    def middle(votes: Index) -> Vote:
+        voted, count = rows(directions, votes), worth[votes]
+        sign = np.where(voted @ voted[0] < 0.0, -1.0, 1.0)
+        return Vote(direction=unit((count * sign) @ voted), foot=count @ rows(feet, votes) / count.sum())
+
+    def is_known(here: Vote) -> bool:
+        near = (v for v in found if abs(v.direction @ here.direction) > np.cos(AGREE_RAD))
+        return any(np.linalg.norm(v.foot - here.foot) < 1.0 / FEET for v in near)
+
     for cell in np.argsort(-density)[: 8 * told]:
-        votes = order[ends[cell] : ends[cell + 1]]
-        for _ in range(2):
-            voted, count = rows(directions, votes), worth[votes]
-            sign = np.where(voted @ voted[0] < 0.0, -1.0, 1.0)
-            u, foot = unit((count * sign) @ voted), count @ rows(feet, votes) / count.sum()
-            # One sweep over all is quicker than a tree of directions and feet would be made.
-            along = np.flatnonzero(np.abs(directions @ u) > np.cos(AGREE_RAD))
-            votes = along[((rows(feet, along) - foot) ** 2).sum(axis=1) < FEET**-2.0]
-            if not votes.size:
-                break
-        known = (abs(v.direction @ u) > np.cos(AGREE_RAD) and np.linalg.norm(v.foot - foot) < 1.0 / FEET for v in found)
-        if votes.size and not any(known):
-            found.append(Vote(direction=u, foot=foot, votes=votes))
+        here = middle(order[ends[cell] : ends[cell + 1]])
+        if is_known(here):
+            continue
+        # One sweep over all is quicker than a tree of directions and feet would be made.
+        along = np.flatnonzero(np.abs(directions @ here.direction) > np.cos(AGREE_RAD))
+        votes = along[((rows(feet, along) - here.foot) ** 2).sum(axis=1) < FEET**-2.0]
+        if votes.size and not is_known(here := middle(votes)):
+            found.append(here)
         if len(found) == told:
             break
     return found
