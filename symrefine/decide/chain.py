@@ -258,13 +258,22 @@ def _generated(
     return fitted(surface, look.placed, error_rad=look.error_rad, before=before)
 
 
-def _worst(found: Hypothesis, hidden: float) -> tuple[float, float, float]:
-    """What a group needs; of those that need no more than is hidden first the largest, as most of it would be chance.
+def _worst(found: Hypothesis, hidden: float) -> tuple[float, float]:
+    """What a group needs; of those that need no more than is hidden, the mean miss of its worst element."""
+    return max(found.need, hidden), max((e.deviation.mean for e in found.elements), default=0.0)
 
-    Of those as large the one whose worst element misses least in the mean.
+
+def _best(tried: Sequence[Hypothesis], hidden: float) -> Hypothesis | None:
+    """Of groups that do not hold together the one that needs least; of those that need as little as noise the largest.
+
+    By chance fewer operations hold than many. Of those as large it is the one that misses least in the mean.
     """
-    mean = max((e.deviation.mean for e in found.elements), default=0.0)
-    return max(found.need, hidden), -_size(found.placed), mean
+
+    def rank(found: Hypothesis) -> tuple[float, float, float]:
+        need, mean = _worst(found, hidden)
+        return need, -_size(found.placed), mean
+
+    return min((h for h in tried if h.elements), key=rank, default=None)
 
 
 def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
@@ -293,7 +302,7 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
             singly = [_join(surface, [here, h], known, most, pool.limit) for h in batch[:SINGLY]]
             tried = [h for h in (found, *singly) if h is not None]
             known += tried
-            found = min((h for h in tried if h.elements), key=worst, default=None)
+            found = _best(tried, hidden)
         # Directions may part what together makes the same group again.
         if found is None or found.group.name == here.group.name:
             rest = [h for h in rest if h not in batch]
