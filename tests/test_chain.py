@@ -14,7 +14,8 @@ from experiments.objects.shapes import box, join, sample
 from experiments.studies import groups
 from experiments.studies.boundary import Case, look
 from symrefine.decide.chain import chain, explore
-from symrefine.decide.hypotheses import NOTHING, SAME_RAD, START_ERROR, Hypothesis, fitted
+from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted
+from symrefine.decide.looks import START_ERROR
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import Link, decide
 from symrefine.detection.measure import gather, measure

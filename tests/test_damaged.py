@@ -18,7 +18,7 @@ from experiments.objects.shapes import bottle, box, join, mug, revolve, sample, 
 from experiments.studies import damaged, groups, single_views
 from symrefine.cli import invoke
 from symrefine.complete import complete
-from symrefine.decide.hypotheses import looked_at
+from symrefine.decide.looks import looked_at
 from symrefine.detection import examination
 from symrefine.detection.measure import HIDDEN, gather, measure
 from symrefine.detection.story import detect

@@ -9,17 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.objects.shapes import bottle, box, join, mug, sample, stool, table
-from symrefine.decide.hypotheses import (
-    NOTHING,
-    START_ERROR,
-    Element,
-    Hypothesis,
-    fitted,
-    glances,
-    joined,
-    looked_at,
-    single,
-)
+from symrefine.decide.hypotheses import NOTHING, Element, Hypothesis, fitted, joined, single
+from symrefine.decide.looks import START_ERROR, glances, looked_at
 from symrefine.fit.placed import Placed, elements
 from symrefine.geometry import frame_with_z, line_angle_rad, random_orthogonal, rotation, tight_diagonal, unit
 from symrefine.groups import close, is_subgroup, point_group

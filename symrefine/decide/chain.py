@@ -12,19 +12,8 @@ from functools import partial
 
 import numpy as np
 
-from symrefine.decide.hypotheses import (
-    NOTHING,
-    START_ERROR,
-    Hypothesis,
-    exact_need,
-    fitted,
-    glances,
-    has_all,
-    joined,
-    looked_at,
-    roughly_judged,
-    single,
-)
+from symrefine.decide.hypotheses import NOTHING, Hypothesis, fitted, has_all, joined, roughly_judged, single
+from symrefine.decide.looks import START_ERROR, exact_need, glances, looked_at
 from symrefine.decide.pool import ALIKE, Pool, is_at
 from symrefine.decide.posterior import ALONE, certain
 from symrefine.fit.placed import Placed

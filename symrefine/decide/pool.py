@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.decide.hypotheses import DIRECTION_ERROR, NOTHING, SAME_RAD, START_ERROR, Hypothesis, has_all
+from symrefine.decide.hypotheses import DIRECTION_ERROR, NOTHING, SAME_RAD, Hypothesis, has_all
+from symrefine.decide.looks import START_ERROR
 from symrefine.fit.placed import Placed
 from symrefine.groups import PointGroup, is_subgroup
 

@@ -11,7 +11,8 @@ from functools import reduce
 import numpy as np
 
 from symrefine.clock import Clock
-from symrefine.decide.hypotheses import MOVED_EACH, NOTHING, SAME_RAD, Element, Hypothesis, exact_need, judged
+from symrefine.decide.hypotheses import MOVED_EACH, NOTHING, SAME_RAD, Element, Hypothesis, judged
+from symrefine.decide.looks import exact_need
 from symrefine.decide.posterior import BEYOND
 from symrefine.decide.subgroups import subgroup_chain
 from symrefine.detection.examination import Examined, examined

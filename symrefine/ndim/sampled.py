@@ -13,7 +13,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import cKDTree
 
-from symrefine.decide.hypotheses import LOOK, MOVED
+from symrefine.decide.hypotheses import MOVED
+from symrefine.decide.looks import LOOK
 from symrefine.geometry import Array
 from symrefine.moments.moments import Moments, tensor_index
 from symrefine.ntuples.rank import SIGNIFICANT

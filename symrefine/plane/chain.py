@@ -8,7 +8,8 @@ from functools import reduce
 import numpy as np
 
 from symrefine.decide.chain import HOPELESS
-from symrefine.decide.hypotheses import DIRECTION_ERROR, LOOK, START_ERROR, exact_need
+from symrefine.decide.hypotheses import DIRECTION_ERROR
+from symrefine.decide.looks import LOOK, START_ERROR, exact_need
 from symrefine.decide.pool import ALIKE
 from symrefine.decide.posterior import NEAR
 from symrefine.fit.vertices import ROUNDED

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.decide.hypotheses import MOVED, SAME_RAD, START_ERROR
+from symrefine.decide.hypotheses import MOVED, SAME_RAD
+from symrefine.decide.looks import START_ERROR
 from symrefine.fit.gauss_newton import Linearisation, minimise
 from symrefine.fit.matching import match, pair_equations
 from symrefine.fit.placed import FITTED, FREE_TURNS, evenly, wide_angle_rad
