@@ -439,6 +439,13 @@ def test_edges_tell_where_the_mirror_is_of_which_one_view_shows_one_side(family,
     assert row.told[0].error_deg < 1.0
 
 
+def test_a_third_of_a_goblet_is_seen_to_be_round():
+    """A half turn takes nearly all of it to where nobody looked, and a small one hardly any."""
+    row = single_views.run(single_views.Case(family="shape", name="goblet", clean=False, seed=17))
+    assert row.occlusion > 0.6
+    assert row.group == "at least Cinfv"
+
+
 @pytest.mark.parametrize("aside", [-0.08, 0.08])
 @pytest.mark.parametrize("seed", [5, 6, 7, 8])
 def test_a_mirror_put_aside_comes_back_to_where_edges_tell(aside, seed):

@@ -59,8 +59,12 @@ class Hypothesis:
 
     @property
     def supported(self) -> float:
-        """Share of the surface that moves and meets itself under the element that says least."""
-        return min((e.coverage.supported for e in self.elements), default=1.0)
+        """Share of the surface that moves and meets itself under the element that says least.
+
+        Of a continuous axis by the turn that says most, as each of them, over and over, makes all others.
+        """
+        shares = (e.coverage.told if math.isinf(e.operations.order) else e.coverage.supported for e in self.elements)
+        return min(shares, default=1.0)
 
     @property
     def group(self) -> PointGroup:
