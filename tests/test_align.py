@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from experiments.objects import damage
+from experiments.objects.built_symmetry import specimen
 from experiments.objects.household import camera
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
 from experiments.studies import partial_alignment
@@ -905,3 +906,16 @@ def test_signatures_do_not_know_pose_hand_or_signs() -> None:
     points = cloud.points @ matrix.T + 2.0
     turned_ = replace(cloud, points=points, normals=signs * cloud.normals @ matrix.T, tree=Tree(points))
     np.testing.assert_allclose(signatures(turned_, 0.3), signatures(cloud, 0.3), atol=1e-6)
+
+
+@pytest.mark.parametrize("times", [1, 2, 8])
+@pytest.mark.parametrize("count", [400, 3000])
+def test_points_that_are_rounded_or_repeated_are_places_all_the_same(count, times):
+    """Coarse digits put several points in one place, where the nearest other one is no distance away."""
+    rng = np.random.default_rng(count)
+    points = np.repeat(sample(specimen("shape", "fan3")[0], count // times, 0.0, rng).round(1), times, axis=0)
+    for part, other in ((points, points), (points[: 2 * len(points) // 3], points[len(points) // 3 :])):
+        found = align(part, other @ np.diag([1.0, 1.0, -1.0]))
+        assert np.isfinite(found.matrix).all()
+        assert np.isfinite(found.rms)
+        assert 0.0 <= found.confidence <= 1.0

@@ -439,6 +439,14 @@ def test_edges_tell_where_the_mirror_is_of_which_one_view_shows_one_side(family,
     assert row.told[0].error_deg < 1.0
 
 
+def test_a_view_whose_points_are_told_twice_says_the_same():
+    mesh, _ = specimen("household", "sofa")
+    made = damage.views(mesh, 1.0, np.random.default_rng(5))
+    once, twice = (detect(np.repeat(made.points, k, axis=0), viewpoint=made.viewpoint[0]) for k in (1, 2))
+    assert once.point_group == twice.point_group == "Cs"
+    assert line_angle_rad(once.planes[0].plane.normal, twice.planes[0].plane.normal) < np.radians(1.0)
+
+
 def test_a_third_of_a_goblet_is_seen_to_be_round():
     """A half turn takes nearly all of it to where nobody looked, and a small one hardly any."""
     row = single_views.run(single_views.Case(family="shape", name="goblet", clean=False, seed=17))

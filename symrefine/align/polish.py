@@ -95,7 +95,7 @@ def polish(
     few = COARSE if len(source.points) > COARSE * ENOUGH else 1
     for index in range(1, MAX_OUTER + 1):
         met = _met(source, target, start.moved(x), reach, few)
-        if len(met.worth) == 0:
+        if len(met.worth) == 0 or target.spacing == 0.0:  # of points in one place nothing tells how near is near
             return _ended(start.moved(x), covariance, index - 1, converged=False)
         before, settled = x, False
         for _ in range(MAX_OUTER):

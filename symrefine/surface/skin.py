@@ -22,6 +22,8 @@ from symrefine.surface.tree import Tree
 
 # Up to so many points of a cloud stand for themselves (atoms), not for a surface.
 FEW = 250
+# Points whose distances tell the spacing and the reach of discs, the first of them the point itself.
+AROUND = 6
 # Classes stand so far apart along a fourth coordinate (RMS radii) that no query finds a point of another class first.
 APART = 1e3
 
@@ -177,7 +179,8 @@ class Skin:
     @cached_property
     def spacing(self) -> float:
         """Median distance from a point to the nearest other one."""
-        return self._reach(1)
+        some = self.points[:: max(1, len(self.points) // PROBES)]
+        return _spacing(self.tree.query(some, AROUND)[0])
 
     @cached_property
     def width(self) -> float:
@@ -243,18 +246,25 @@ class Skin:
         planes, labels = self.denoised(pick, near), self.labels if labels is None else labels
         classes = None if labels is None else labels[pick]
         tree = Tree(planes.points)
-        distance, _ = tree.query(planes.points, min(6, len(pick)))
+        distance, _ = tree.query(planes.points, min(AROUND, len(pick)))
         return LocalPlanes(
             points=planes.points,
             normals=planes.normals,
             thickness=planes.thickness,
             flatness=planes.flatness,
             reach=distance[:, -1],
-            spacing=float(np.median(distance[:, 1])),
+            spacing=_spacing(distance),
             redundancy=self.shared_by(len(pick)),
             tree=tree if classes is None else Tree(_with_class(planes.points, classes)),
             labels=classes,
         )
+
+
+def _spacing(away: Array) -> float:
+    """Median distance to the nearest other place, from those [M, k] to the nearest points: repeated ones are one."""
+    nearest = np.where(away > 0.0, away, np.inf).min(axis=1)
+    apart = nearest[np.isfinite(nearest)]
+    return float(np.median(apart)) if apart.size else 0.0
 
 
 def _with_class(points: Array, classes: Index | None) -> Array:
