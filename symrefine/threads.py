@@ -7,7 +7,7 @@ the processor time, and no less of the clock.
 
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -22,6 +22,8 @@ class _State(threading.local):
 
 
 _state = _State()
+# Held by the thread of Python that holds those of the linear algebra back.
+_holder = threading.Lock()
 
 
 @contextmanager
@@ -34,7 +36,11 @@ def one_thread() -> Iterator[None]:
     if _state.within:  # as in every query of a tree
         yield
         return
-    with _controller().limit(limits=1):
+    with ExitStack() as held:
+        held.enter_context(_libraries("openmp").limit(limits=1))
+        if _holder.acquire(blocking=False):  # whoever came later would take 1 for what was set before, and leave that
+            held.callback(_holder.release)
+            held.enter_context(_libraries("blas").limit(limits=1))
         _state.within = True
         try:
             yield
@@ -43,10 +49,13 @@ def one_thread() -> Iterator[None]:
 
 
 @cache
-def _controller() -> "ThreadpoolController":
-    """Of what makes threads in numpy, scipy and pykdtree, which are loaded first lest one of them is missed."""
+def _libraries(kind: str) -> "ThreadpoolController":
+    """Of one kind of what makes threads in numpy, scipy and pykdtree, which are loaded first lest one is missed.
+
+    What limits some of the libraries of a controller sets all of them back afterwards: so each kind has its own.
+    """
     import pykdtree.kdtree  # noqa: F401
     import scipy.linalg  # noqa: F401
     from threadpoolctl import ThreadpoolController
 
-    return ThreadpoolController()
+    return ThreadpoolController().select(user_api=kind)

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-from threading import Barrier, Thread
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from symrefine.threads import one_thread
 
 # Pools of the libraries that the product computes with; others may be loaded by the tests.
 OURS = ("openblas", "mkl", "blis", "flexiblas")
+SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 with one_thread():
     """Loads them."""
 
@@ -35,23 +35,24 @@ def test_what_was_set_comes_back_however_it_ends() -> None:
 
 
 def test_threads_of_python_that_are_within_at_once_leave_what_was_set() -> None:
-    met = Barrier(2, timeout=30)
-
-    def work() -> None:
-        with one_thread():
-            met.wait()
-
-    with threadpool_limits(2):
-        before = counts()
-    threads = [Thread(target=work) for _ in range(2)]
-    for t in threads:
-        t.start()
-    for t in threads:
-        t.join()
-    with threadpool_limits(2):
-        assert counts() == before
+    script = """
+from threading import Barrier, Thread
+from tests.test_threads import counts, one_thread
+before, met = counts(), Barrier(2, timeout=30)
+def work():
     with one_thread():
+        met.wait()
         assert set(counts()) == {1}
+        met.wait()
+threads = [Thread(target=work) for _ in range(2)]
+for t in threads: t.start()
+for t in threads: t.join()
+assert set(before) == {2} and counts() == before, (before, counts())
+with one_thread():
+    assert set(counts()) == {1}
+"""
+    environment = os.environ | dict.fromkeys(SETTINGS, "2")
+    subprocess.run([sys.executable, "-c", script], check=True, timeout=120, env=environment)
 
 
 @pytest.mark.parametrize("verb", ["detect(one)", "align(one, other)"])
@@ -68,9 +69,8 @@ told.pop("timings")
 print(json.dumps(told))
 """
     answers = []
-    settings = "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
     for threads in ("1", "2"):
-        environment = os.environ | dict.fromkeys(settings, threads)
+        environment = os.environ | dict.fromkeys(SETTINGS, threads)
         done = subprocess.run(
             [sys.executable, "-c", script], check=True, timeout=120, env=environment, capture_output=True, text=True
         )

@@ -114,8 +114,6 @@ def partial_meeting(evidence: Evidence, *, reflections: bool, factor: float = 1.
     if source is None or target is None:
         return None
     finest = min(source.cloud.spacing, target.cloud.spacing)
-    if finest == 0.0:
-        return None
     source, target = source.as_fine_as(finest), target.as_fine_as(finest)
     judge = Judge(
         source=source,

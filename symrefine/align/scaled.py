@@ -39,7 +39,7 @@ def size_of_parts(evidence: Evidence) -> Size | None:
         Shown.of(side, unit, evidence.seed)
         for side, unit in zip((evidence.source, evidence.target), sizes, strict=True)
     )
-    if own is None or target is None or own.cloud.spacing == 0.0:
+    if own is None or target is None:
         return None
     target_size = tight_diagonal(target.cloud.points)
 

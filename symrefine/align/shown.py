@@ -45,7 +45,7 @@ class Shown:
 
     @classmethod
     def of(cls, side: Side, unit: float, seed: int) -> "Shown | None":
-        """What a mesh or cloud shows; None if its points fill a volume."""
+        """What a mesh or cloud shows; None if its points fill a volume, or many share each place and none is near."""
         rng = np.random.default_rng(seed)
         shape, weights = side.shape, None
         if side.is_mesh:
@@ -58,6 +58,8 @@ class Shown:
         if not side.is_mesh and normals is None and fills_volume(local, skin.tree, np.random.default_rng(0)):
             return None
         cloud, near = _planes(skin, drawn(len(local), PLANES, rng, weights))
+        if cloud.spacing == 0.0:
+            return None
         views = None if views is None else (views - side.moments.center) / unit
         return cls(skin=skin, weights=weights, cloud=cloud, near=near, views=views, closed=side.is_mesh, rng=rng)
 

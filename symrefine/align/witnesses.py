@@ -50,7 +50,8 @@ def witnesses(source: Shape, target: Shape, *, scale: float = 1.0, tolerance: fl
         sides = [_side(shape) for shape in (source, target)]
         unit = sides[1].moments.scale
         one, other = (Shown.of(s, u, seed) for s, u in zip(sides, (unit / scale, unit), strict=True))
-        if one is not None and other is not None and (finest := min(one.cloud.spacing, other.cloud.spacing)) > 0.0:
+        if one is not None and other is not None:
+            finest = min(one.cloud.spacing, other.cloud.spacing)
             shown = one.as_fine_as(finest), other.as_fine_as(finest)
             centers = sides[0].moments.center, sides[1].moments.center
             return _Surfaces(shown=shown, centers=centers, unit=unit, scale=scale, tolerance=tolerance)

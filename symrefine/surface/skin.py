@@ -179,8 +179,7 @@ class Skin:
     @cached_property
     def spacing(self) -> float:
         """Median distance from a point to the nearest other one."""
-        some = self.points[:: max(1, len(self.points) // PROBES)]
-        return _spacing(self.tree.query(some, AROUND)[0])
+        return _spacing(self.tree.query(self._probes, AROUND)[0])
 
     @cached_property
     def width(self) -> float:
@@ -189,8 +188,11 @@ class Skin:
 
     def _reach(self, neighbour: int) -> float:
         """Median distance from a point to one of the others, counted by how near they are, from 1 on."""
-        some = self.points[:: max(1, len(self.points) // PROBES)]
-        return float(np.median(self.tree.query(some, 1, skip=neighbour)[0]))
+        return float(np.median(self.tree.query(self._probes, 1, skip=neighbour)[0]))
+
+    @property
+    def _probes(self) -> Array:
+        return self.points[:: max(1, len(self.points) // PROBES)]
 
     @cached_property
     def _neighbourhoods(self) -> Neighbourhoods:
