@@ -47,15 +47,15 @@ class Shown:
     def of(cls, side: Side, unit: float, seed: int) -> "Shown | None":
         """What a mesh or cloud shows; None if its points fill a volume, or many share each place and none is near."""
         rng = np.random.default_rng(seed)
-        shape, weights = side.shape, None
+        shape, weights, solid = side.shape, None, False
         if side.is_mesh:
             shape = sampled(shape, SAMPLES, rng)
         else:
             seen = side.sampling
-            shape, weights = shape.chosen(seen.even), seen.shares
+            shape, weights, solid = shape.chosen(seen.even), seen.shares, seen.solid
         local, normals, views = (shape.points - side.moments.center) / unit, shape.normals, shape.viewpoint
         skin = make_skin(local, rng, normals=normals, labels=shape.labels, thin=THIN)
-        if not side.is_mesh and normals is None and fills_volume(local, skin.tree, np.random.default_rng(0)):
+        if solid and normals is None and fills_volume(local, skin.tree, np.random.default_rng(0)):
             return None
         cloud, near = _planes(skin, drawn(len(local), PLANES, rng, weights))
         if cloud.spacing == 0.0:

@@ -53,6 +53,7 @@ class Measured:
         clumps: of each group of points that was for standing apart from the body, or filling a volume beside it, and
             where they are.
         blobs: of each group of points still in it that fills a volume beside the body, where they are.
+        solid: whether some of its points show no surface at any width, so that all may fill a volume.
         classes: of its points or faces, that must match.
         moments: to order 8.
         vectors: the n-tuples of them.
@@ -64,6 +65,7 @@ class Measured:
     strays: Index
     clumps: tuple[tuple[Index, Array], ...]
     blobs: tuple[Array, ...]
+    solid: bool
     classes: Index | None
     moments: Moments
     vectors: NTuples
@@ -113,6 +115,7 @@ def measure(
     clumps: tuple[tuple[Index, Array], ...] = ()
     scan: Shape | None = None
     more: tuple[Array, ...] = ()
+    solid = False
     massive = np.arange(len(shape.points))
     if shape.faces is None and shape.weights is not None and not shape.weights.all():
         massive = np.flatnonzero(shape.weights > 0)
@@ -125,7 +128,7 @@ def measure(
         seen = sampling(shape.points, rng, outliers=auto, groups=groups, apart=apart, blobs=blobs)
         more = tuple(shape.points[b] for b in seen.blobs)
         strays, clumps = massive[seen.strays], tuple((massive[c], shape.points[c]) for c in seen.clumps)
-        count = len(seen.kept)
+        count, solid = len(seen.kept), seen.solid
         scan = shape.chosen(seen.kept) if shape.viewpoint is not None else None
         if shape.weights is None and seen.shares is not None:
             shape = replace(shape.chosen(seen.even), weights=seen.shares)
@@ -144,6 +147,7 @@ def measure(
         strays=strays,
         clumps=clumps,
         blobs=more,
+        solid=solid,
         classes=classes,
         moments=moments,
         vectors=vectors,
@@ -269,6 +273,8 @@ def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLE
     if is_few(shape):
         return evidence, Surface(cloud=isolated_points(local, labels), diagonal=tight_diagonal(local))
     hiding = tuple(Clump.of((p - moments.center) / moments.scale) for _, p in measured.clumps)
+    if measured.solid and normals is None and fills_volume(local, Tree(local), np.random.default_rng(0)):
+        return evidence, _volume(local, labels, rng)
     exact = shape.faces is not None
     return evidence, _surface(local, normals, weights, labels, exact, tolerance, measured.views, hiding, rng)
 
@@ -284,10 +290,8 @@ def _surface(
     hiding: tuple[Clump, ...],
     rng: np.random.Generator,
 ) -> Surface:
-    """Local planes (points, where they fill a volume) with what noise alone shows."""
+    """Local planes with what noise alone shows."""
     tree = None if exact else Tree(local)
-    if tree is not None and normals is None and fills_volume(local, tree, np.random.default_rng(0)):
-        return _volume(local, labels, rng)
     uneven = None if exact or np.ptp(weights) == 0.0 else weights
     whole = make_skin(local, rng, normals=normals, labels=labels, exact=exact, tree=tree)
 

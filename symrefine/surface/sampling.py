@@ -44,6 +44,7 @@ class Sampling:
         strays: indices of those far from all others.
         clumps: indices of each group of points that was set apart from the body, with no counterpart.
         blobs: of each group of those kept that touches the body, fills a volume and has no counterpart.
+        solid: whether some of the points show no surface at any width, so that all may fill a volume.
     """
 
     kept: Index
@@ -52,12 +53,14 @@ class Sampling:
     clumps: tuple[Index, ...] = ()
     blobs: tuple[Index, ...] = ()
     shares: Array | None = None
+    solid: bool = False
 
     @property
     def without_strays(self) -> "Sampling":
         """The same of the points that are kept, if nothing else than strays was set apart."""
         every = np.arange(len(self.kept))
-        return Sampling(kept=every, even=np.searchsorted(self.kept, self.even), strays=every[:0], shares=self.shares)
+        even = np.searchsorted(self.kept, self.even)
+        return Sampling(kept=every, even=even, strays=every[:0], shares=self.shares, solid=self.solid)
 
 
 def sampling(
@@ -87,7 +90,7 @@ def sampling(
     points = (points - points[some].mean(axis=0)) / spread
     around = Surroundings.of(points[some])
     if fills_volume(around.points, around.tree, np.random.default_rng(0)):
-        return Sampling(kept=kept, even=kept, strays=kept[:0])
+        return Sampling(kept=kept, even=kept, strays=kept[:0], solid=True)
     if outliers and _alone(around).any():
         kept = _without_strays(points)
         around = around_some(points[kept], rng, asked)
