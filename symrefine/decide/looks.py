@@ -34,7 +34,7 @@ START_ERROR = 0.05
 
 def glances(surface: Surface, starts: Sequence[Placed], most: float = math.inf) -> list[float]:
     """What each of several groups needs, as a few operations tell on a few points; from `most` on a lower bound."""
-    each = [_few_motions(s) for s in starts]
+    each = [few_motions(s) for s in starts]
     owner = np.repeat(np.arange(len(starts)), [len(motions) for motions in each])
     every, found = [m for motions in each for m in motions], np.zeros(len(starts))
     # Most candidates are hopeless, and seen to be so without a wide search; of an open surface none is made.
@@ -47,7 +47,7 @@ def glances(surface: Surface, starts: Sequence[Placed], most: float = math.inf) 
     return found.tolist()
 
 
-def _few_motions(placed: Placed) -> list[Isometry]:
+def few_motions(placed: Placed) -> list[Isometry]:
     """The operations of a few elements of a group where it stands."""
     parts = elements(placed.group)
     return [m for part in parts[:: max(1, len(parts) // GLANCED)] for m in part.motions(placed.center)]
@@ -135,14 +135,14 @@ def _lowest(places: Array, needs: Array, level: float) -> float:
 
 def _sideways(placed: Placed) -> Array:
     """Directions [k, 3] in which the centre of a group moves its elements, and does not glide along them."""
-    moves = [np.eye(3) - m.matrix for m in _few_motions(placed)]
+    moves = [np.eye(3) - m.matrix for m in few_motions(placed)]
     values, vectors = np.linalg.eigh(sum((m.T @ m for m in moves), np.zeros((3, 3))))
     return np.asarray(vectors[:, values > ROUNDED * values[-1]].T)
 
 
 def _seems(surface: Surface, placed: Placed, sources: int) -> float:
     """What a group where it stands needs, as a few operations tell on a few points."""
-    return float(surface.needs(_few_motions(placed), sources=sources, tests=GLANCED).max())
+    return float(surface.needs(few_motions(placed), sources=sources, tests=GLANCED).max())
 
 
 def start_error(surface: Surface) -> float:

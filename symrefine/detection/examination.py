@@ -8,18 +8,23 @@ import numpy as np
 
 from symrefine.clock import Clock
 from symrefine.decide.chain import chain, explore
-from symrefine.decide.hypotheses import Hypothesis
+from symrefine.decide.hypotheses import MOVED, Hypothesis
+from symrefine.decide.looks import GLANCED, few_motions
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, known_links
 from symrefine.detection.measure import Measured, Outliers, doubt, gather, measure
 from symrefine.detection.sketch import Sample, Sketch, is_large, set_apart, sketched
 from symrefine.fit.vertices import ROUNDED, OnVertices, on_vertices
 from symrefine.geometry import Array, check_tolerance
+from symrefine.groups import PointGroup
 from symrefine.shape import Index, Shape
-from symrefine.surface.clumps import COUNTERPART, Clump
+from symrefine.surface.clumps import COUNTERPART, Clump, clump_among
 from symrefine.surface.misses import TOLERANCE, disc_distances
 from symrefine.surface.surface import Surface
 from symrefine.surface.tree import Tree
+
+# Larger groups that are asked what speaks against them, the ones that need least first.
+RIVALS = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,8 +76,13 @@ class Examined:
         """Order of the group that is decided, and of what stands for it if that is infinite; 0 if none is."""
         if self.doubt(tolerance):
             return 0.0, 0.0
-        group = self.links[self.decided(tolerance).index].group
-        return group.order, group.sampled(7).order
+        return _size(self.links[self.decided(tolerance).index].group)
+
+    def rivals(self, tolerance: float) -> list[Hypothesis]:
+        """Larger groups than the one that is decided, the ones that need least first."""
+        order = self.size(tolerance)
+        every = (*self.links, *self.pool.small, *self.pool.failed, *self.pool.turned_down())
+        return sorted((h for h in every if _size(h.group) > order), key=lambda h: h.need)
 
     def doubt(self, tolerance: float) -> str:
         """Why the data support no decision at a tolerance, or nothing if they do."""
@@ -86,6 +96,10 @@ class Examined:
         by = sorted(zip(probabilities, self.links, strict=True), key=lambda k: -k[0])
         told = ", ".join(f"{h.group.name} ({100 * p:.0f} %)" for p, h in by[:3])
         return f"no group is more likely than not: {told}"
+
+
+def _size(group: PointGroup) -> tuple[float, float]:
+    return group.order, group.sampled(7).order
 
 
 def examined(
@@ -107,16 +121,44 @@ def examined(
         with clock("pass"):
             shape = sketched(shape, seed)
     examine = partial(_examined, shape, outliers, tolerance, ladder, seed, clock)
-    found = examine(apart=True, blobs=False)
+    found = examine(apart=True)
     apart = not _has_parts_apart(found, tolerance)
     if not apart:
-        found = examine(apart=False, blobs=False)
-    if not all(_has_counterparts(found, blob, tolerance) for blob in found.measured.blobs):
+        found = examine(apart=False)
+    points = (shape.sample if isinstance(shape, Sketch) else shape).points
+    for suspects in (_suspects, _strangers) if outliers == "auto" else ():
         # What fills a volume beside a surface is taken for a clump only where it alone hides a symmetry.
-        without = examine(apart=apart, blobs=True)
-        if without.size(tolerance) > found.size(tolerance) and not _has_parts_apart(without, tolerance):
-            return without
+        if foreign := suspects(found, points, tolerance):
+            without = examine(apart=apart, foreign=foreign)
+            if without.size(tolerance) > found.size(tolerance) and not _has_parts_apart(without, tolerance):
+                return without
     return found
+
+
+def _suspects(found: Examined, _: Array, tolerance: float) -> tuple[Index, ...]:
+    """Groups of points that fill a volume beside the body, unless each has counterparts."""
+    blobs = found.measured.blobs
+    has = all(_has_counterparts(found, points, tolerance) for _, points in blobs)
+    return () if has else tuple(indices for indices, _ in blobs)
+
+
+def _strangers(found: Examined, points: Array, tolerance: float) -> tuple[Index, ...]:
+    """Of points [N, 3] those that fill a volume and are all that speaks against a larger group, if there are any."""
+    surface, measured = found.surface, found.measured
+    if surface.skin is None or measured.views or found.doubt(tolerance):
+        return ()
+    out = np.concatenate([measured.strays, *(indices for indices, _ in measured.clumps)])
+    own = np.setdiff1d(np.arange(len(points)), out, assume_unique=True)
+    local = (points[own] - measured.moments.center) / measured.moments.scale
+    some = MOVED // GLANCED
+    nearest = Tree(surface.cloud.points[:: surface.stride(some)]).nearest(local)[1]
+    for rival in found.rivals(tolerance)[:RIVALS]:
+        motions = few_motions(rival.placed)
+        misses = surface.seen(surface.misses(motions, sources=some), motions, sources=some)
+        unmet = (np.nan_to_num(misses) > surface.far).mean(axis=0) > 0.5
+        if (group := clump_among(local, unmet[nearest])).size:
+            return (own[group],)
+    return ()
 
 
 def _has_parts_apart(found: Examined, tolerance: float) -> bool:
@@ -134,13 +176,13 @@ def _examined(
     clock: Clock,
     *,
     apart: bool,
-    blobs: bool,
+    foreign: Sequence[Index] = (),
 ) -> Examined:
     sketch = given if isinstance(given, Sketch) else None
     shape = given.sample if isinstance(given, Sketch) else given
     with clock("moments", len(shape.points)):
         whole = sketch.moments if sketch is not None and sketch.seen else None
-        measured = measure(shape, outliers=outliers, apart=apart, blobs=blobs, whole=whole)
+        measured = measure(shape, outliers=outliers, apart=apart, foreign=foreign, whole=whole)
         out, share = set_apart(measured, sketch, outliers=outliers == "auto")
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed), tolerance)

@@ -1,6 +1,7 @@
 """What is known of a shape before any symmetry is looked for: moments, n-tuples, and a surface to judge by."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, get_args
@@ -52,7 +53,7 @@ class Measured:
         strays: indices of the points that were for being far from all others.
         clumps: of each group of points that was for standing apart from the body, or filling a volume beside it, and
             where they are.
-        blobs: of each group of points still in it that fills a volume beside the body, where they are.
+        blobs: the same of each group of points still in it that fills a volume beside the body.
         solid: whether some of its points show no surface at any width, so that all may fill a volume.
         classes: of its points or faces, that must match.
         moments: to order 8.
@@ -64,7 +65,7 @@ class Measured:
     scan: Shape | None
     strays: Index
     clumps: tuple[tuple[Index, Array], ...]
-    blobs: tuple[Array, ...]
+    blobs: tuple[tuple[Index, Array], ...]
     solid: bool
     classes: Index | None
     moments: Moments
@@ -94,7 +95,7 @@ def measure(
     *,
     outliers: Outliers = "auto",
     apart: bool = True,
-    blobs: bool = False,
+    foreign: Sequence[Index] = (),
     whole: Moments | None = None,
 ) -> Measured:
     """Moments to order 8 and the n-tuples of them, of the points that belong to the object.
@@ -103,7 +104,7 @@ def measure(
         shape: of which only some points may belong to the object.
         outliers: "auto" or "none": whether any are set apart.
         apart: whether clumps apart from the body count as outliers.
-        blobs: whether those do that touch it.
+        foreign: indices of each group of points that is known to be no part of the object.
         whole: moments of all the points that `shape` is a sample of; they count where no point is set apart.
 
     Raises:
@@ -114,7 +115,7 @@ def measure(
     strays: Index = np.empty(0, dtype=np.int64)
     clumps: tuple[tuple[Index, Array], ...] = ()
     scan: Shape | None = None
-    more: tuple[Array, ...] = ()
+    blobs: tuple[tuple[Index, Array], ...] = ()
     solid = False
     massive = np.arange(len(shape.points))
     if shape.faces is None and shape.weights is not None and not shape.weights.all():
@@ -125,9 +126,10 @@ def measure(
         auto = outliers == "auto"
         # What stands in front parts what a camera sees, and hides its counterparts.
         groups, rng = shape.viewpoint is None, np.random.default_rng(0)
-        seen = sampling(shape.points, rng, outliers=auto, groups=groups, apart=apart, blobs=blobs)
-        more = tuple(shape.points[b] for b in seen.blobs)
-        strays, clumps = massive[seen.strays], tuple((massive[c], shape.points[c]) for c in seen.clumps)
+        known = [np.flatnonzero(np.isin(massive, group)) for group in foreign]
+        seen = sampling(shape.points, rng, outliers=auto, groups=groups, apart=apart, foreign=known)
+        strays = massive[seen.strays]
+        clumps, blobs = (tuple((massive[g], shape.points[g]) for g in parts) for parts in (seen.clumps, seen.blobs))
         count, solid = len(seen.kept), seen.solid
         scan = shape.chosen(seen.kept) if shape.viewpoint is not None else None
         if shape.weights is None and seen.shares is not None:
@@ -146,7 +148,7 @@ def measure(
         scan=scan,
         strays=strays,
         clumps=clumps,
-        blobs=more,
+        blobs=blobs,
         solid=solid,
         classes=classes,
         moments=moments,

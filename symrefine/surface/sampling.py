@@ -70,14 +70,14 @@ def sampling(
     outliers: bool,
     groups: bool = True,
     apart: bool = True,
-    blobs: bool = False,
+    foreign: Sequence[Index] = (),
     asked: int = ASKED,
 ) -> Sampling:
     """How points [N, 3] were sampled; with `outliers` those that belong to no surface are set apart.
 
-    With `apart` clumps apart from the body are as well, and with `blobs` those that touch it; without `groups` nobody
-    looks for either. `asked` of the points tell whether there is anything to be done. Of points that fill a volume none
-    is set apart, and all are kept.
+    With `apart` clumps apart from the body are as well, and those groups that are known to be `foreign`, indices of
+    each; if none are, it is told what may be. Without `groups` nobody looks for any. `asked` of the points tell whether
+    there is anything to be done. Of points that fill a volume none is set apart, and all are kept.
     """
     size = len(points)
     kept: Index = np.arange(size)
@@ -98,11 +98,11 @@ def sampling(
         taken += [kept[c] for c in found]
         kept = _without(kept, taken, size)
         around = around_some(points[kept], rng)
-    if outliers and groups:
+    if outliers and groups and not foreign:
         lone = [kept[b] for b in filled(points[kept], around, rng)]
-    if blobs and lone:
-        taken += lone
-        kept = _without(kept, lone, size)
+    if foreign:
+        taken += [np.intersect1d(group, kept, assume_unique=True) for group in foreign]
+        kept = _without(kept, taken, size)
         kept = kept[_without_strays(points[kept])]  # the rim of what fills a volume is alone once that is gone
         around = around_some(points[kept], rng)
     strays = _without(np.arange(size), [kept, *taken], size)
@@ -113,7 +113,7 @@ def sampling(
         shares=shares,
         strays=strays,
         clumps=tuple(taken),
-        blobs=() if blobs else tuple(lone),
+        blobs=tuple(lone),
     )
 
 
