@@ -74,11 +74,11 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     # What may not be open at all is missing a part only where that explains more, and no more than so short a border
     # may enclose.
     hidden = max((e.coverage.unseen for e in part.largest.elements), default=0.0)
-    missing = surface.openings.evident or (more and hidden <= ENCLOSED)
-    missing = missing and not _ends_there(surface, whole.largest)
+    ends = _ends_there(surface, whole.largest)
+    missing = (surface.openings.evident or (more and hidden <= ENCLOSED)) and not ends
     if missing or _places(whole.largest, part.largest) >= PLACES:
         return replace(part, at_least=True)
-    whole = replace(whole, at_least=surface.openings.evident)
+    whole = replace(whole, at_least=surface.openings.evident or (more and not ends))
     if not more:
         return whole
     # To believe that what ends so evenly is missing a part takes as much as to believe in as much as was seen.
