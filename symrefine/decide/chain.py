@@ -238,7 +238,7 @@ def _generated(
     if same is not None:
         return same
     if surface.openings is not None:
-        return fitted(surface, placed, before=before)
+        return fitted(surface, placed, before=before, most=COARSE * most)
     look = looked_at(surface, placed, COARSE * most)
     if look.needs > most:
         return Hypothesis(placed=placed, elements=(), need=look.needs)

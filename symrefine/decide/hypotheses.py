@@ -92,16 +92,21 @@ def has_all(placed: Placed, other: Placed, within_rad: float = SAME_RAD) -> bool
 NOTHING = Hypothesis(placed=Placed(group=PointGroup(name="C1"), center=np.zeros(3)), elements=(), need=0.0)
 
 
-def fitted(surface: Surface, start: Placed, *, error_rad: float = START_ERROR, before: int = 0) -> Hypothesis:
+def fitted(
+    surface: Surface, start: Placed, *, error_rad: float = START_ERROR, before: int = 0, most: float = math.inf
+) -> Hypothesis:
     """The group fitted as a whole from where it stands, which may be off by `error_rad`, and judged.
 
-    It may stay where it stands if the fit does not settle, or if the surface has openings: what lies behind them is
+    One that needs more than `most` by few points where the fit puts it is told without elements. It may stay where it stands if the fit does not settle, or if the surface has openings: what lies behind them is
     matched with what does not. There it is moved sideways, too, to where edges say that it belongs.
     """
     state = start.framed()
     stride = surface.stride(_moved_each(len(state.standard), GLANCE))
     history = tuple(refine(surface.cloud, state, start_error_rad=error_rad, stride=stride))
-    found = _placed(surface, start.moved(history[-1].state), history, before)
+    end = start.moved(history[-1].state)
+    if most < math.inf and (rough := _placed(surface, end, history, before, GLANCE)).need > most:
+        return replace(rough, elements=())
+    found = _placed(surface, end, history, before)
     drawn = surface.openings is not None or not history[-1].converged
     if not drawn or found.need <= exact_need(surface.floor):
         return found
