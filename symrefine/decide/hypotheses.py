@@ -97,8 +97,9 @@ def fitted(
 ) -> Hypothesis:
     """The group fitted as a whole from where it stands, which may be off by `error_rad`, and judged.
 
-    One that needs more than `most` by few points where the fit puts it is told without elements. It may stay where it stands if the fit does not settle, or if the surface has openings: what lies behind them is
-    matched with what does not. There it is moved sideways, too, to where edges say that it belongs.
+    One that needs more than `most` by few points where the fit puts it is told without elements. It may stay where it
+    stands if the fit does not settle, or if the surface has openings: what lies behind them is matched with what does
+    not. There it is moved sideways, too, to where edges say that it belongs.
     """
     state = start.framed()
     stride = surface.stride(_moved_each(len(state.standard), GLANCE))
