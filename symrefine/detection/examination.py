@@ -9,16 +9,17 @@ import numpy as np
 from symrefine.clock import Clock
 from symrefine.decide.chain import chain, explore
 from symrefine.decide.hypotheses import MOVED, Hypothesis
-from symrefine.decide.looks import GLANCED, few_motions
+from symrefine.decide.looks import LOOK, few_motions
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, known_links
 from symrefine.detection.measure import Measured, Outliers, doubt, gather, measure
 from symrefine.detection.sketch import Sample, Sketch, is_large, set_apart, sketched
+from symrefine.fit.placed import Placed
 from symrefine.fit.vertices import ROUNDED, OnVertices, on_vertices
-from symrefine.geometry import Array, check_tolerance
+from symrefine.geometry import Array, Mask, check_tolerance
 from symrefine.groups import PointGroup
 from symrefine.shape import Index, Shape
-from symrefine.surface.clumps import COUNTERPART, Clump, clump_among
+from symrefine.surface.clumps import CLUMP, COUNTERPART, Clump, clump_among
 from symrefine.surface.misses import TOLERANCE, disc_distances
 from symrefine.surface.surface import Surface
 from symrefine.surface.tree import Tree
@@ -147,18 +148,26 @@ def _strangers(found: Examined, points: Array, tolerance: float) -> tuple[Index,
     surface, measured = found.surface, found.measured
     if surface.skin is None or measured.views or found.doubt(tolerance):
         return ()
+    if not (rivals := found.rivals(tolerance)[:RIVALS]):
+        return ()
     out = np.concatenate([measured.strays, *(indices for indices, _ in measured.clumps)])
     own = np.setdiff1d(np.arange(len(points)), out, assume_unique=True)
     local = (points[own] - measured.moments.center) / measured.moments.scale
-    some = MOVED // GLANCED
+    some = MOVED // 4
     nearest = Tree(surface.cloud.points[:: surface.stride(some)]).nearest(local)[1]
-    for rival in found.rivals(tolerance)[:RIVALS]:
-        motions = few_motions(rival.placed)
-        misses = surface.seen(surface.misses(motions, sources=some), motions, sources=some)
-        unmet = (np.nan_to_num(misses) > surface.far).mean(axis=0) > 0.5
-        if (group := clump_among(local, unmet[nearest])).size:
-            return (own[group],)
+    for rival in rivals:
+        if 0.0 < _unmet(surface, rival.placed, LOOK).mean() <= CLUMP:
+            unmet = _unmet(surface, rival.placed, some)
+            if (group := clump_among(local, unmet[nearest])).size:
+                return (own[group],)
     return ()
+
+
+def _unmet(surface: Surface, placed: Placed, sources: int) -> Mask:
+    """Which of about so many local planes most of a few operations of a group carry to where nothing is."""
+    motions = few_motions(placed)
+    misses = surface.seen(surface.misses(motions, sources=sources), motions, sources=sources)
+    return np.asarray((np.nan_to_num(misses) > surface.far).mean(axis=0) > 0.5)
 
 
 def _has_parts_apart(found: Examined, tolerance: float) -> bool:
