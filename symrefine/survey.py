@@ -183,7 +183,7 @@ def _cloud(shape: Shape) -> Cloud:
         clumps=tuple(round(each * len(clump)) for clump in found.clumps),
         parts=count_parts(kept, np.random.default_rng(0)),
         even=found.shares is None,
-        volume=fills_volume(kept, Tree(kept), np.random.default_rng(0)),
+        volume=found.solid and fills_volume(kept, Tree(kept), np.random.default_rng(0)),
     )
 
 

@@ -18,6 +18,7 @@ from experiments.objects.shapes import bottle, box, join, mug, revolve, sample, 
 from experiments.studies import damaged, groups, single_views
 from symrefine.cli import invoke
 from symrefine.complete import complete
+from symrefine.decide import chain
 from symrefine.decide.looks import looked_at
 from symrefine.detection import examination
 from symrefine.detection.measure import HIDDEN, gather, measure
@@ -219,6 +220,20 @@ def test_a_hole_whose_border_may_be_none_leaves_an_answer_that_may_be_less_than_
     assert found.at_least
     assert truth.group.name in [found.point_group, *(a.point_group for a in found.alternatives)]
     assert not detect(sample(specimen("shape", name)[0], 20000, 0.003, np.random.default_rng(777))).at_least
+
+
+def test_a_group_of_an_open_surface_that_a_strict_limit_turned_down_is_fitted_under_a_laxer_one():
+    measured = measure(Shape(points=damage.hole(table(), 0.15, np.random.default_rng(4)).points))
+    surface = gather(measured, np.random.default_rng(0))[1]
+    assert surface.openings is not None
+    parts = [Placed(group=PointGroup(name="C7"), center=-measured.moments.center / measured.moments.scale)]
+    turned_down = chain._generated(surface, parts, (), 0, 1e-4)
+    assert turned_down is not None
+    assert turned_down.elements == ()
+    assert turned_down.need > chain.COARSE * 1e-4
+    again = chain._generated(surface, parts, (turned_down,), 0, 10.0)
+    assert again is not None
+    assert len(again.elements) == 1
 
 
 @pytest.mark.parametrize("name", ["chair", "starfish", "swirl4", "plastic_cup"])

@@ -74,7 +74,7 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     # What may not be open at all is missing a part only where that explains more, and no more than so short a border
     # may enclose.
     hidden = max((e.coverage.unseen for e in part.largest.elements), default=0.0)
-    ends = _ends_there(surface, whole.largest)
+    ends = (surface.openings.evident or more) and _ends_there(surface, whole.largest)
     missing = (surface.openings.evident or (more and hidden <= ENCLOSED)) and not ends
     if missing or _places(whole.largest, part.largest) >= PLACES:
         return replace(part, at_least=True)

@@ -106,7 +106,7 @@ def fitted(
     history = tuple(refine(surface.cloud, state, start_error_rad=error_rad, stride=stride))
     end = start.moved(history[-1].state)
     if most < math.inf and (rough := _placed(surface, end, history, before, GLANCE)).need > most:
-        return replace(rough, elements=())
+        return Hypothesis(placed=end, elements=(), need=rough.need)
     found = _placed(surface, end, history, before)
     drawn = surface.openings is not None or not history[-1].converged
     if not drawn or found.need <= exact_need(surface.floor):

@@ -150,8 +150,7 @@ def _strangers(found: Examined, points: Array, tolerance: float) -> tuple[Index,
         return ()
     if not (rivals := found.rivals(tolerance)[:RIVALS]):
         return ()
-    out = np.concatenate([measured.strays, *(indices for indices, _ in measured.clumps)])
-    own = np.setdiff1d(np.arange(len(points)), out, assume_unique=True)
+    own = np.setdiff1d(np.arange(len(points)), np.concatenate(measured.apart), assume_unique=True)
     local = (points[own] - measured.moments.center) / measured.moments.scale
     some = MOVED // 4
     nearest = Tree(surface.cloud.points[:: surface.stride(some)]).nearest(local)[1]

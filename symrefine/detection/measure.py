@@ -71,6 +71,11 @@ class Measured:
     moments: Moments
     vectors: NTuples
 
+    @property
+    def apart(self) -> list[Index]:
+        """Indices of the strays, and of each clump."""
+        return [self.strays, *(indices for indices, _ in self.clumps)]
+
     @cached_property
     def flaw(self) -> str:
         """Why the shape supports no decision at any tolerance, or nothing if it does."""

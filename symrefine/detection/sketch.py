@@ -137,7 +137,7 @@ def set_apart(measured: Measured, sketch: Sketch | None, *, outliers: bool) -> t
 
     What was found in a sample is looked for among all points that are in memory; of a stream they are of the sample.
     """
-    groups = [measured.strays, *(indices for indices, _ in measured.clumps)]
+    groups = measured.apart
     some = np.sort(np.concatenate(groups))
     if sketch is None:
         return some, len(some) / (len(some) + measured.count)

@@ -76,16 +76,15 @@ def clump_among(points: Array, unmet: Mask) -> Index:
     None where they are more than a clump may be, or too few to tell. Nothing but they is asked, so that it does not
     matter what they touch.
     """
-    found = np.flatnonzero(unmet)
-    if not NEIGHBOURS[0] * FRACTIONS[0] <= len(found) <= CLUMP * len(points):
+    found, least = np.flatnonzero(unmet), max(NEIGHBOURS[0] * FRACTIONS[0], SHARES[-1] * len(points))
+    if not least <= len(found) <= CLUMP * len(points):
         return found[:0]
     part = _parts(Surroundings.of(points[found]))
-    sizes = np.bincount(part)
-    own = found[part == sizes.argmax()]
-    if len(own) < max(NEIGHBOURS[0] * FRACTIONS[0], SHARES[-1] * len(points), 0.5 * len(found)):
+    own = found[part == np.bincount(part).argmax()]
+    if len(own) < max(least, 0.5 * len(found)):
         return found[:0]
     tree, queries = Tree(points[own]), points[own][:: max(1, len(own) // PROBES)]
-    thick = (np.median(_blobness(points[own], tree, queries, len(own) // part)) for part in FRACTIONS)
+    thick = (np.median(_blobness(points[own], tree, queries, len(own) // k)) for k in FRACTIONS)
     return own if min(thick) > VOLUME else found[:0]
 
 
