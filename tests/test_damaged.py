@@ -13,6 +13,8 @@ from scipy.spatial import cKDTree
 
 from experiments.objects import damage
 from experiments.objects.built_symmetry import specimen
+from experiments.objects.constructions import polygon
+from experiments.objects.parts import extruded
 from experiments.objects.poses import Pose
 from experiments.objects.shapes import bottle, box, join, mug, revolve, sample, stool, table
 from experiments.studies import damaged, groups, single_views
@@ -271,6 +273,14 @@ def test_a_part_out_of_place_is_no_clump_that_hides_where_it_belongs(name):
     shape, _ = groups.posed(case)
     found = detect(shape, tolerance=case.tolerance)
     assert (found.point_group, found.clumps) == (groups.true_group(name, True).name, 0)
+
+
+def test_no_clump_grows_from_a_crown_of_teeth_that_fills_its_neighbourhoods():
+    """Sixty teeth, half of the surface: asked whether they were a clump, it was decided twice, in a minute."""
+    teeth = extruded(np.tile([1.0, 0.7], 60)[:, None] * polygon(120), -0.4, 0.4)
+    rng = np.random.default_rng(11)
+    points = Pose.random(rng).of(sample(Shape(teeth.vertices, teeth.faces), 20000, 0.003, rng))
+    assert not sampling(points, np.random.default_rng(0), outliers=True).blobs
 
 
 def test_a_clump_covers_its_rim_wherever_it_is_and_no_more():

@@ -127,7 +127,9 @@ def filled(points: Array, around: Surroundings, rng: np.random.Generator) -> lis
             part = _parts_of(_filled_at(size, part >= 0, points, tree, around, step), around, enough)
         within &= _beside(_beside(part >= 0, around), around)
     # One that fills a volume may hold more than one of surface, as long as the rest is no counterpart of it.
-    return _members(points, around, [_grown(m, around) for m in _lone(part, COUNTERPART / (1.0 + COUNTERPART))])
+    most = COUNTERPART / (1.0 + COUNTERPART)
+    grown = (_grown(m, around) for m in _lone(part, most))
+    return _members(points, around, [m for m in grown if m.mean() <= most])
 
 
 def _parts_of(within: Mask, around: Surroundings, enough: float) -> Index:
