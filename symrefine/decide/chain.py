@@ -69,6 +69,8 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     whole = _of_whole(replace(surface, openings=closed), evidence, limit, nothing)
     if surface.openings is None or surface.openings is closed:
         return whole
+    if not whole.largest.group.is_polar and _ends_there(surface, whole.largest):
+        return replace(whole, at_least=surface.openings.evident)  # no single hole leaves such a group
     part = _of_part(surface, whole)
     more = _size(part.largest.placed) > _size(whole.largest.placed)
     # What may not be open at all is missing a part only where that explains more, and no more than so short a border
@@ -126,7 +128,10 @@ def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float
 def _of_part(surface: Surface, whole: Pool) -> Pool:
     pool = Pool(nothing=whole.nothing, limit=whole.limit)
     for known in (whole.largest, *whole.small):
-        pool = _grown(surface, pool, fitted(surface, known.placed)) if known.elements else pool
+        if known.elements:
+            # What holds without them asks nothing of openings.
+            again = known if known.need <= exact_need(surface.floor) else fitted(surface, known.placed)
+            pool = _grown(surface, pool, again)
     return _with(surface, pool, [*voted_mirrors(surface.cloud), *repeated(surface.cloud, surface.diagonal)])
 
 

@@ -55,6 +55,11 @@ class PointGroup:
         return not math.isinf(self.symbol.fold) and self.symbol.family not in ("K", "Kh")
 
     @property
+    def is_polar(self) -> bool:
+        """Whether it leaves more than the centre where it is: the points of a plane, of an axis, or all."""
+        return self.symbol.family in ("C", "Cv") or self.name == "Cs"
+
+    @property
     def order(self) -> float:
         """Number of operations: an int, or `math.inf`."""
         return len(standard_operations(self.symbol)) if self.is_finite else math.inf
