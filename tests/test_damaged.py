@@ -37,6 +37,7 @@ from symrefine.propose.votes import mirror_votes, revolution
 from symrefine.shape import CAMERAS, Shape
 from symrefine.surface.cameras import cameras, unclosed
 from symrefine.surface.clumps import Clump, clump_among
+from symrefine.surface.openings import agreed
 from symrefine.surface.sampling import sampling
 from symrefine.surface.surroundings import Surroundings
 
@@ -404,6 +405,24 @@ def test_a_part_without_counterpart_is_hardly_explained_away(seed):
     made = damage.cut(NOTCHED, 0.1, np.random.default_rng(seed))
     found = detect(posed(made.points, 15)[0])
     assert found.point_group == "C1" or found.confidence < 0.95
+
+
+def test_whether_a_place_was_looked_at_is_a_matter_of_the_place():
+    """Of twelve patches that come to lie in one hole, three are denied as their borders were not all told."""
+    rng = np.random.default_rng(31)
+    hole, gap = rng.normal(size=(1200, 3)), rng.normal(size=(200, 3)) + 20.0
+    unseen = np.concatenate([np.arange(1200) % 4 > 0, np.zeros(200, dtype=bool)])
+    found = agreed(np.concatenate([hole, gap]), unseen)
+    assert found[:1200].mean() > 0.9
+    assert not found[1200:].any()
+    assert not agreed(gap, unseen[1200:]).any()
+
+
+@pytest.mark.parametrize(("name", "strength"), [("crown_gear12", 0.05), ("crown_gear12", 0.15), ("crate", 0.05)])
+def test_what_most_operations_carry_to_a_hole_is_no_evidence_against_the_others(name, strength):
+    made, truth = damaged.damaged(damaged.Case(family="shape", name=name, kind="hole", strength=strength, seed=1402))
+    found = detect(made.points)
+    assert (found.point_group, found.at_least) == (truth.group.name, True)
 
 
 def test_the_corner_of_a_cube_says_at_least():

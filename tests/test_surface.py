@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from experiments.objects.shapes import bottle, box, join, mug, sample, stool, table
 from symrefine.geometry import Isometry, Plane, householder, random_orthogonal, rotation, tight_diagonal
+from symrefine.groups import PointGroup
 from symrefine.moments.moments import shape_moments
 from symrefine.moments.quadrature import sample_surface
 from symrefine.surface.misses import (
@@ -352,6 +353,18 @@ def test_of_a_volume_the_spread_counts():
     quarter, half = ([about(rotation(Z, a))] for a in (np.pi / 2, np.pi))
     assert quiet.need(quarter) == pytest.approx(np.sqrt(2) * 0.2 / surface.diagonal / LIMITS[0], rel=0.15)
     assert quiet.need(quarter) > 2 * quiet.need(half)
+
+
+def test_chance_puts_the_spread_of_a_volume_off_less_often_than_it_may():
+    """Of a box in random samples, with all that its group holds asked at once, and its spread off by rounding at most."""
+    group = PointGroup(name="D2h").operations()[1:]
+    motions, off = [about(m) for m in group], []
+    for seed in range(60):
+        points = np.random.default_rng(seed).uniform(-1, 1, (1500, 3)) * [1.0, 0.8, 0.5]
+        surface = Surface(cloud=isolated_points(points, body="volume"), diagonal=tight_diagonal(points))
+        nothing = np.zeros((len(motions), len(points)))
+        off.append(surface.needed(nothing, motions, len(motions)).max() > 1e-6)
+    assert np.mean(off) < 0.1
 
 
 def test_only_the_discs_of_its_own_class_count():

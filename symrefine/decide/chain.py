@@ -64,7 +64,7 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
         limit: what the largest group may need, as a fraction of the diagonal.
         finest: the smallest tolerance that is asked for.
     """
-    nothing = max(ALIKE * exact_need(surface.floor), certain(finest))
+    nothing = max(ALIKE * _hidden(surface), certain(finest, surface.floor))
     closed = None if surface.openings is None else surface.openings.closed
     whole = _of_whole(replace(surface, openings=closed), evidence, limit, nothing)
     if surface.openings is None or surface.openings is closed:
@@ -86,6 +86,11 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     # To believe that what ends so evenly is missing a part takes as much as to believe in as much as was seen.
     rival = replace(part.largest, need=math.hypot(part.largest.need, surface.tolerance))
     return replace(whole, small=(*whole.small, rival))
+
+
+def _hidden(surface: Surface) -> float:
+    """The need up to which noise tells no two groups apart, and none is doubted for it."""
+    return min(exact_need(surface.floor), certain(surface.tolerance, surface.floor))
 
 
 def _ends_there(surface: Surface, found: Hypothesis) -> bool:
@@ -278,7 +283,7 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     elements = [single(e) for e in pool.largest.elements if e.need < pool.largest.need / ALIKE]
     near = [h for h in pool.turned_down() if h.need <= COARSE * pool.limit]
     # What is hidden by noise, or by the least tolerance that is asked for, tells no two groups apart.
-    hidden = max(exact_need(surface.floor), pool.nothing / ALIKE)
+    hidden = max(_hidden(surface), pool.nothing / ALIKE)
     worst = partial(_worst, hidden=hidden)
     rest = sorted([*pool.small, *elements, pool.largest, *near], key=worst)
     known = [pool.largest, *pool.failed]

@@ -175,7 +175,8 @@ def _closely_judged(surface: Surface, found: tuple[Element, ...], need: float) -
         told[told <= hidden] = 0.0
         own = [float(part.max()) for part in np.split(told, ends[:-1])]
         found = tuple(replace(e, need=max(e.need, n)) for e, n in zip(found, own, strict=True))
-    return found, max(need, *(e.need for e in found))
+        need = max(need, *own)
+    return found, need
 
 
 def _telling(element: Element, wedge: Wedge) -> tuple[Isometry, ...]:
@@ -221,16 +222,19 @@ class _Parts:
 
 def _seen_judged(surface: Surface, parts: _Parts, misses: Array) -> tuple[tuple[Element, ...], float]:
     """The elements of a group by what was seen of them, and what all of them need with the belief in the rest."""
-    found, need = _judged(surface, parts, surface.seen(misses, parts.motions, sources=parts.sources))
+    seen = surface.seen(misses, parts.motions, sources=parts.sources, together=True)
+    found, need = _judged(surface, parts, seen)
     if surface.openings is None or surface.openings.cameras:  # they say what they could not see
         return found, need
     # A lone mirror is forgiven more for being made inexactly, not for what nobody saw of it.
     whole = surface.tolerance * (EVEN_MIRROR / EVEN if parts.placed.group.name == "Cs" else 1.0)
     beliefs = [whole * _belief(e) for e in found]
-    # More than half of the operations of a group generate it (Lagrange), so that the others follow.
+    # More than half of the operations of a group generate it (Lagrange), so that the others follow; of a continuous one
+    # that takes turns about its axes, as nearly all are.
+    turns = [b for e, b in zip(found, beliefs, strict=True) if math.isinf(e.operations.order)]
     return (
         tuple(replace(e, need=math.hypot(e.need, b)) for e, b in zip(found, beliefs, strict=True)),
-        math.hypot(need, sorted(beliefs)[len(beliefs) // 2]),
+        math.hypot(need, max(turns, default=sorted(beliefs)[len(beliefs) // 2])),
     )
 
 

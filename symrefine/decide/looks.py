@@ -142,7 +142,7 @@ def _sideways(placed: Placed) -> Array:
 
 def _seems(surface: Surface, placed: Placed, sources: int) -> float:
     """What a group where it stands needs, as a few operations tell on a few points."""
-    return float(surface.needs(few_motions(placed), sources=sources, tests=GLANCED).max())
+    return float(surface.needs(few_motions(placed), sources=sources, tests=GLANCED, together=True).max())
 
 
 def start_error(surface: Surface) -> float:

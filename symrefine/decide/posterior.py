@@ -114,9 +114,9 @@ def meant(link: Link, tolerance: float, noise: float = 0.0, curve: Curve = SPACE
     return float(1.0 / (1.0 + strained ** (sharpness(noise / tolerance, curve.steepness) / 2.0)))
 
 
-def certain(tolerance: float, curve: Curve = SPACE) -> float:
-    """The need up to which a group leaves less doubt at a tolerance than is worth telling."""
-    return float(curve.even * tolerance * LEAST ** (1.0 / curve.steepness))
+def certain(tolerance: float, noise: float = 0.0, curve: Curve = SPACE) -> float:
+    """The need up to which a group leaves less doubt at a tolerance than is worth telling; as little strain in noise."""
+    return float(curve.even * tolerance * LEAST ** (1.0 / curve.steepness) / math.hypot(1.0, BLURRED * noise / tolerance))
 
 
 def strain(need: T, noise: T, even: T, unknown: float = UNKNOWN, blurred: float = BLURRED) -> T:

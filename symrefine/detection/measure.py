@@ -281,7 +281,7 @@ def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLE
         return evidence, Surface(cloud=isolated_points(local, labels), diagonal=tight_diagonal(local))
     hiding = tuple(Clump.of((p - moments.center) / moments.scale) for _, p in measured.clumps)
     if measured.solid and normals is None and fills_volume(local, Tree(local), np.random.default_rng(0)):
-        return evidence, _volume(local, labels, rng)
+        return evidence, _volume(local, labels, tolerance, rng)
     exact = shape.faces is not None
     return evidence, _surface(local, normals, weights, labels, exact, tolerance, measured.views, hiding, rng)
 
@@ -331,7 +331,7 @@ def _surface(
     return surface
 
 
-def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Surface:
+def _volume(points: Array, labels: Index | None, tolerance: float, rng: np.random.Generator) -> Surface:
     pick = drawn(len(points), SAMPLES, rng)
     points, labels = points[pick], None if labels is None else labels[pick]
 
@@ -342,7 +342,7 @@ def _volume(points: Array, labels: Index | None, rng: np.random.Generator) -> Su
     noise = noise_distances(len(points), some_of, rng)
     cloud = some_of(np.arange(len(points)))
     drift = Drift.of(points, Tree(points) if labels is not None else cloud.tree, WINDOWS, rng)
-    return Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, drift=drift)
+    return Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, drift=drift, tolerance=tolerance)
 
 
 def _cloud(

@@ -151,6 +151,18 @@ class Openings:
         return found | covered
 
 
+def agreed(places: Array, unseen: Mask) -> Mask:
+    """Whether nobody looked at places [N, 3] that operations carry parts of a surface to, by what is said around each.
+
+    Whether somebody did is a matter of the place. Of a border not all may be told, so that a patch of one operation is
+    denied what those of others that come to lie there are granted.
+    """
+    if unseen.all() or not unseen.any() or len(places) <= LINKS:
+        return unseen
+    near = Tree(places).query(places, LINKS + 1)[1]
+    return np.asarray(unseen[near].mean(axis=1) > 0.5)
+
+
 def openings(
     cloud: LocalPlanes,
     points: Array,

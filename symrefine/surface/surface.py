@@ -19,7 +19,7 @@ from symrefine.surface.misses import (
     needs_of_atoms,
     spread_distance,
 )
-from symrefine.surface.openings import Openings
+from symrefine.surface.openings import Openings, agreed
 from symrefine.surface.skin import LocalPlanes, Skin
 from symrefine.surface.wedge import Wedge
 
@@ -27,8 +27,8 @@ from symrefine.surface.wedge import Wedge
 NEAREST_SPREAD = 0.363
 # Local planes that show how the patches of an image hang together.
 PATCHES = 1500
-# Pieces of a volume that tell how far chance puts its covariance off.
-PIECES = 8
+# Pieces of a volume that tell how far chance puts its covariance off, which two of its components do to a sixth.
+PIECES = 32
 # Windows that are moved: by all operations together, and by each at least.
 WINDOWS, WINDOWS_EACH = 2400, 400
 # Misses of an open surface end where the least of it needs so many tolerances: nothing beyond is told apart.
@@ -111,14 +111,24 @@ class Surface:
         bound *= self.diagonal
         return miss_distances(self.cloud, motions, stride=stride, bound=bound, discs=discs) / self.diagonal
 
-    def seen(self, misses: Array, motions: Sequence[Isometry], *, sources: int = 10**9) -> Array:
-        """The misses [K, N] of K operations, NaN for what they carry to where nobody looked; `sources` as before."""
+    def seen(
+        self, misses: Array, motions: Sequence[Isometry], *, sources: int = 10**9, together: bool = False
+    ) -> Array:
+        """The misses [K, N] of K operations, NaN for what they carry to where nobody looked.
+
+        `sources` as before. Of operations that are judged `together` most say whether somebody looked at a place,
+        unless cameras do.
+        """
         if self.openings is None:
             return misses
         stride, found = self.stride(sources), misses.copy()
-        for motion, miss in zip(motions, found, strict=True):
-            moved = motion.apply(self.cloud.points[::stride])
-            miss[self.openings.unseen(self.cloud, moved, miss > self.far, stride, self.far * self.diagonal)] = np.nan
+        moved = [motion.apply(self.cloud.points[::stride]) for motion in motions]
+        for there, miss in zip(moved, found, strict=True):
+            miss[self.openings.unseen(self.cloud, there, miss > self.far, stride, self.far * self.diagonal)] = np.nan
+        if together and not self.openings.cameras:
+            away = misses > self.far
+            unseen = agreed(np.stack(moved)[away], np.isnan(found[away]))
+            found[away] = np.where(unseen, np.nan, misses[away])
         return found
 
     def coverage(self, misses: Array, motions: Sequence[Isometry], *, sources: int = 10**9) -> Coverage:
@@ -156,18 +166,29 @@ class Surface:
         found = needs(misses, self.noise, tests)
         if self.cloud.body == "surface":
             return found
-        own, chance = self._spread
-        apart = np.array([spread_distance(own, m.matrix @ own @ m.matrix.T) for m in motions]) ** 2
-        return np.maximum(found, np.sqrt(np.maximum(apart - chance, 0.0)) / (self.diagonal * LIMITS[0]))
+        matrices = np.stack([m.matrix for m in motions])
+        return np.maximum(found, self._spreads_apart(matrices, tests) / (self.diagonal * LIMITS[0]))
+
+    def _spreads_apart(self, matrices: Array, tests: int) -> Array:
+        """How far the spread of the points is from that of their images [K], but for what chance puts them apart by.
+
+        By how much the pieces disagree tells that of each operation. The least that one compares are two components of
+        the covariance, as a mirror does; then the square is exponentially distributed. It may be as large as is as rare
+        as `SURE` standard deviations are.
+        """
+        own, pieces = self._spreads
+        apart, each = (c - np.einsum("kab,...bc,kdc->k...ad", matrices, c, matrices) for c in (own, pieces))
+        squares = (apart**2).sum(axis=(1, 2))
+        by_chance = ((each - apart[:, None]) ** 2).sum(axis=(1, 2, 3)) / (PIECES * (PIECES - 1))
+        most = by_chance * math.log(tests / math.erfc(SURE / math.sqrt(2.0)))
+        left = np.sqrt(np.clip(1.0 - most / np.maximum(squares, np.finfo(float).tiny), 0.0, None))
+        return left * [spread_distance(own, m @ own @ m.T) for m in matrices]
 
     @cached_property
-    def _spread(self) -> tuple[Array, float]:
-        """Covariance of the points [3, 3], and by how much, in squares, chance puts it off an image of it at most."""
+    def _spreads(self) -> tuple[Array, Array]:
+        """Covariance of the points [3, 3], and of random pieces of them [PIECES, 3, 3]."""
         points = self.cloud.points[np.random.default_rng(0).permutation(len(self.cloud.points))]
-        own, parts = np.cov(points.T), [np.cov(points[k::PIECES].T) for k in range(PIECES)]
-        # One of n pieces is n - 1 times as far off as the whole, in squares, and the image is off as much once more.
-        chance = 2.0 * np.mean([spread_distance(own, part) ** 2 for part in parts]) / (PIECES - 1)
-        return own, float(chance * (1.0 + SURE * math.sqrt(2.0 / own[np.triu_indices(3)].size)))
+        return np.cov(points.T), np.stack([np.cov(points[k::PIECES].T) for k in range(PIECES)])
 
     def drifted(
         self, misses: Array, motions: Sequence[Isometry], tests: int = 1, *, sources: int = 10**9
@@ -219,13 +240,14 @@ class Surface:
         bound: float = math.inf,
         discs: int = DISCS,
         tests: int = 1,
+        together: bool = False,
     ) -> Array:
         """The smallest tolerances [K] at which each of K operations holds, as far as it was seen.
 
-        `sources`, `bound` and `discs` as of `misses`, `tests` as of `needed`.
+        `sources`, `bound` and `discs` as of `misses`, `tests` as of `needed`, `together` as of `seen`.
         """
         misses = self.misses(motions, sources=sources, bound=bound, discs=discs)
-        return self.needed(self.seen(misses, motions, sources=sources), motions, tests)
+        return self.needed(self.seen(misses, motions, sources=sources, together=together), motions, tests)
 
     def need(self, motions: Sequence[Isometry], *, sources: int = 10**9) -> float:
         """The smallest tolerance at which all of some operations hold."""
