@@ -328,3 +328,13 @@ def test_what_a_group_holds_but_for_a_few_degrees_makes_no_larger_one():
 def mirror_frame():
     """The frame of a mirror of C5v."""
     return frame_with_z(point_group("C5v").mirrors()[0])
+
+
+@pytest.mark.parametrize("name", ["goblet", "spool"])
+def test_of_mirrors_that_noise_does_not_tell_apart_none_is_sure(name):
+    """A small part on a body of revolution: noise hides which way its mirror faces, not that there is one."""
+    case = groups.Case(shape=name, sibling=True, noise_rel=0.01, seed=101)
+    found, turn = detect(groups.posed(case)[0]), groups.posed(case)[1]
+    truth = groups.true_group(name, True)
+    assert found.point_group == "Cs"
+    assert all(groups.is_mirror(truth, turn.T @ p.plane.normal) or p.confidence < 0.5 for p in found.planes)

@@ -356,7 +356,7 @@ def test_of_a_volume_the_spread_counts():
 
 
 def test_chance_puts_the_spread_of_a_volume_off_less_often_than_it_may():
-    """Of a box in random samples, with all that its group holds asked at once, and its spread off by rounding at most."""
+    """Of a box in random samples, all that its group holds is asked at once; rounding puts it off by next to nothing."""
     group = PointGroup(name="D2h").operations()[1:]
     motions, off = [about(m) for m in group], []
     for seed in range(60):

@@ -14,7 +14,7 @@ import numpy as np
 
 from symrefine.decide.hypotheses import NOTHING, Hypothesis, fitted, has_all, joined, roughly_judged, single
 from symrefine.decide.looks import START_ERROR, exact_need, glances, looked_at
-from symrefine.decide.pool import ALIKE, Pool, is_at
+from symrefine.decide.pool import ALIKE, Pool, is_at, is_same
 from symrefine.decide.posterior import ALONE, certain
 from symrefine.fit.placed import Placed
 from symrefine.propose.candidates import (
@@ -265,14 +265,19 @@ def _worst(found: Hypothesis, hidden: float) -> tuple[float, float]:
 def _best(tried: Sequence[Hypothesis], hidden: float) -> Hypothesis | None:
     """Of groups that do not hold together the one that needs least; of those that need as little as noise the largest.
 
-    By chance fewer operations hold than many. Of those as large it is the one that misses least in the mean.
+    By chance fewer operations hold than many. Of those as large it is the one that misses least in the mean; how many
+    of them it is tells how sure its place is.
     """
 
     def rank(found: Hypothesis) -> tuple[float, float, float]:
         need, mean = _worst(found, hidden)
         return need, -_size(found.placed), mean
 
-    return min((h for h in tried if h.elements), key=rank, default=None)
+    best = min((h for h in tried if h.elements), key=rank, default=None)
+    if best is None or best.need > hidden:
+        return best
+    rivals = [h for h in tried if h.elements and h.need <= hidden and h.group.name == best.group.name]
+    return replace(best, share=sum(is_same(h.placed, best.placed) for h in rivals) / len(rivals))
 
 
 def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:

@@ -48,7 +48,8 @@ class Element:
 class Hypothesis:
     """A group where it fits best: its elements judged, and what the worst of them needs.
 
-    `history` holds the iterates of the fit; `before` counts those of the parts that it was put together from.
+    `history` holds the iterates of the fit; `before` counts those of the parts that it was put together from. `share`
+    tells how many it is of those of its name that noise does not tell from it, and that do not hold together.
     """
 
     placed: Placed
@@ -56,6 +57,7 @@ class Hypothesis:
     need: float
     history: tuple[Iterate, ...] = ()
     before: int = 0
+    share: float = 1.0
 
     @property
     def supported(self) -> float:

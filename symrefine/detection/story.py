@@ -254,11 +254,14 @@ def _polished(chosen: Hypothesis, on: OnVertices, measured: Measured) -> Hypothe
 
 
 def _confidence(element: Element, links: Sequence[Hypothesis], decision: Decision) -> float:
-    """Probability that an element is meant: that the true group holds the first group of the chain which has it."""
+    """Probability that an element is meant: that the true group holds the first group of the chain which has it.
+
+    And that it stands there, where noise does not tell it from others that would stand elsewhere.
+    """
     matrix = element.operations.matrices[0][None]
     for link, inside in zip(links, decision.inside, strict=True):
         if link.elements and link.group.distance_rad(matrix)[0] < math.radians(5.0):
-            return inside
+            return inside * link.share
     return decision.inside[decision.index]
 
 
