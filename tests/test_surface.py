@@ -356,7 +356,7 @@ def test_of_a_volume_the_spread_counts():
 
 
 def test_chance_puts_the_spread_of_a_volume_off_less_often_than_it_may():
-    """Of a box in random samples, all that its group holds is asked at once; rounding puts it off by next to nothing."""
+    """Of a box in random samples, all that its group holds is asked at once; rounding puts it off a little."""
     group = PointGroup(name="D2h").operations()[1:]
     motions, off = [about(m) for m in group], []
     for seed in range(60):
