@@ -64,7 +64,7 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
         limit: what the largest group may need, as a fraction of the diagonal.
         finest: the smallest tolerance that is asked for.
     """
-    nothing = max(ALIKE * _hidden(surface), certain(finest, surface.floor))
+    nothing = max(ALIKE * _hidden(surface), certain(finest))
     closed = None if surface.openings is None else surface.openings.closed
     whole = _of_whole(replace(surface, openings=closed), evidence, limit, nothing)
     if surface.openings is None or surface.openings is closed:

@@ -166,29 +166,20 @@ class Surface:
         found = needs(misses, self.noise, tests)
         if self.cloud.body == "surface":
             return found
-        matrices = np.stack([m.matrix for m in motions])
-        return np.maximum(found, self._spreads_apart(matrices, tests) / (self.diagonal * LIMITS[0]))
-
-    def _spreads_apart(self, matrices: Array, tests: int) -> Array:
-        """How far the spread of the points is from that of their images [K], but for what chance puts them apart by.
-
-        By how much the pieces disagree tells that of each operation. The least that one compares are two components of
-        the covariance, as a mirror does; then the square is exponentially distributed. It may be as large as is as rare
-        as `SURE` standard deviations are.
-        """
-        own, pieces = self._spreads
-        apart, each = (c - np.einsum("kab,...bc,kdc->k...ad", matrices, c, matrices) for c in (own, pieces))
-        squares = (apart**2).sum(axis=(1, 2))
-        by_chance = ((each - apart[:, None]) ** 2).sum(axis=(1, 2, 3)) / (PIECES * (PIECES - 1))
-        most = by_chance * math.log(tests / math.erfc(SURE / math.sqrt(2.0)))
-        left = np.sqrt(np.clip(1.0 - most / np.maximum(squares, np.finfo(float).tiny), 0.0, None))
-        return left * [spread_distance(own, m @ own @ m.T) for m in matrices]
+        own, chance = self._spread
+        apart = np.array([spread_distance(own, m.matrix @ own @ m.matrix.T) for m in motions]) ** 2
+        # An operation may compare no more than two components, as a mirror does: then the square is exponentially
+        # distributed. It may be as large as is as rare as `SURE` standard deviations are.
+        chance *= math.log(tests / math.erfc(SURE / math.sqrt(2.0)))
+        return np.maximum(found, np.sqrt(np.maximum(apart - chance, 0.0)) / (self.diagonal * LIMITS[0]))
 
     @cached_property
-    def _spreads(self) -> tuple[Array, Array]:
-        """Covariance of the points [3, 3], and of random pieces of them [PIECES, 3, 3]."""
+    def _spread(self) -> tuple[Array, float]:
+        """Covariance of the points [3, 3], and by how much, in squares, chance puts it off its image in the mean."""
         points = self.cloud.points[np.random.default_rng(0).permutation(len(self.cloud.points))]
-        return np.cov(points.T), np.stack([np.cov(points[k::PIECES].T) for k in range(PIECES)])
+        own, parts = np.cov(points.T), [np.cov(points[k::PIECES].T) for k in range(PIECES)]
+        # One of n pieces is n - 1 times as far off as the whole, in squares, and the image is off as much once more.
+        return own, float(2.0 * np.mean([spread_distance(own, part) ** 2 for part in parts]) / (PIECES - 1))
 
     def drifted(
         self, misses: Array, motions: Sequence[Isometry], tests: int = 1, *, sources: int = 10**9
