@@ -24,6 +24,7 @@ from symrefine.fit.placed import Placed
 from symrefine.geometry import frame_with_z, line_angle_rad, random_orthogonal, rotation
 from symrefine.groups import is_subgroup, point_group
 from symrefine.shape import Shape
+from symrefine.surface.misses import LIMITS
 
 # What `detect` asks for at most, and what it takes a molecule for.
 LIMIT, TOLERANCE = 0.03, 0.02
@@ -206,6 +207,16 @@ def test_what_needs_more_than_the_limit_is_left_out():
     parts = (replace(of("C3"), need=0.001), replace(of("C2"), need=2 * LIMIT))
     links = chain(ring()[1], Pool(small=parts), LIMIT)
     assert [h.group.name for h in links] == ["C1", "C3"]
+
+
+def test_in_noise_as_thick_as_the_tolerance_what_is_doubted_hides_no_part_that_holds():
+    """What two parts make needs less than three quarters of what noise does, for which it is doubted all the same."""
+    whole = replace(of("C6v"), need=0.7 * TOLERANCE)
+    whole = replace(whole, elements=tuple(replace(e, need=whole.need) for e in whole.elements))
+    noisy = replace(ring()[1], noise=np.full(100, LIMITS[0] * TOLERANCE), tolerance=TOLERANCE)
+    links = chain(noisy, Pool(largest=whole, small=(of("C6"), of("C3v"))), LIMIT)
+    assert [h.group.name for h in links] == ["C1", "C6", "C6v"]
+    assert decide([Link(need=h.need) for h in links[1:]], TOLERANCE, noisy.floor).index == 1
 
 
 def test_a_group_that_fails_is_told_with_what_it_needs():

@@ -12,7 +12,7 @@ from matplotlib.path import Path as MatplotlibPath
 from scipy.spatial import cKDTree
 
 from experiments.objects import damage
-from experiments.objects.built_symmetry import specimen
+from experiments.objects.built_symmetry import Truth, specimen
 from experiments.objects.constructions import polygon
 from experiments.objects.parts import extruded
 from experiments.objects.poses import Pose
@@ -20,7 +20,8 @@ from experiments.objects.shapes import bottle, box, join, mug, revolve, sample, 
 from experiments.studies import damaged, groups, single_views
 from symrefine.cli import invoke
 from symrefine.complete import complete
-from symrefine.decide import chain
+from symrefine.decide import chain, hypotheses
+from symrefine.decide.hypotheses import judged
 from symrefine.decide.looks import looked_at
 from symrefine.detection import examination
 from symrefine.detection.measure import HIDDEN, gather, measure
@@ -37,6 +38,7 @@ from symrefine.propose.votes import mirror_votes, revolution
 from symrefine.shape import CAMERAS, Shape
 from symrefine.surface.cameras import cameras, unclosed
 from symrefine.surface.clumps import Clump, clump_among
+from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.openings import agreed
 from symrefine.surface.sampling import sampling
 from symrefine.surface.surroundings import Surroundings
@@ -49,6 +51,13 @@ NOTCHED = join([box((0, 0, 0), (1.0, 0.7, 0.5)), box((0.45, 0.3, 0.35), (0.3, 0.
 def surface_of(points, **more):
     measured = measure(Shape(points=points, **more))
     return gather(measured, np.random.default_rng(0))[1]
+
+
+def at_truth(points, truth):
+    """The true group judged where it is."""
+    measured = measure(Shape(points=points))
+    center = (truth.center - measured.moments.center) / measured.moments.scale
+    return judged(gather(measured, np.random.default_rng(0))[1], Placed(group=truth.group, center=center))
 
 
 def posed(points, seed):
@@ -423,6 +432,26 @@ def test_what_most_operations_carry_to_a_hole_is_no_evidence_against_the_others(
     made, truth = damaged.damaged(damaged.Case(family="shape", name=name, kind="hole", strength=strength, seed=1402))
     found = detect(made.points)
     assert (found.point_group, found.at_least) == (truth.group.name, True)
+
+
+def test_a_group_asks_for_no_more_belief_than_what_generates_it():
+    """Of one mirror of a crate a cut leaves too little to believe it by; the other elements make it."""
+    made, truth = damaged.damaged(damaged.Case(family="shape", name="crate", kind="cut", strength=0.2, seed=1402))
+    found = at_truth(made.points, truth)
+    assert max(e.need for e in found.elements) > 1.0
+    assert found.need < TOLERANCE
+
+
+def test_a_continuous_group_asks_for_the_belief_that_its_turns_need(monkeypatch):
+    """A disc with patches missing: if half turns that carry it to its other side were sure, no azimuth would be."""
+    monkeypatch.setattr(hypotheses, "_belief", lambda e: 0.5 if np.isinf(e.operations.order) else 0.0)
+    rng = np.random.default_rng(32)
+    disc = sample(join([revolve([(0.0, -0.06), (1.0, -0.06), (1.0, 0.06), (0.0, 0.06)])]), 20000, 0.0, rng)
+    patches = [(0.25 + 0.07 * k) * np.array([np.cos(0.9 * k), np.sin(0.9 * k)]) for k in range(8)]
+    disc = disc[np.min([np.linalg.norm(disc[:, :2] - p, axis=1) for p in patches], axis=0) > 0.11]
+    found = at_truth(disc, Truth(group=PointGroup(name="Dinfh"), center=np.zeros(3)))
+    assert max(e.coverage.unseen for e in found.elements) > 0.03
+    assert found.need > 0.4 * TOLERANCE
 
 
 def test_the_corner_of_a_cube_says_at_least():

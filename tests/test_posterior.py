@@ -158,7 +158,7 @@ def test_what_is_certain_leaves_no_doubt_worth_telling(tolerance, lone):
 @given(st.floats(1e-4, 0.2), st.floats(0.0, 1.2))
 def test_what_is_certain_leaves_little_more_doubt_than_noise_does(tolerance, noise):
     """Where noise is as large as the tolerance, half of what noise needs was taken for exact, and denied."""
-    need = certain(tolerance, noise * tolerance)
+    need = certain(tolerance, noise)
     alone, with_need = (meant(Link(need=n), tolerance, noise * tolerance) for n in (0.0, need))
     assert need <= certain(tolerance)
     assert alone - with_need < 0.25

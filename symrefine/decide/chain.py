@@ -69,14 +69,14 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     whole = _of_whole(replace(surface, openings=closed), evidence, limit, nothing)
     if surface.openings is None or surface.openings is closed:
         return whole
-    if not whole.largest.group.is_polar and _ends_there(surface, whole.largest):
+    ends = _ends_there(surface, whole.largest)
+    if ends and not whole.largest.group.is_polar:
         return replace(whole, at_least=surface.openings.evident)  # no single hole leaves such a group
     part = _of_part(surface, whole)
     more = _size(part.largest.placed) > _size(whole.largest.placed)
     # What may not be open at all is missing a part only where that explains more, and no more than so short a border
     # may enclose.
     hidden = max((e.coverage.unseen for e in part.largest.elements), default=0.0)
-    ends = (surface.openings.evident or more) and _ends_there(surface, whole.largest)
     missing = (surface.openings.evident or (more and hidden <= ENCLOSED)) and not ends
     if missing or _places(whole.largest, part.largest) >= PLACES:
         return replace(part, at_least=True)
@@ -90,7 +90,7 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
 
 def _hidden(surface: Surface) -> float:
     """The need up to which noise tells no two groups apart, and none is doubted for it."""
-    return min(exact_need(surface.floor), certain(surface.tolerance, surface.floor))
+    return min(exact_need(surface.floor), certain(surface.tolerance, surface.floor / surface.tolerance))
 
 
 def _ends_there(surface: Surface, found: Hypothesis) -> bool:
@@ -112,7 +112,7 @@ def _places(seen: Hypothesis, found: Hypothesis) -> float:
         return len(found.group.mirrors()) if found.group.is_finite else math.inf
     if not seen.group.is_finite:
         return math.inf if (seen.group.name, found.group.name) == ("Cinfv", "Kh") else 1.0
-    if seen.group.symbol.family not in ("C", "Cv") or not found.group.is_finite:
+    if not seen.group.is_polar or not found.group.is_finite:
         return 1.0
     return sum(order % seen.group.symbol.fold == 0 for _, order in found.group.rotation_axes())
 

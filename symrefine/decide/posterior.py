@@ -115,9 +115,11 @@ def meant(link: Link, tolerance: float, noise: float = 0.0, curve: Curve = SPACE
 
 
 def certain(tolerance: float, noise: float = 0.0, curve: Curve = SPACE) -> float:
-    """The need up to which a group leaves less doubt at a tolerance than is worth telling; in noise the same strain."""
-    blurred = math.hypot(tolerance, BLURRED * noise)
-    return float(curve.even * LEAST ** (1.0 / curve.steepness) * tolerance * (tolerance / blurred if blurred else 0.0))
+    """The need up to which a group leaves less doubt at a tolerance than is worth telling.
+
+    In noise, which needs so many tolerances, the one that strains a group as much.
+    """
+    return float(curve.even * tolerance * LEAST ** (1.0 / curve.steepness) / math.hypot(1.0, BLURRED * noise))
 
 
 def strain(need: T, noise: T, even: T, unknown: float = UNKNOWN, blurred: float = BLURRED) -> T:
