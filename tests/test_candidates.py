@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from experiments.objects.constructions import gear, rotor
 from experiments.objects.parts import assembled
 from experiments.objects.shapes import bottle, box, join, sample, table
-from symrefine.decide.hypotheses import joined
-from symrefine.fit.placed import Placed
+from symrefine.fit.placed import Placed, joined
 from symrefine.geometry import line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.groups import is_subgroup, point_group
 from symrefine.moments.moments import central_moments

@@ -36,7 +36,7 @@ from symrefine.propose.candidates import repeated
 from symrefine.propose.maps import maps_onto_itself
 from symrefine.propose.votes import mirror_votes, revolution
 from symrefine.shape import CAMERAS, Shape
-from symrefine.surface.cameras import cameras, unclosed
+from symrefine.surface.cameras import cameras, outwards, unclosed
 from symrefine.surface.clumps import Clump, clump_among
 from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.openings import agreed
@@ -579,6 +579,22 @@ def test_a_mirror_put_aside_comes_back_to_where_edges_tell(aside, seed):
     assert look.needs < 0.25 * surface.tolerance
 
 
+def test_votes_tell_one_side_of_a_wall_from_the_other_where_normals_point_outwards():
+    """A bump and its cast: normals of either sign are mirror images, those out of the body are not."""
+    rng = np.random.default_rng(19)
+    normals = rng.normal(size=(600, 3)) * [1.0, 1.0, 0.3] + [0.0, 0.0, 1.0]
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    bump, mirror = normals + [0.0, 0.0, 0.5], np.array([1.0, 1.0, -1.0])
+    points = np.concatenate([bump, bump * mirror])
+    found = {}
+    for name, turned in (("image", 1.0), ("cast", -1.0)):
+        every = np.concatenate([normals, turned * normals * mirror])
+        for signed in (False, True):
+            votes = mirror_votes(points, every, np.random.default_rng(0), outwards=signed)
+            found[name, signed] = any(abs(v.direction[2]) > 0.99 and np.linalg.norm(v.foot) < 0.05 for v in votes)
+    assert found == {("image", False): True, ("image", True): True, ("cast", False): True, ("cast", True): False}
+
+
 def test_the_axis_of_a_revolution_meets_its_normals():
     rng = np.random.default_rng(18)
     turn = random_orthogonal(rng)
@@ -651,8 +667,9 @@ def test_the_normals_of_what_was_seen_tell_what_was_not(count, low, high):
     seen = [ball[ball @ eye > 1.0] for eye in eyes]
     points, places = np.concatenate(seen), np.repeat(eyes, [len(s) for s in seen], axis=0)
     normals = points * np.random.default_rng(46).choice([-1.0, 1.0], (len(points), 1))
-    found = unclosed(cameras(points, places), points, normals, np.ones(len(points)))
-    assert low <= found < high
+    turned = outwards(cameras(points, places), points, normals)
+    np.testing.assert_array_equal(turned, points)
+    assert low <= unclosed(turned, np.ones(len(points))) < high
 
 
 def test_a_single_view_leaves_a_doubt_and_views_from_all_sides_none():

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.objects.shapes import bottle, box, join, mug, sample, stool, table
-from symrefine.decide.hypotheses import NOTHING, Element, Hypothesis, fitted, joined, single
+from symrefine.decide.hypotheses import NOTHING, Element, Hypothesis, fitted, single
 from symrefine.decide.looks import START_ERROR, glances, looked_at
-from symrefine.fit.placed import Placed, elements
+from symrefine.fit.placed import Placed, elements, joined
 from symrefine.geometry import frame_with_z, line_angle_rad, random_orthogonal, rotation, tight_diagonal, unit
 from symrefine.groups import close, is_subgroup, point_group
 from symrefine.moments.moments import shape_moments

@@ -12,11 +12,12 @@ from functools import partial
 
 import numpy as np
 
-from symrefine.decide.hypotheses import NOTHING, Hypothesis, fitted, has_all, joined, roughly_judged, single
+from symrefine.decide.hypotheses import NOTHING, Hypothesis, fitted, has_all, roughly_judged, single
 from symrefine.decide.looks import START_ERROR, exact_need, glances, looked_at
+from symrefine.decide.place import SUPPORTED
 from symrefine.decide.pool import ALIKE, Pool, is_at, is_same
-from symrefine.decide.posterior import ALONE, certain
-from symrefine.fit.placed import Placed
+from symrefine.decide.posterior import ALONE, EVEN, certain
+from symrefine.fit.placed import Placed, joined
 from symrefine.propose.candidates import (
     Evidence,
     about,
@@ -34,8 +35,6 @@ from symrefine.surface.surface import Surface
 # What a start that is off by START_ERROR may miss by: half a diagonal is the longest lever. Votes know no more than to
 # AGREE_RAD.
 HOPELESS, HOPELESS_VOTES = 0.5 * START_ERROR / LIMITS[0], 0.5 * AGREE_RAD / LIMITS[0]
-# Share of a surface that has to be carried onto itself for anything to be said of an operation.
-SUPPORTED = 0.15
 # Share of its open borders that a group carries onto open borders where the object ends there: flat plates 1, mugs 0.75
 # and more, chance up to 0.6.
 KEPT = 2.0 / 3.0
@@ -132,10 +131,12 @@ def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float
 
 def _of_part(surface: Surface, whole: Pool) -> Pool:
     pool = Pool(nothing=whole.nothing, limit=whole.limit)
+    seen = surface.openings is not None and bool(surface.openings.cameras)
     for known in (whole.largest, *whole.small):
         if known.elements:
-            # What holds without them asks nothing of openings.
-            again = known if known.need <= exact_need(surface.floor) else fitted(surface, known.placed)
+            # What holds without them asks nothing of openings, unless cameras tell how little of it was seen.
+            exact = known.need <= exact_need(surface.floor) and not seen
+            again = known if exact else fitted(surface, known.placed)
             pool = _grown(surface, pool, again)
     return _with(surface, pool, [*voted_mirrors(surface.cloud), *repeated(surface.cloud, surface.diagonal)])
 
@@ -162,6 +163,11 @@ def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tup
     return best if surface.openings is None else best[:LOOKED]
 
 
+def _is_loose(surface: Surface, found: Hypothesis) -> bool:
+    """Whether what was seen does not tell that a group holds, or where: as likely as not it holds elsewhere as well."""
+    return not found.told or found.elsewhere <= EVEN * surface.tolerance
+
+
 def _size(placed: Placed) -> float:
     return placed.group.order if placed.group.is_finite else 100.0
 
@@ -183,7 +189,7 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
             pool = _joined_at_once(surface, pool, moved) if needs <= pool.limit and pool.largest.elements else pool
             if not pool.has(moved, needs):
                 found = fitted(surface, moved, error_rad=look.error_rad)
-                if surface.openings is None or found.supported >= SUPPORTED:
+                if surface.openings is None or surface.openings.cameras or found.supported >= SUPPORTED:
                     pool = _grown(surface, pool, found)
     return pool
 
@@ -198,19 +204,19 @@ def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
     if known.holds(start) or has_all(start, known.placed):
         return pool
     both = _generated(surface, [known.placed, start], pool.failed, known.iterations, ALIKE * pool.nothing)
-    if both is None or both.need > pool.nothing:
+    if both is None or _is_loose(surface, both) or both.need > pool.nothing:
         return pool.with_failed(both)
     return replace(pool, small=(*pool.small, both)) if exact else replace(pool, largest=both)
 
 
 def _grown(surface: Surface, pool: Pool, found: Hypothesis) -> Pool:
     """The pool with what was fitted, and its largest group joined to it, if both hold together, or else the larger."""
-    if pool.has(found.placed, found.need):
+    if pool.has(found.placed, found.need) or _is_loose(surface, found):
         return pool
     if found.need > pool.limit:
         return replace(pool, small=(*pool.small, found))
     both = _join(surface, [pool.largest, found], pool.failed, ALIKE * pool.limit)
-    if both is not None and both.need <= pool.limit:
+    if both is not None and not _is_loose(surface, both) and both.need <= pool.limit:
         largest = both
     else:
         largest, pool = max(pool.largest, found, key=lambda h: _size(h.placed)), pool.with_failed(both)
@@ -302,9 +308,9 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
         level = max(ALIKE * rest[0].need, here.need, hidden)
         batch = [h for h in rest if h.need <= level]
         found = _join(surface, [here, *batch], known, most, pool.limit)
-        if found is None or not found.elements or found.need > ALIKE * level:
+        if found is None or _is_loose(surface, found) or not found.elements or found.need > ALIKE * level:
             singly = [_join(surface, [here, h], known, most, pool.limit) for h in batch[:SINGLY]]
-            tried = [h for h in (found, *singly) if h is not None]
+            tried = [h for h in (found, *singly) if h is not None and not _is_loose(surface, h)]
             known += tried
             found = _best(tried, hidden)
         # Directions may part what together makes the same group again.

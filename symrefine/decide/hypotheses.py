@@ -5,19 +5,18 @@ the table that everything else reads.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from symrefine.decide.looks import GLANCE, START_ERROR, Look, exact_need, slid
+from symrefine.decide.place import is_told, least_elsewhere
 from symrefine.decide.posterior import EVEN, EVEN_MIRROR
-from symrefine.errors import DegenerateShapeError
-from symrefine.fit.placed import Operations, Placed, common_center, elements
+from symrefine.fit.placed import FITTED, Operations, Placed, elements
 from symrefine.fit.refine import Iterate, refine
 from symrefine.geometry import Array, Axis, Isometry, frame_with_z, rotation
-from symrefine.groups import PointGroup, from_elements, is_subgroup
+from symrefine.groups import PointGroup, is_subgroup
 from symrefine.propose.folds import fold_candidates
 from symrefine.surface.misses import SHARES, Deviation
 from symrefine.surface.skin import Skin
@@ -27,8 +26,6 @@ from symrefine.surface.wedge import Wedge
 # Local planes that are moved in a fit and when judged by all together (a quarter of that by each at most), and when
 # judged by each at least: 0.6 % of fewer are no sample.
 MOVED, MOVED_EACH = 12000, 1200
-# How far directions of fitted elements may be off.
-DIRECTION_ERROR = np.radians(1.5)
 # Elements nearer than this (radians) are the same.
 SAME_RAD = np.radians(4.0)
 
@@ -58,6 +55,8 @@ class Hypothesis:
     history: tuple[Iterate, ...] = ()
     before: int = 0
     share: float = 1.0
+    told: bool = True
+    elsewhere: float = math.inf
 
     @property
     def supported(self) -> float:
@@ -111,13 +110,15 @@ def fitted(
         return Hypothesis(placed=end, elements=(), need=rough.need)
     found = _placed(surface, end, history, before)
     drawn = surface.openings is not None or not history[-1].converged
-    if not drawn or found.need <= exact_need(surface.floor):
+    if drawn and found.need > exact_need(surface.floor):
+        found = min(found, _placed(surface, start, history[:1], before), key=lambda h: h.need)
+        aside, _ = slid(surface, found.placed, found.need)
+        if aside is not found.placed:
+            found = min(found, _placed(surface, aside, found.history, before), key=lambda h: h.need)
+    if surface.openings is None or not surface.openings.cameras:
         return found
-    found = min(found, _placed(surface, start, history[:1], before), key=lambda h: h.need)
-    aside, _ = slid(surface, found.placed, found.need)
-    if aside is found.placed:
-        return found
-    return min(found, _placed(surface, aside, found.history, before), key=lambda h: h.need)
+    told = is_told(found.placed, [(e.operations, e.coverage.supported) for e in found.elements])
+    return replace(found, told=told, elsewhere=least_elsewhere(surface, found.placed))
 
 
 def judged(surface: Surface, placed: Placed) -> Hypothesis:
@@ -134,15 +135,17 @@ def _placed(
     surface: Surface, placed: Placed, history: tuple[Iterate, ...], before: int, least: int = MOVED_EACH
 ) -> Hypothesis:
     """A group judged where a fit put it, by so many points of each element at least."""
-    parts = _Parts.of(placed, least)
+    # What holds of a turn need not hold of its powers where the rest was not seen.
+    parts = _Parts.of(placed, least, FITTED if surface.openings is not None and surface.openings.cameras else 0)
     misses = surface.misses(parts.motions, sources=parts.sources)
     found, need = _judged(surface, parts, misses)
-    if surface.openings is not None and need > exact_need(surface.floor):
-        # What holds without it asks for no belief in anything unseen.
+    openings = surface.openings
+    if openings is not None and (openings.cameras or need > exact_need(surface.floor)):
+        # What holds without it asks for no belief in anything unseen, but cameras tell what nobody saw of it.
         partly, partial = _seen_judged(surface, parts, misses)
         # What is unseen under no element by more than a detail is rather that: a flag, on one side.
         most = max(e.coverage.unseen for e in partly)
-        if partial < need and (surface.openings.cameras or surface.openings.clumps or most > SHARES[1]):
+        if openings.cameras or (partial < need and (openings.clumps or most > SHARES[1])):
             found, need = partly, partial
     if least == MOVED_EACH:
         found, need = _closely_judged(surface, found, need)
@@ -209,8 +212,8 @@ class _Parts:
     sources: int
 
     @classmethod
-    def of(cls, placed: Placed, least: int) -> "_Parts":
-        operations = elements(placed.group)
+    def of(cls, placed: Placed, least: int, powers: int) -> "_Parts":
+        operations = elements(placed.group, powers=powers)
         each = [part.motions(placed.center) for part in operations]
         ends = np.cumsum([0, *map(len, each)]).tolist()
         return cls(
@@ -272,29 +275,6 @@ def _judged(surface: Surface, parts: _Parts, misses: Array) -> tuple[tuple[Eleme
     return found, max(surface.needed_by_all(misses), all_drifted, *(e.need for e in found))
 
 
-def joined(parts: Sequence[Placed]) -> Placed | None:
-    """The smallest group that holds all of several groups, where it stands; None if there is none."""
-    groups = [p.group for p in parts]
-    center = common_center(list(parts))
-    if any(g.name == "Kh" for g in groups):
-        return Placed(group=PointGroup(name="Kh"), center=center)
-    try:
-        group = from_elements(
-            mirrors=[n for g in groups for n in g.mirrors()],
-            axes=[a for g in groups for a in g.rotation_axes()],
-            improper=[a for g in groups for a in g.improper_axes() if np.isfinite(a[1])],
-            inversion=any(g.has_inversion for g in groups),
-            tolerance_rad=DIRECTION_ERROR,
-        )
-    except DegenerateShapeError:
-        return None
-    return Placed(group=group.for_point_set(), center=center)
-
-
 def single(element: Element) -> Hypothesis:
     """An element of a group as a group of its own."""
-    part = element.operations
-    number = "inf" if math.isinf(part.order) else f"{part.order:.0f}"
-    name = {"plane": "Cs", "inversion": "Ci", "axis": f"C{number}", "improper": f"S{number}"}[part.kind]
-    group = PointGroup(name=name, frame=frame_with_z(part.direction)).for_point_set()
-    return Hypothesis(placed=Placed(group=group, center=element.center), elements=(element,), need=element.need)
+    return Hypothesis(placed=element.operations.alone(element.center), elements=(element,), need=element.need)

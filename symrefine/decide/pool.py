@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.decide.hypotheses import DIRECTION_ERROR, NOTHING, SAME_RAD, Hypothesis, has_all
+from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, has_all
 from symrefine.decide.looks import START_ERROR
-from symrefine.fit.placed import Placed
+from symrefine.fit.placed import DIRECTION_ERROR, Placed
 from symrefine.groups import PointGroup, is_subgroup
 
 # Needs within this factor are the same, as the elements of a true group miss alike.

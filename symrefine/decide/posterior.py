@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, TypeVar
 
+import numpy as np
+
 # One number, or many side by side.
 T = TypeVar("T", bound=Any)
 # Of the logistic curve: the need over the tolerance at which half of the groups are meant, and how fast they become
@@ -54,18 +56,22 @@ PICTURE = Curve(even=EVEN_PICTURE, even_mirror=EVEN_PICTURE_MIRROR, steepness=ST
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Link:
-    """A group of the chain as the decision sees it: the smallest tolerance at which it holds, and if it is a mirror."""
+    """A group of the chain as the decision sees it: the smallest tolerance at which it holds, and if it is a mirror.
+
+    `elsewhere` is the need of the same group where it does not stand.
+    """
 
     need: float
     lone_mirror: bool = False
+    elsewhere: float = math.inf
 
 
-def known_links(names: Sequence[str], needs: Sequence[float]) -> list[Link]:
-    """The groups of a chain in space beyond C1, from the names and needs of these."""
+def known_links(names: Sequence[str], needs: Sequence[float], elsewhere: Sequence[float] = ()) -> list[Link]:
+    """The groups of a chain in space beyond C1, from the names and needs of these, here and where they do not stand."""
     beyond = [*needs, math.inf][1:]
     return [
-        Link(need=need, lone_mirror=name == "Cs" and larger >= ALONE * need)
-        for name, need, larger in zip(names, needs, beyond, strict=True)
+        Link(need=need, lone_mirror=name == "Cs" and larger >= ALONE * need, elsewhere=other)
+        for name, need, larger, other in zip(names, needs, beyond, elsewhere or [math.inf] * len(needs), strict=True)
     ]
 
 
@@ -96,22 +102,25 @@ def decide(
         curve: what was calibrated on objects of this kind.
         unclosed: how much surface no camera saw at least, by what was seen.
     """
-    inside, whole = [1.0], 1.0 - BROKEN * unclosed
-    for link in links:
-        own = meant(link, tolerance, noise, curve)
-        inside.append(min(inside[-1], whole * own))
-    return Decision.of(inside)
+    whole, own = 1.0 - BROKEN * unclosed, [meant(link, tolerance, noise, curve) for link in links]
+    # Where a group stands is known as well as where any larger one does.
+    inside = whole * np.maximum.accumulate(own[::-1])[::-1]
+    return Decision.of([1.0, *inside.tolist()])
 
 
 def meant(link: Link, tolerance: float, noise: float = 0.0, curve: Curve = SPACE) -> float:
-    """Probability that a group is meant, from what it needs.
+    """Probability that a group is meant here, from what it needs, and not elsewhere.
 
     Noise and need add up in squares. Noise also blurs what was measured: local planes grow with it, so that details of
     one size show less and less of what they miss by, and the curve gets less steep.
     """
-    even = curve.even_mirror if link.lone_mirror else curve.even
-    strained = strain(link.need / tolerance, noise / tolerance, even)
-    return float(1.0 / (1.0 + strained ** (sharpness(noise / tolerance, curve.steepness) / 2.0)))
+    even, noise = curve.even_mirror if link.lone_mirror else curve.even, noise / tolerance
+
+    def holds(need: float) -> float:
+        strained = strain(need / tolerance, noise, even)
+        return float(1.0 / (1.0 + strained ** (sharpness(noise, curve.steepness) / 2.0)))
+
+    return holds(link.need) * (1.0 - holds(link.elsewhere))
 
 
 def certain(tolerance: float, noise: float = 0.0, curve: Curve = SPACE) -> float:

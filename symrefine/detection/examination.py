@@ -66,7 +66,8 @@ class Examined:
     @property
     def known(self) -> list[Link]:
         """The groups beyond C1 as the decision sees them."""
-        return known_links([h.group.name for h in self.links[1:]], [h.need for h in self.links[1:]])
+        beyond = self.links[1:]
+        return known_links([h.group.name for h in beyond], [h.need for h in beyond], [h.elsewhere for h in beyond])
 
     def choices(self, tolerance: float) -> tuple[Alternative, ...]:
         """Every group of the chain, C1 first, as likely as at a tolerance."""

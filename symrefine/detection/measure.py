@@ -18,7 +18,7 @@ from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import FixedSubspace, fixed_subspace
 from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
-from symrefine.surface.cameras import Camera, cameras
+from symrefine.surface.cameras import Camera, cameras, outwards
 from symrefine.surface.clumps import Clump
 from symrefine.surface.drift import Drift
 from symrefine.surface.misses import TOLERANCE, noise_distances, sampling_distances
@@ -313,6 +313,9 @@ def _surface(
     pick = pick[side_by_side(local[pick])]
     near = whole.near(pick, NEIGHBOURS) if len(local) >= NEIGHBOURS else None
     cloud = whole.local_planes(pick, near=near)
+    if views:
+        eyes = np.array([view.eye for view in views])
+        cloud = replace(cloud, normals=outwards(views, cloud.points, cloud.normals), eyes=eyes)
     diagonal = tight_diagonal(cloud.points)
     if exact:
         others = np.delete(np.arange(len(local)), pick)

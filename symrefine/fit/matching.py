@@ -32,10 +32,10 @@ def match(
     """Pair every `stride`-th local plane, moved by each of K operations, with the nearest one, and weight the pairs.
 
     Pairs are dropped when the moved normal disagrees by more than 45 degrees, when the point hardly moves, so that it
-    would meet itself, or when they are farther apart than a few spacings and what the present uncertainty can move a
-    point by. Weights: flatness times Geman-McClure, whose scale starts at the uncertainty (early on the informative
-    pairs are those that disagree: handles, spouts, legs) and falls to a robust scale of the residuals, bounded from
-    below: with exact data it would collapse (method.md, section 4).
+    would meet itself, when it turns its back to all that saw the surface, or when they are farther apart than a few
+    spacings and what the present uncertainty can move a point by. Weights: flatness times Geman-McClure, whose scale
+    starts at the uncertainty (early on the informative pairs are those that disagree: handles, spouts, legs) and falls
+    to a robust scale of the residuals, bounded from below: with exact data it would collapse (method.md, section 4).
 
     Args:
         uncertainty: how far the motions may still move a point, RMS radii.
@@ -58,7 +58,8 @@ def match(
         keep &= _dot(travel, travel) > cloud.spacing**2
         target = np.where(keep, target, 0)
         normals = rows(cloud.normals, target)
-        keep &= _facing(cloud.normals[source] @ turns, normals)
+        turned = cloud.normals[source] @ turns
+        keep &= _facing(turned, normals) & cloud.faced(moved, turned)
         error = _dot(moved - rows(cloud.points, target), normals)
         flat = worth(cloud.flatness[source], cloud.flatness[target])
 

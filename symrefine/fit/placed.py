@@ -7,9 +7,10 @@ from typing import TypeVar
 
 import numpy as np
 
+from symrefine.errors import DegenerateShapeError
 from symrefine.fit.refine import Framed, mirror_bundle
 from symrefine.geometry import Array, Isometry, ReadOnly, frame_with_z, householder, rotation, rotoreflection
-from symrefine.groups import PointGroup
+from symrefine.groups import PointGroup, from_elements
 from symrefine.groups.standard import GOLDEN
 
 T = TypeVar("T")
@@ -18,6 +19,8 @@ FREE_TURNS = 2.0 * np.pi * np.array([0.0823, 0.1381966, 0.2360680, 0.4270510])
 # Operations of one kind that are fitted together: more add points, but no knowledge. Of the mirrors through an axis all
 # are, each with its own angle, up to so many.
 FITTED, BUNDLE = 8, 60
+# How far directions of fitted elements may be off.
+DIRECTION_ERROR = np.radians(1.5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -58,9 +61,18 @@ class Operations:
         """The operations about a centre."""
         return tuple(Isometry.about(center, m) for m in self.matrices)
 
+    def alone(self, center: Array) -> Placed:
+        """The group that the element generates about a centre."""
+        number = "inf" if math.isinf(self.order) else f"{self.order:.0f}"
+        name = {"plane": "Cs", "inversion": "Ci", "axis": f"C{number}", "improper": f"S{number}"}[self.kind]
+        return Placed(group=PointGroup(name=name, frame=frame_with_z(self.direction)).for_point_set(), center=center)
 
-def elements(group: PointGroup) -> list[Operations]:
-    """Every mirror, axis and rotoreflection axis of a group, and the inversion; of a continuous family, a member."""
+
+def elements(group: PointGroup, *, powers: int = 0) -> list[Operations]:
+    """Every mirror, axis and rotoreflection axis of a group, and the inversion; of a continuous family, a member.
+
+    An axis stands for its smallest turn and a wide one, and for at most so many `powers` of the first.
+    """
     normals = group.mirrors()
     if group.name in ("Cinfv", "Kh"):
         normals = group.frame[:0]
@@ -68,7 +80,7 @@ def elements(group: PointGroup) -> list[Operations]:
         normals = group.frame[2:]
     found = [Operations(kind="plane", direction=n, order=1.0, matrices=(householder(n),)) for n in normals]
     for direction, order in group.rotation_axes() if group.is_finite else _endless(group):
-        turns = tuple(rotation(direction, float(a)) for a in _angles(order))
+        turns = tuple(rotation(direction, float(a)) for a in _angles(order, powers))
         found.append(Operations(kind="axis", direction=direction, order=order, matrices=turns))
     for direction, order in group.improper_axes() if group.is_finite else []:
         turn = rotoreflection(direction, wide_angle_rad(int(order)))
@@ -85,12 +97,13 @@ def _endless(group: PointGroup) -> list[tuple[Array, float]]:
     return axes if group.name == "Kh" else axes[:1]
 
 
-def _angles(order: float) -> tuple[float, ...]:
+def _angles(order: float, powers: int) -> tuple[float, ...]:
     """Turns that together stand for an axis: the smallest one moves hardly anything, so that a wide one goes along."""
     if math.isinf(order):
         return tuple(FREE_TURNS)
     smallest = 2.0 * math.pi / order
-    return tuple(dict.fromkeys((wide_angle_rad(int(order)), smallest)))
+    others = evenly([smallest * k for k in range(1, int(order) // 2 + 1)], powers)
+    return tuple(dict.fromkeys((wide_angle_rad(int(order)), smallest, *others)))
 
 
 def wide_angle_rad(order: int) -> float:
@@ -147,3 +160,22 @@ def common_center(placed: "list[Placed]") -> Array:
         return np.zeros(3)
     # Normals are known to a degree or so: what little they leave their common plane by is no third condition.
     return np.asarray(np.linalg.lstsq(np.array(rows), np.array(values), rcond=0.1)[0])
+
+
+def joined(parts: Sequence[Placed]) -> Placed | None:
+    """The smallest group that holds all of several groups, where it stands; None if there is none."""
+    groups = [p.group for p in parts]
+    center = common_center(list(parts))
+    if any(g.name == "Kh" for g in groups):
+        return Placed(group=PointGroup(name="Kh"), center=center)
+    try:
+        group = from_elements(
+            mirrors=[n for g in groups for n in g.mirrors()],
+            axes=[a for g in groups for a in g.rotation_axes()],
+            improper=[a for g in groups for a in g.improper_axes() if np.isfinite(a[1])],
+            inversion=any(g.has_inversion for g in groups),
+            tolerance_rad=DIRECTION_ERROR,
+        )
+    except DegenerateShapeError:
+        return None
+    return Placed(group=group.for_point_set(), center=center)

@@ -58,6 +58,10 @@ class Framed(ReadOnly):
         """The operations in space."""
         return tuple(Isometry.about(self.center, self.frame.T @ s @ self.frame) for s in self.standard)
 
+    def moved(self, x: Array) -> "Framed":
+        """The same operations with the frame turned about its axes and shifted along them by x [6]."""
+        return replace(self, frame=turn_frame(self.frame, x[:3]), center=self.center + self.frame.T @ x[3:])
+
     @property
     def planes(self) -> tuple[Plane, ...]:
         """The mirror planes among the operations."""
@@ -147,7 +151,7 @@ def refine(
     for index in range(1, max_outer + 1):
         uncertainty = min(start_error_rad, SPREAD * step)
         pairs = match(cloud, state.motions, uncertainty, stride=stride, robust=robust)
-        grams = np.stack([_pair_gram(cloud, p) for p in pairs])
+        grams = np.stack([pair_gram(cloud, p) for p in pairs])
         theta = _thetas(grams, state) if state.bundle else np.zeros(0)
         solution, sight, unseen = _solve(grams, state, float(np.median(theta)) if theta.size else 0.0)
         weight = max(sum(float(p.weights.sum()) for p in pairs), 1e-300)
@@ -155,11 +159,11 @@ def refine(
         noise = WITHIN_NOISE * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
         settled = bool(np.abs(solution.x).max() < SETTLED or np.all(np.abs(solution.x) <= noise))
         last = solution.x * _remaining(solution.x, last)
-        state, step, way = _moved(state, last), float(np.abs(last).max()), way + last
+        state, step, way = state.moved(last), float(np.abs(last).max()), way + last
         # A tilt lets what is unseen seem seen: how far it went meanwhile is taken back.
         if unseen.size:
             away = unseen @ (unseen.T @ way)
-            state, way = _moved(state, -away), way - away
+            state, way = state.moved(-away), way - away
         yield Iterate(
             index=index,
             state=state,
@@ -189,7 +193,8 @@ def _remaining(x: Array, last: Array) -> float:
     return 1.0 / (1.0 - min(ratio, LONGEST)) if ratio < 0.95 else 1.0
 
 
-def _pair_gram(cloud: LocalPlanes, pairs: Pairs) -> Array:
+def pair_gram(cloud: LocalPlanes, pairs: Pairs) -> Array:
+    """The Gram matrix [13, 13] of the equations that pairs make; see `residual`."""
     sources, targets, directions, weights = pair_equations(cloud, pairs)
     return gram(design_rows(sources, targets, directions), weights)
 
@@ -236,7 +241,3 @@ def _solve(grams: Array, state: Framed, theta: float) -> tuple[Solution, Array, 
         tolerance=math.sqrt(0.1 * SETTLED),
     )
     return replace(solution, x=basis @ solution.x), (basis / values[seen]) @ basis.T, vectors[:, ~seen]
-
-
-def _moved(state: Framed, x: Array) -> Framed:
-    return replace(state, frame=turn_frame(state.frame, x[:3]), center=state.center + state.frame.T @ x[3:])

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.decide.hypotheses import DIRECTION_ERROR
+from symrefine.fit.placed import DIRECTION_ERROR
 from symrefine.geometry import Array
 from symrefine.moments.moments import shape_moments
 from symrefine.ndim import sampled as samples

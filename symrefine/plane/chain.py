@@ -8,10 +8,10 @@ from functools import reduce
 import numpy as np
 
 from symrefine.decide.chain import HOPELESS
-from symrefine.decide.hypotheses import DIRECTION_ERROR
 from symrefine.decide.looks import LOOK, START_ERROR, exact_need
 from symrefine.decide.pool import ALIKE
 from symrefine.decide.posterior import NEAR
+from symrefine.fit.placed import DIRECTION_ERROR
 from symrefine.fit.vertices import ROUNDED
 from symrefine.geometry import Array
 from symrefine.plane.outline import NOISES, Outlines

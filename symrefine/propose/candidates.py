@@ -22,7 +22,7 @@ from symrefine.propose.folds import MAX_FOLD, ROUNDING, fold_candidates, frames_
 from symrefine.propose.maps import WITHIN, maps_onto_itself
 from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candidates, whitened
 from symrefine.propose.votes import AGREE_RAD, mirror_votes, revolution
-from symrefine.surface.skin import LocalPlanes, Planes
+from symrefine.surface.skin import LocalPlanes
 
 # Directions nearer than this to an earlier one are the same start: half of what order 8 resolves is 5.6 degrees.
 APART_RAD = np.radians(3.0)
@@ -63,12 +63,12 @@ def proposals(evidence: Evidence) -> list[Placed]:
     return [*around, placed("Ci", np.eye(3)), *(placed("Cs", frame_with_z(n)) for n in apart(normals))]
 
 
-def voted_mirrors(planes: Planes) -> list[Placed]:
+def voted_mirrors(planes: LocalPlanes) -> list[Placed]:
     """Mirrors and a revolution that the local planes of a surface with parts missing vote for."""
-    axis = revolution(planes.points, planes.normals)
-    round_it = [] if axis is None else [placed("Cinfv", frame_with_z(axis[0]), axis[1])]
-    mirrors = mirror_votes(planes.points, planes.normals, np.random.default_rng(0))
-    return [*round_it, *(placed("Cs", frame_with_z(v.direction), v.foot) for v in mirrors)]
+    direction, point = revolution(planes.points, planes.normals)
+    mirrors = mirror_votes(planes.points, planes.normals, np.random.default_rng(0), outwards=planes.outwards)
+    found = placed("Cinfv", frame_with_z(direction), point)
+    return [found, *(placed("Cs", frame_with_z(v.direction), v.foot) for v in mirrors)]
 
 
 def repeated(cloud: LocalPlanes, diagonal: float) -> list[Placed]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, rows, unit
+from symrefine.propose.folds import ROUNDING
 from symrefine.shape import Index
 
 # Local planes whose pairs vote, the largest angle between the normals of a pair, and the candidates that are told: of 9
@@ -32,17 +33,20 @@ class Vote:
     foot: Array
 
 
-def mirror_votes(points: Array, normals: Array, rng: np.random.Generator, *, told: int = TOLD) -> list[Vote]:
+def mirror_votes(
+    points: Array, normals: Array, rng: np.random.Generator, *, told: int = TOLD, outwards: bool = False
+) -> list[Vote]:
     """Planes that many pairs of local planes [N, 3] are mirror images in, most votes first; normalised units.
 
     Pairs within one flat part agree under any mirror across it and say nothing: a pair counts by how much its normals
-    turn.
+    turn. Where all are known to point `outwards` a mirror keeps their signs, too.
     """
     x, n, i, j = _pairs(points, normals, VOTERS, rng)
     across, own = unit_rows(rows(x, j) - rows(x, i)), rows(n, i)
     along = np.einsum("ki,ki->k", across, own)
     image = own - 2.0 * along[:, None] * across
-    agree = np.abs(np.einsum("ki,ki->k", image, rows(n, j))) > np.cos(AGREE_RAD)
+    turned = np.einsum("ki,ki->k", image, rows(n, j))
+    agree = (turned if outwards else np.abs(turned)) > np.cos(AGREE_RAD)
     i, j, m, worth = i[agree], j[agree], rows(across, agree), np.abs(along[agree])
     return _densest(m, 0.5 * np.einsum("ki,ki->k", m, rows(x, i) + rows(x, j))[:, None] * m, worth, told)
 
@@ -108,18 +112,18 @@ def _cells(directions: Array, feet: Array) -> tuple[Index, Array]:
     return cells, (1.0 + ((2.0 * grid / DIRECTIONS) ** 2).sum(axis=0)) ** -1.5
 
 
-def revolution(points: Array, normals: Array) -> tuple[Array, Array] | None:
+def revolution(points: Array, normals: Array) -> tuple[Array, Array]:
     """Direction [3] and a point [3] of the line that the normals [N, 3] of a surface at points [N, 3] come closest to.
 
-    A normal n at x meets the line (u, v = p x u) if `(x cross n).u + n.v = 0`: the smallest singular vector, then again
-    without the half that misses most. None where that is no line but a direction that all normals lie across.
+    A normal n at x meets the line (u, v = p x u) if `(x cross n).u + n.v = 0`: least squares over all u of length 1
+    (that all normals lie across one direction says nothing of a line), then again without the half that misses most.
     """
     rows = np.column_stack([np.cross(points, normals), normals])
     kept = rows
     for _ in range(3):
-        line = np.linalg.eigh(kept.T @ kept)[1][:, 0]
-        off = np.abs(rows @ line)
+        matrix = kept.T @ kept
+        aside = -np.linalg.pinv(matrix[3:, 3:], rcond=ROUNDING, hermitian=True) @ matrix[3:, :3]
+        u = np.linalg.eigh(matrix[:3, :3] + matrix[:3, 3:] @ aside)[1][:, 0]
+        off = np.abs(rows @ np.concatenate([u, aside @ u]))
         kept = rows[off <= np.median(off)]
-    u, v = line[:3], line[3:]
-    square = float(u @ u)
-    return None if square < FEET**-2.0 else (unit(u), np.cross(u, v) / square)
+    return u, np.cross(u, aside @ u)

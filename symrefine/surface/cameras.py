@@ -76,21 +76,23 @@ def cameras(points: Array, viewpoints: Array) -> tuple[Camera, ...]:
     return tuple(_camera(place, points[owner.ravel() == k]) for k, place in enumerate(places))
 
 
-def unclosed(views: Sequence[Camera], points: Array, normals: Array, areas: Array) -> float:
+def outwards(views: Sequence[Camera], points: Array, normals: Array) -> Array:
+    """Normals [N, 3] of parts of a surface at points [N, 3], turned to the cameras that saw them."""
+    seen_by = np.argmin([view.off(points) for view in views], axis=0)
+    towards = np.array([view.eye for view in views])[seen_by] - points
+    return np.where(np.einsum("ni,ni->n", towards, normals)[:, None] < 0.0, -normals, normals)
+
+
+def unclosed(normals: Array, areas: Array) -> float:
     """How much is missing at least of a surface, by the area that was seen: 0 of all of it, 1/2 of half a ball.
 
     The normals of a closed surface, out of it and as long as its parts are large, add up to nothing.
 
     Args:
-        views: the cameras that saw it.
-        points: [N, 3] of its parts.
-        normals: [N, 3] unit normals, any sign.
+        normals: [N, 3] unit normals of its parts, out of the body.
         areas: [N], up to a factor.
     """
-    seen_by = np.argmin([view.off(points) for view in views], axis=0)
-    towards = np.array([view.eye for view in views])[seen_by] - points
-    outwards = np.where(np.einsum("ni,ni->n", towards, normals) < 0.0, -areas, areas)
-    return float(np.linalg.norm(outwards @ normals) / areas.sum())
+    return float(np.linalg.norm(areas @ normals) / areas.sum())
 
 
 def _camera(eye: Array, points: Array) -> Camera:

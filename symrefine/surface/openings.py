@@ -12,7 +12,7 @@ import numpy as np
 
 from symrefine.geometry import Array, Mask, rows, unit
 from symrefine.shape import Index
-from symrefine.surface.cameras import Camera, unclosed
+from symrefine.surface.cameras import Camera, outwards, unclosed
 from symrefine.surface.clumps import Clump
 from symrefine.surface.neighbourhoods import (
     WIDEST,
@@ -104,6 +104,7 @@ class Openings:
         *,
         met: "tuple[LocalPlanes, Openings] | None" = None,
         most: int = MOST,
+        turned: Array | None = None,
     ) -> Mask:
         """Which of every `stride`-th local planes, moved to [N, 3], lie where nobody looked.
 
@@ -115,6 +116,8 @@ class Openings:
             margin: by how much space has to be free.
             met: the surface that they were to meet and its openings, where that is another one.
             most: a patch is unseen if one in so many of the places where it begins is at a border.
+            turned: [N, 3] their normals there, out of the body: what turns its back to all cameras they could not see,
+                though it meets the other side of a wall.
         """
         there_cloud, there_openings = (cloud, self) if met is None else met
         covered = away.copy()
@@ -129,6 +132,8 @@ class Openings:
             # What meets the surface next to it already reaches beyond what was seen.
             beyond = np.zeros_like(found)
             beyond[other[found[one]]] = True
+            if turned is not None:
+                beyond |= ~there_cloud.faced(moved, turned)
             return covered | found | (beyond & ~away)
         leave = away[one]
         begins = leave & ~away[other]
@@ -186,7 +191,7 @@ def openings(
     """
     none = np.zeros(len(cloud.points), dtype=bool)
     if cameras:
-        missing = unclosed(cameras, cloud.points, cloud.normals, cloud.reach**2)
+        missing = unclosed(outwards(cameras, cloud.points, cloud.normals), cloud.reach**2)
         return Openings(line=none, border=none, evident=True, cameras=cameras, clumps=clumps, unclosed=missing)
     aside, width = _aside(cloud, points, tree, near)
     far = _lines(cloud, aside > FAR_ASIDE)

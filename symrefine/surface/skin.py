@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from symrefine.geometry import Array, ReadOnly, rows
+from symrefine.geometry import Array, Mask, ReadOnly, rows
 from symrefine.shape import Index
 from symrefine.surface.neighbourhoods import (
     NEIGHBOURS,
@@ -68,6 +68,7 @@ class LocalPlanes(Planes):
         tree: kd-tree over `points`, with the class as a fourth coordinate where there are classes.
         body: what the points are: samples of a surface, atoms that stand for themselves, or samples of a volume.
         labels: [M] class of each point, which only meets points of its own class; None where all are of one.
+        eyes: [c, 3] where it was seen from, so that the normals point out of the body; None if that is not known.
     """
 
     reach: Array
@@ -76,6 +77,7 @@ class LocalPlanes(Planes):
     tree: Tree
     body: Body = "surface"
     labels: Index | None = None
+    eyes: Array | None = None
 
     @property
     def isolated(self) -> bool:
@@ -86,6 +88,18 @@ class LocalPlanes(Planes):
     def offsets(self) -> Array:
         """[M] where each plane lies along its normal."""
         return np.einsum("ij,ij->i", self.points, self.normals)
+
+    @property
+    def outwards(self) -> bool:
+        """Whether the normals are known to point out of the body."""
+        return self.eyes is not None
+
+    def faced(self, points: Array, normals: Array) -> Mask:
+        """Which surfaces at points [..., 3], with normals [..., 3] out of the body, turn to where it was seen from."""
+        if self.eyes is None:
+            return np.ones(points.shape[:-1], dtype=bool)
+        sides = (np.einsum("...i,...i->...", normals, eye - points) > 0.0 for eye in self.eyes)
+        return np.asarray(np.any(list(sides), axis=0))
 
     def classes(self, chosen: Index | slice) -> Index | None:
         """Classes of some of the points."""
@@ -115,6 +129,7 @@ class LocalPlanes(Planes):
             reach=factor * self.reach,
             spacing=factor * self.spacing,
             tree=Tree(_with_class(points, self.labels)),
+            eyes=None if self.eyes is None else factor * self.eyes,
         )
 
     def with_copies(self, points: Array, normals: Array) -> "LocalPlanes":

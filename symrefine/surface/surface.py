@@ -123,8 +123,10 @@ class Surface:
             return misses
         stride, found = self.stride(sources), misses.copy()
         moved = [motion.apply(self.cloud.points[::stride]) for motion in motions]
-        for there, miss in zip(moved, found, strict=True):
-            miss[self.openings.unseen(self.cloud, there, miss > self.far, stride, self.far * self.diagonal)] = np.nan
+        for motion, there, miss in zip(motions, moved, found, strict=True):
+            turned = motion.turn(self.cloud.normals[::stride]) if self.cloud.outwards else None
+            away, margin = miss > self.far, self.far * self.diagonal
+            miss[self.openings.unseen(self.cloud, there, away, stride, margin, turned=turned)] = np.nan
         if together and not self.openings.cameras:
             away = misses > self.far
             unseen = agreed(np.stack(moved)[away], np.isnan(found[away]))

@@ -1,0 +1,196 @@
+"""Whether what was seen tells that a group holds, and where: what is free to move, and what nothing speaks for."""
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+
+from experiments.objects import damage
+from experiments.objects.shapes import bottle, box, join, mug, sample, table
+from symrefine.decide.hypotheses import fitted, judged
+from symrefine.decide.looks import few_motions, looked_at
+from symrefine.decide.place import SUPPORTED, is_told, least_elsewhere
+from symrefine.detection.measure import gather, measure
+from symrefine.detection.story import detect
+from symrefine.fit.freedom import freest
+from symrefine.fit.placed import Placed, elements
+from symrefine.fit.refine import Framed
+from symrefine.geometry import Isometry, frame_with_z, line_angle_rad, rotation
+from symrefine.groups import PointGroup
+from symrefine.propose.votes import revolution
+from symrefine.shape import Shape
+from symrefine.surface.skin import local_planes
+
+MAKES = {
+    "mug": mug,
+    "bottle": bottle,
+    "table": table,
+    "slab": lambda: join([box((0, 0, 0), (1.0, 0.7, 0.02))]),
+    "sheet": lambda: join([box((0, 0, 0), (1.0, 0.7, 1e-4))]),
+}
+# Of the mug the axis is z, and the handle stands along x.
+BESIDE_THE_HANDLE, ABOVE = (0.75, 0.6, 0.3), (0.2, 0.3, 0.93)
+
+
+@cache
+def view(name, direction):
+    """What a camera sees of a shape from a direction: the surface, and the centre of the whole in its coordinates."""
+    made = damage.view(MAKES[name](), np.array(direction) / np.linalg.norm(direction), np.random.default_rng(3))
+    measured = measure(Shape(points=made.points, viewpoint=made.viewpoint))
+    center = -measured.moments.center / measured.moments.scale
+    return gather(measured, np.random.default_rng(0))[1], center
+
+
+def mirror(azimuth_deg, center):
+    """A mirror through the z axis, its normal at an azimuth."""
+    angle = math.radians(azimuth_deg)
+    normal = np.array([math.cos(angle), math.sin(angle), 0.0])
+    return Placed(group=PointGroup(name="Cs", frame=frame_with_z(normal)), center=center)
+
+
+@pytest.mark.parametrize("azimuth_deg", [5.0, 10.0, 25.0])
+def test_a_mirror_that_carries_the_handle_to_where_nobody_looked_is_not_told(azimuth_deg):
+    """Nothing contradicts it, but turned it holds as well, or hardly anything speaks for it."""
+    surface, center = view("mug", BESIDE_THE_HANDLE)
+    true, false = (fitted(surface, mirror(a, center)) for a in (90.0, azimuth_deg))
+    assert max(true.need, false.need) < 0.5 * surface.tolerance
+    assert not false.told or false.elsewhere < 0.5 * surface.tolerance
+    assert true.told
+    assert true.elsewhere > 1.5 * surface.tolerance
+
+
+def test_one_view_of_a_mug_tells_of_all_mirrors_through_its_axis_that_of_the_handle():
+    made = damage.view(mug(), np.array(BESIDE_THE_HANDLE), np.random.default_rng(3))
+    found = detect(made.points, viewpoint=made.viewpoint)
+    through = [p.plane.normal for p in found.planes if abs(p.plane.normal[2]) < 0.5]
+    assert [line_angle_rad(normal, [0.0, 1.0, 0.0]) < 0.02 for normal in through] == [True]
+    assert found.at_least
+
+
+@pytest.mark.parametrize("start_deg", [-6.0, 2.5])
+def test_what_was_not_seen_draws_no_mirror_to_where_the_view_is_symmetric(start_deg):
+    """What turns its back to the camera was matched with the outline of what was seen, which is a mirror image."""
+    surface, center = view("mug", BESIDE_THE_HANDLE)
+    look = looked_at(surface, mirror(90.0 + start_deg, center), 1.0)
+    assert line_angle_rad(look.placed.group.frame[2], [0.0, 1.0, 0.0]) < math.radians(abs(start_deg))
+    assert look.needs < 0.25 * surface.tolerance
+
+
+@pytest.mark.parametrize("direction", [BESIDE_THE_HANDLE, ABOVE])
+def test_a_bottle_seen_once_stands_where_it_stands(direction):
+    surface, center = view("bottle", direction)
+    axis = Placed(group=PointGroup(name="Cinfv"), center=center)
+    assert judged(surface, axis).need < 0.5 * surface.tolerance
+    assert least_elsewhere(surface, axis) > 1.5 * surface.tolerance
+
+
+def test_turns_of_many_folds_are_asked_for_within_their_wedge():
+    """Turned by a whole wedge a group is the same; what is round holds in between, a table does not."""
+    round_one, center = view("bottle", ABOVE)
+    square, middle = view("table", ABOVE)
+    assert least_elsewhere(round_one, Placed(group=PointGroup(name="C40v"), center=center)) < round_one.tolerance
+    assert least_elsewhere(square, Placed(group=PointGroup(name="C4v"), center=middle)) > square.tolerance
+
+
+def test_what_is_freest_is_a_turn_about_the_axis_of_what_is_round():
+    cloud = local_planes(sample(bottle(), 4000, 0.0, np.random.default_rng(0)), 2000, np.random.default_rng(0))
+    placed = mirror(25.0, np.zeros(3))
+    frame = placed.group.frame
+    standard = np.stack([frame @ m.matrix @ frame.T for m in few_motions(placed)])
+    ways = freest(cloud, Framed(standard=standard, frame=frame, center=np.zeros(3)))
+    assert ways.shape == (3, 6)
+    np.testing.assert_allclose(np.linalg.norm(ways, axis=1), 1.0)
+    assert abs(ways[0][:3] @ frame @ [0.0, 0.0, 1.0]) > 0.99
+    # None of them glides along the plane or turns about its normal.
+    assert np.abs(ways[:, [2, 3, 4]]).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("name", "shares", "told"),
+    [
+        ("C2v", {"plane": 0.5, "axis": 0.0}, True),  # two mirrors make the axis
+        ("C2v", {"plane": 0.0, "axis": 0.5}, False),
+        ("D2h", {"plane": 0.0, "axis": 0.5, "inversion": 0.0}, False),
+        ("D2h", {"plane": 0.0, "axis": 0.5, "inversion": 0.5}, True),
+        ("Cinfv", {"axis": 0.0}, True),
+        ("Dinfh", {"axis": 0.0, "plane": 0.0, "inversion": 0.0}, False),
+        ("Dinfh", {"axis": 0.0, "plane": 0.5, "inversion": 0.0}, True),
+        ("Td", {"plane": 0.5, "axis": 0.0, "improper": 0.0}, True),
+    ],
+)
+def test_a_group_is_told_by_what_elements_that_were_seen_generate(name, shares, told):
+    placed = Placed(group=PointGroup(name=name), center=np.zeros(3))
+    assert is_told(placed, [(part, shares[part.kind]) for part in elements(placed.group)]) == told
+    assert SUPPORTED <= 0.5
+
+
+@pytest.mark.parametrize("direction", [(0.3, 0.2, 0.93), (0.7, 0.3, 0.6)])
+@pytest.mark.parametrize("name", ["slab", "sheet"])
+def test_one_side_of_a_slab_tells_nothing_of_the_other(name, direction):
+    """Its own plane is no mirror that anybody saw, though it moves what was seen by no more than is forgiven."""
+    made = damage.view(MAKES[name](), np.array(direction), np.random.default_rng(3))
+    found = detect(made.points, viewpoint=made.viewpoint)
+    assert found.point_group == "C2v"
+    assert found.at_least
+    surface, center = view(name, direction)
+    (element,) = judged(surface, Placed(group=PointGroup(name="Cs"), center=center)).elements
+    assert element.need < 0.5 * surface.tolerance
+    assert element.coverage.unseen > 0.5
+    assert element.coverage.supported < SUPPORTED
+
+
+def test_a_wall_is_not_met_by_its_other_side():
+    """The inner side of a bowl, seen from above, is carried onto its outer side by no operation that holds."""
+    made = damage.view(mug(), np.array(ABOVE), np.random.default_rng(4))
+    measured = measure(Shape(points=made.points, viewpoint=made.viewpoint))
+    surface = gather(measured, np.random.default_rng(0))[1]
+    assert surface.cloud.outwards
+    towards = made.viewpoint[0] - measured.moments.center - measured.moments.scale * surface.cloud.points
+    assert (np.einsum("ni,ni->n", towards, surface.cloud.normals) >= 0.0).mean() > 0.99
+    through = Isometry.about(-measured.moments.center / measured.moments.scale, rotation([1.0, 0.0, 0.0], math.pi))
+    turned = surface.seen(surface.misses([through]), [through])
+    assert np.isnan(turned).mean() > 0.5  # upside down it turns its back to the camera
+    assert (turned <= surface.far).mean() < 0.02
+
+
+@pytest.mark.parametrize("order", [8, 30])
+def test_an_axis_that_was_seen_in_part_is_judged_by_its_powers(order):
+    few, more = (next(e for e in elements(PointGroup(name=f"C{order}"), powers=p) if e.kind == "axis") for p in (0, 8))
+    assert len(few.matrices) == 2 < len(more.matrices) <= 10
+    step = 2.0 * math.pi / order
+    angles = [math.acos(np.clip(0.5 * (np.trace(m) - 1.0), -1.0, 1.0)) / step for m in more.matrices]
+    np.testing.assert_allclose(angles, np.round(angles), atol=1e-6)
+    assert len(set(np.round(angles))) == len(angles)
+
+
+def test_what_one_view_shows_is_judged_by_more_turns_than_what_all_sides_show():
+    surface, center = view("bottle", ABOVE)
+    whole = gather(
+        measure(Shape(points=sample(bottle(), 5000, 0.0, np.random.default_rng(7)))), np.random.default_rng(0)
+    )
+    turns = Placed(group=PointGroup(name="C12"), center=center)
+    seen, closed = (len(judged(s, turns).elements[0].operations.matrices) for s in (surface, whole[1]))
+    assert seen > closed == 2
+
+
+def test_the_axis_of_a_cone_that_is_nearly_a_cylinder_is_a_line_all_the_same():
+    """All normals lie nearly across its direction, which is no line; half of it was seen, with some noise."""
+    rng = np.random.default_rng(5)
+    angle, z, slope = rng.uniform(0.0, math.pi, 3000), rng.uniform(-1.5, 1.5, 3000), 0.05
+    points = np.stack([(1.0 + slope * z) * np.cos(angle), (1.0 + slope * z) * np.sin(angle), z], axis=1)
+    normals = np.stack([np.cos(angle), np.sin(angle), np.full(3000, -slope)], axis=1)
+    normals += rng.normal(scale=0.03, size=normals.shape)
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    direction, through = revolution(points - [0.0, 0.6, 0.0], normals)
+    assert line_angle_rad(direction, [0.0, 0.0, 1.0]) < math.radians(2.0)
+    assert np.linalg.norm(np.cross(np.array([0.0, -0.6, 0.0]) - through, direction)) < 0.05
+
+
+def test_whole_objects_ask_nothing_of_the_sort():
+    surface = gather(
+        measure(Shape(points=sample(mug(), 5000, 0.0, np.random.default_rng(6)))), np.random.default_rng(0)
+    )[1]
+    found = fitted(surface, mirror(90.0, np.zeros(3)))
+    assert found.told
+    assert found.elsewhere == math.inf
