@@ -1,6 +1,6 @@
 """One depth view of many objects, judged by SymmetryNet's protocol (Shi et al., 2020): recall at a precision.
 
-    python -m experiments.studies.single_views [--every N] [--seed N] [--clean] [--jobs N]
+    python -m experiments.studies.single_views [--every N] [--seed N ...] [--clean] [--jobs N]
 
 A camera looks at each object from a random side, about 10,000 rays, noisy, quantised and with flying pixels unless
 `--clean`; its place is given. The true elements are the mirrors of finite groups and the axes of revolutions. One that
@@ -176,12 +176,13 @@ def main() -> None:
     """Print what was missed or is wrong, and a line for each range of occlusion."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--every", type=int, default=1, help="each so many-th object (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of views, noise and poses (default: %(default)s)")
+    parser.add_argument("--seed", type=int, nargs="+", default=[0], help="of views, noise and poses; all together")
     parser.add_argument("--clean", action="store_true", help="no noise of the depth, no flying pixels")
     add_jobs(parser)
     options = parser.parse_args()
     rows = []
-    for row in in_order(run, cases(options.seed, clean=options.clean)[:: options.every], options.jobs):
+    every = [case for seed in options.seed for case in cases(seed, clean=options.clean)[:: options.every]]
+    for row in in_order(run, every, options.jobs):
         rows.append(row)
         found, false = {t.is_true for t in row.told if t.is_true >= 0}, [t for t in row.told if t.is_true < 0]
         if len(found) < row.asked or false:
