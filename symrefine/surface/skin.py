@@ -96,10 +96,12 @@ class LocalPlanes(Planes):
 
     def faced(self, points: Array, normals: Array) -> Mask:
         """Which surfaces at points [..., 3], with normals [..., 3] out of the body, turn to where it was seen from."""
-        if self.eyes is None:
-            return np.ones(points.shape[:-1], dtype=bool)
-        sides = (np.einsum("...i,...i->...", normals, eye - points) > 0.0 for eye in self.eyes)
-        return np.asarray(np.any(list(sides), axis=0))
+        found = np.full(points.shape[:-1], self.eyes is None)
+        for eye in () if self.eyes is None else self.eyes:
+            if not (others := ~found).any():
+                break
+            found[others] = np.einsum("ni,ni->n", normals[others], eye - points[others]) > 0.0
+        return found
 
     def classes(self, chosen: Index | slice) -> Index | None:
         """Classes of some of the points."""
