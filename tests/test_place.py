@@ -1,12 +1,14 @@
 """Whether what was seen tells that a group holds, and where: what is free to move, and what nothing speaks for."""
 
 import math
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
 
 from experiments.objects import damage
+from experiments.objects.constructions import polygon
+from experiments.objects.parts import assembled, extruded
 from experiments.objects.shapes import bottle, box, join, mug, sample, table
 from symrefine.decide.hypotheses import fitted, judged
 from symrefine.decide.looks import few_motions, looked_at
@@ -22,11 +24,19 @@ from symrefine.propose.votes import revolution
 from symrefine.shape import Shape
 from symrefine.surface.skin import local_planes
 
+
+def star(teeth):
+    """A prism over a star."""
+    return assembled([extruded(np.tile([1.0, 0.75], teeth)[:, None] * polygon(2 * teeth), -0.25, 0.25)])
+
+
 MAKES = {
     "mug": mug,
     "bottle": bottle,
     "table": table,
     "slab": lambda: join([box((0, 0, 0), (1.0, 0.7, 0.02))]),
+    "bar": lambda: join([box((0, 0, 0), (1.0, 0.08, 0.008)), box((0.3, 0, 0.008), (0.2, 0.04, 0.03))]),
+    **{f"star{n}": partial(star, n) for n in (16, 20, 22)},
     "sheet": lambda: join([box((0, 0, 0), (1.0, 0.7, 1e-4))]),
 }
 # Of the mug the axis is z, and the handle stands along x.
@@ -85,12 +95,21 @@ def test_a_bottle_seen_once_stands_where_it_stands(direction):
     assert least_elsewhere(surface, axis) > 1.5 * surface.tolerance
 
 
-def test_turns_of_many_folds_are_asked_for_within_their_wedge():
-    """Turned by a whole wedge a group is the same; what is round holds in between, a table does not."""
-    round_one, center = view("bottle", ABOVE)
-    square, middle = view("table", ABOVE)
-    assert least_elsewhere(round_one, Placed(group=PointGroup(name="C40v"), center=center)) < round_one.tolerance
-    assert least_elsewhere(square, Placed(group=PointGroup(name="C4v"), center=middle)) > square.tolerance
+def test_what_is_narrow_is_turned_farther():
+    """Turned about its length by as much as tells of a cube, a flat bar moves by little more than is forgiven."""
+    surface, center = view("bar", (0.5, 0.4, 0.7))
+    assert judged(surface, mirror(90.0, center)).need < 0.5 * surface.tolerance
+    assert least_elsewhere(surface, mirror(90.0, center)) > 1.5 * surface.tolerance
+
+
+@pytest.mark.parametrize("fold", [16, 20, 22])
+def test_a_group_of_many_folds_is_turned_by_a_part_of_its_wedge(fold):
+    """By a whole one, or half of one for mirrors, it is turned into itself; what is round holds anywhere."""
+    group = PointGroup(name=f"C{fold}v")
+    star, center = view(f"star{fold}", ABOVE)
+    assert least_elsewhere(star, Placed(group=group, center=center)) > 2.0 * star.tolerance
+    bottle_seen, center = view("bottle", ABOVE)
+    assert least_elsewhere(bottle_seen, Placed(group=group, center=center)) < bottle_seen.tolerance
 
 
 def test_what_is_freest_is_a_turn_about_the_axis_of_what_is_round():
@@ -98,12 +117,16 @@ def test_what_is_freest_is_a_turn_about_the_axis_of_what_is_round():
     placed = mirror(25.0, np.zeros(3))
     frame = placed.group.frame
     standard = np.stack([frame @ m.matrix @ frame.T for m in few_motions(placed)])
-    ways = freest(cloud, Framed(standard=standard, frame=frame, center=np.zeros(3)))
+    state = Framed(standard=standard, frame=frame, center=np.zeros(3))
+    ways = freest(cloud, state)
     assert ways.shape == (3, 6)
-    np.testing.assert_allclose(np.linalg.norm(ways, axis=1), 1.0)
-    assert abs(ways[0][:3] @ frame @ [0.0, 0.0, 1.0]) > 0.99
+    assert abs(ways[0][:3] @ frame @ [0.0, 0.0, 1.0]) > 0.99 * np.linalg.norm(ways[0])
     # None of them glides along the plane or turns about its normal.
     assert np.abs(ways[:, [2, 3, 4]]).max() < 1e-6
+    # Each moves images by 1, in the mean square and as far as that is linear.
+    image = placed.moved(state.moved(1e-4 * ways[0])).framed().motions[0].apply(cloud.points)
+    away = image - state.motions[0].apply(cloud.points)
+    assert math.sqrt((away**2).sum(axis=1).mean()) == pytest.approx(1e-4, rel=1e-3)
 
 
 @pytest.mark.parametrize(

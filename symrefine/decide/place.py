@@ -24,16 +24,16 @@ def least_elsewhere(surface: Surface, placed: Placed) -> float:
     """What a group needs at least where it is moved as far as starts may be off.
 
     It says nothing of the object unless something would contradict it elsewhere: moved to either side, in the ways that
-    change what it is and that the surface tells least of. Turns about an axis of many folds go no farther than a
-    quarter of a wedge.
+    change what it is and that the surface tells least of, until its images lie as far aside as those of a mirror that
+    is off so much. Turns go no farther than a quarter of a wedge.
     """
     frame, fold = placed.group.frame, placed.group.symbol.fold
     standard = np.stack([frame @ m.matrix @ frame.T for m in few_motions(placed)])
     state = Framed(standard=standard, frame=frame, center=placed.center)
-    wedge = 2.0 * math.pi / fold if 0 < fold < math.inf else math.inf
+    wedge = 2.0 * math.pi / (fold if 0 < fold < math.inf else 1)
     moved = []
     for way in freest(surface.cloud, state, stride=surface.stride(LOOK)):
-        size = min(start_error(surface), 0.25 * wedge / max(abs(way[2]), 1e-300))
+        size = min(2.0 * start_error(surface), 0.25 * wedge / max(float(np.linalg.norm(way[:3])), 1e-300))
         moved += [placed.moved(state.moved(side * size * way)) for side in (-1.0, 1.0)]
     motions = [few_motions(m) for m in moved]
     needs = surface.needs([m for part in motions for m in part], sources=LOOK, tests=GLANCED)
