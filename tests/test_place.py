@@ -168,7 +168,7 @@ def test_a_wall_is_not_met_by_its_other_side():
     made = damage.view(mug(), np.array(ABOVE), np.random.default_rng(4))
     measured = measure(Shape(points=made.points, viewpoint=made.viewpoint))
     surface = gather(measured, np.random.default_rng(0))[1]
-    assert surface.cloud.outwards
+    assert surface.viewed
     towards = made.viewpoint[0] - measured.moments.center - measured.moments.scale * surface.cloud.points
     assert (np.einsum("ni,ni->n", towards, surface.cloud.normals) >= 0.0).mean() > 0.99
     through = Isometry.about(-measured.moments.center / measured.moments.scale, rotation([1.0, 0.0, 0.0], math.pi))

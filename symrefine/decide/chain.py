@@ -94,7 +94,7 @@ def _hidden(surface: Surface) -> float:
 
 def _ends_there(surface: Surface, found: Hypothesis) -> bool:
     """Whether a group carries the open borders onto themselves, as what a sensor leaves out has no symmetry."""
-    if surface.openings is None or surface.openings.cameras:
+    if surface.openings is None or surface.viewed:
         return False
     line, cloud = surface.openings.line, surface.cloud
     motions = [m for e in found.elements for m in e.operations.motions(e.center)]
@@ -131,11 +131,10 @@ def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float
 
 def _of_part(surface: Surface, whole: Pool) -> Pool:
     pool = Pool(nothing=whole.nothing, limit=whole.limit)
-    seen = surface.openings is not None and bool(surface.openings.cameras)
     for known in (whole.largest, *whole.small):
         if known.elements:
             # What holds without them asks nothing of openings, unless cameras tell how little of it was seen.
-            exact = known.need <= exact_need(surface.floor) and not seen
+            exact = known.need <= exact_need(surface.floor) and not surface.viewed
             again = known if exact else fitted(surface, known.placed)
             pool = _grown(surface, pool, again)
     return _with(surface, pool, [*voted_mirrors(surface.cloud), *repeated(surface.cloud, surface.diagonal)])
@@ -189,7 +188,7 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
             pool = _joined_at_once(surface, pool, moved) if needs <= pool.limit and pool.largest.elements else pool
             if not pool.has(moved, needs):
                 found = fitted(surface, moved, error_rad=look.error_rad)
-                if surface.openings is None or surface.openings.cameras or found.supported >= SUPPORTED:
+                if surface.openings is None or surface.viewed or found.supported >= SUPPORTED:
                     pool = _grown(surface, pool, found)
     return pool
 

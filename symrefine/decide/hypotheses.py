@@ -46,7 +46,9 @@ class Hypothesis:
     """A group where it fits best: its elements judged, and what the worst of them needs.
 
     `history` holds the iterates of the fit; `before` counts those of the parts that it was put together from. `share`
-    tells how many it is of those of its name that noise does not tell from it, and that do not hold together.
+    tells how many it is of those of its name that noise does not tell from it, and that do not hold together. Where
+    cameras are known, `told` says whether what they saw of its elements makes up the group, and `elsewhere` what it
+    needs at least where it does not stand.
     """
 
     placed: Placed
@@ -115,7 +117,7 @@ def fitted(
         aside, _ = slid(surface, found.placed, found.need)
         if aside is not found.placed:
             found = min(found, _placed(surface, aside, found.history, before), key=lambda h: h.need)
-    if surface.openings is None or not surface.openings.cameras:
+    if not surface.viewed:
         return found
     told = is_told(found.placed, [(e.operations, e.coverage.supported) for e in found.elements])
     return replace(found, told=told, elsewhere=least_elsewhere(surface, found.placed))
@@ -136,16 +138,16 @@ def _placed(
 ) -> Hypothesis:
     """A group judged where a fit put it, by so many points of each element at least."""
     # What holds of a turn need not hold of its powers where the rest was not seen.
-    parts = _Parts.of(placed, least, FITTED if surface.openings is not None and surface.openings.cameras else 0)
+    parts = _Parts.of(placed, least, FITTED if surface.viewed else 0)
     misses = surface.misses(parts.motions, sources=parts.sources)
     found, need = _judged(surface, parts, misses)
     openings = surface.openings
-    if openings is not None and (openings.cameras or need > exact_need(surface.floor)):
+    if openings is not None and (surface.viewed or need > exact_need(surface.floor)):
         # What holds without it asks for no belief in anything unseen, but cameras tell what nobody saw of it.
         partly, partial = _seen_judged(surface, parts, misses)
         # What is unseen under no element by more than a detail is rather that: a flag, on one side.
         most = max(e.coverage.unseen for e in partly)
-        if openings.cameras or (partial < need and (openings.clumps or most > SHARES[1])):
+        if surface.viewed or (partial < need and (openings.clumps or most > SHARES[1])):
             found, need = partly, partial
     if least == MOVED_EACH:
         found, need = _closely_judged(surface, found, need)
@@ -229,7 +231,7 @@ def _seen_judged(surface: Surface, parts: _Parts, misses: Array) -> tuple[tuple[
     """The elements of a group by what was seen of them, and what all of them need with the belief in the rest."""
     seen = surface.seen(misses, parts.motions, sources=parts.sources, together=True)
     found, need = _judged(surface, parts, seen)
-    if surface.openings is None or surface.openings.cameras:  # they say what they could not see
+    if surface.openings is None or surface.viewed:  # cameras say what they could not see
         return found, need
     # A lone mirror is forgiven more for being made inexactly, not for what nobody saw of it.
     whole = surface.tolerance * (EVEN_MIRROR / EVEN if parts.placed.group.name == "Cs" else 1.0)

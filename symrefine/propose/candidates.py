@@ -66,7 +66,7 @@ def proposals(evidence: Evidence) -> list[Placed]:
 def voted_mirrors(planes: LocalPlanes) -> list[Placed]:
     """Mirrors and a revolution that the local planes of a surface with parts missing vote for."""
     direction, point = revolution(planes.points, planes.normals)
-    mirrors = mirror_votes(planes.points, planes.normals, np.random.default_rng(0), outwards=planes.outwards)
+    mirrors = mirror_votes(planes.points, planes.normals, np.random.default_rng(0), outwards=planes.eyes is not None)
     found = placed("Cinfv", frame_with_z(direction), point)
     return [found, *(placed("Cs", frame_with_z(v.direction), v.foot) for v in mirrors)]
 

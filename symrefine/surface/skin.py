@@ -89,11 +89,6 @@ class LocalPlanes(Planes):
         """[M] where each plane lies along its normal."""
         return np.einsum("ij,ij->i", self.points, self.normals)
 
-    @property
-    def outwards(self) -> bool:
-        """Whether the normals are known to point out of the body."""
-        return self.eyes is not None
-
     def faced(self, points: Array, normals: Array) -> Mask:
         """Which surfaces at points [..., 3], with normals [..., 3] out of the body, turn to where it was seen from."""
         found = np.full(points.shape[:-1], self.eyes is None)

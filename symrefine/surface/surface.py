@@ -87,6 +87,11 @@ class Surface:
         return any(w.is_about(axis, fold) for w in self.wedges)
 
     @property
+    def viewed(self) -> bool:
+        """Whether cameras are known that saw it: then they say what was not seen, and normals point out of the body."""
+        return self.openings is not None and bool(self.openings.cameras)
+
+    @property
     def far(self) -> float:
         """Misses from which on a point meets no surface, a fraction of the diagonal."""
         return LIMITS[1] * self.tolerance
@@ -124,10 +129,10 @@ class Surface:
         stride, found = self.stride(sources), misses.copy()
         moved = [motion.apply(self.cloud.points[::stride]) for motion in motions]
         for motion, there, miss in zip(motions, moved, found, strict=True):
-            turned = motion.turn(self.cloud.normals[::stride]) if self.cloud.outwards else None
+            turned = motion.turn(self.cloud.normals[::stride]) if self.viewed else None
             away, margin = miss > self.far, self.far * self.diagonal
             miss[self.openings.unseen(self.cloud, there, away, stride, margin, turned=turned)] = np.nan
-        if together and not self.openings.cameras:
+        if together and not self.viewed:
             away = misses > self.far
             unseen = agreed(np.stack(moved)[away], np.isnan(found[away]))
             found[away] = np.where(unseen, np.nan, misses[away])
