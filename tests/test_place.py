@@ -217,3 +217,13 @@ def test_whole_objects_ask_nothing_of_the_sort():
     found = fitted(surface, mirror(90.0, np.zeros(3)))
     assert found.told
     assert found.elsewhere == math.inf
+
+
+@pytest.mark.parametrize("name", ["mug", "bar", "star16"])
+def test_a_larger_tolerance_takes_no_group_away_that_a_smaller_one_tells(name):
+    """Though it holds elsewhere as well at that tolerance: it is known to stand where it does at the one asked for."""
+    made = damage.view(MAKES[name](), np.array([0.5, 0.4, 0.7]), np.random.default_rng(3))
+    found = detect(made.points, viewpoint=made.viewpoint, ladder=(0.02, 0.04, 0.08))
+    steps = [found.examined.decided(t).index for t in (0.02, 0.04, 0.08)]
+    assert steps == sorted(steps)
+    assert steps[0] > 0

@@ -148,16 +148,16 @@ def test_what_is_inside_a_group_is_at_least_as_sure_in_whatever_order_needs_come
     assert min(found.probabilities) >= 0.0
 
 
-@given(NEED, st.tuples(NEED, NEED).map(sorted), TOLERANCE)
-def test_a_group_that_holds_elsewhere_as_well_is_not_meant_here(need, elsewhere, tolerance):
-    close, far = (meant(Link(need=need, elsewhere=e), tolerance) for e in elsewhere)
-    assert close <= far <= meant(Link(need=need), tolerance)
-    assert meant(Link(need=need, elsewhere=0.0), tolerance) == 0.0
+@given(NEED, st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)).map(sorted), TOLERANCE)
+def test_a_group_that_may_as_well_stand_elsewhere_is_less_surely_meant(need, placed, tolerance):
+    loose, firm = (meant(Link(need=need, placed=p), tolerance) for p in placed)
+    assert loose <= firm <= meant(Link(need=need), tolerance)
+    assert meant(Link(need=need, placed=0.0), tolerance) == 0.0
 
 
 @given(TOLERANCE, NEED)
 def test_where_a_group_stands_is_known_as_well_as_where_a_larger_one_does(tolerance, need):
-    mirror, turns = Link(need=need, elsewhere=0.0), Link(need=need)
+    mirror, turns = Link(need=need, placed=0.0), Link(need=need)
     assert decide([mirror, turns], tolerance).inside[1] == decide([turns], tolerance).inside[1]
     assert decide([mirror], tolerance).inside[1] == 0.0
 

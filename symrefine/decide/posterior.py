@@ -58,20 +58,20 @@ PICTURE = Curve(even=EVEN_PICTURE, even_mirror=EVEN_PICTURE_MIRROR, steepness=ST
 class Link:
     """A group of the chain as the decision sees it: the smallest tolerance at which it holds, and if it is a mirror.
 
-    `elsewhere` is the need of the same group where it does not stand.
+    `placed` is the probability that it does not hold elsewhere as well.
     """
 
     need: float
     lone_mirror: bool = False
-    elsewhere: float = math.inf
+    placed: float = 1.0
 
 
-def known_links(names: Sequence[str], needs: Sequence[float], elsewhere: Sequence[float] = ()) -> list[Link]:
-    """The groups of a chain in space beyond C1, from the names and needs of these, here and where they do not stand."""
+def known_links(names: Sequence[str], needs: Sequence[float], placed: Sequence[float] = ()) -> list[Link]:
+    """The groups of a chain in space beyond C1, from the names and needs of these, and how sure their places are."""
     beyond = [*needs, math.inf][1:]
     return [
-        Link(need=need, lone_mirror=name == "Cs" and larger >= ALONE * need, elsewhere=other)
-        for name, need, larger, other in zip(names, needs, beyond, elsewhere or [math.inf] * len(needs), strict=True)
+        Link(need=need, lone_mirror=name == "Cs" and larger >= ALONE * need, placed=sure)
+        for name, need, larger, sure in zip(names, needs, beyond, placed or [1.0] * len(needs), strict=True)
     ]
 
 
@@ -109,18 +109,14 @@ def decide(
 
 
 def meant(link: Link, tolerance: float, noise: float = 0.0, curve: Curve = SPACE) -> float:
-    """Probability that a group is meant here, from what it needs, and not elsewhere.
+    """Probability that a group is meant, and stands where it was put, from what it needs.
 
     Noise and need add up in squares. Noise also blurs what was measured: local planes grow with it, so that details of
     one size show less and less of what they miss by, and the curve gets less steep.
     """
-    even, noise = curve.even_mirror if link.lone_mirror else curve.even, noise / tolerance
-
-    def holds(need: float) -> float:
-        strained = strain(need / tolerance, noise, even)
-        return float(1.0 / (1.0 + strained ** (sharpness(noise, curve.steepness) / 2.0)))
-
-    return holds(link.need) * (1.0 - holds(link.elsewhere))
+    even = curve.even_mirror if link.lone_mirror else curve.even
+    strained = strain(link.need / tolerance, noise / tolerance, even)
+    return link.placed * float(1.0 / (1.0 + strained ** (sharpness(noise / tolerance, curve.steepness) / 2.0)))
 
 
 def certain(tolerance: float, noise: float = 0.0, curve: Curve = SPACE) -> float:

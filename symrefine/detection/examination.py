@@ -11,7 +11,7 @@ from symrefine.decide.chain import chain, explore
 from symrefine.decide.hypotheses import MOVED, Hypothesis
 from symrefine.decide.looks import LOOK, few_motions
 from symrefine.decide.pool import Pool
-from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, known_links
+from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, known_links, meant
 from symrefine.detection.measure import Measured, Outliers, doubt, gather, measure
 from symrefine.detection.sketch import Sample, Sketch, is_large, set_apart, sketched
 from symrefine.fit.placed import Placed
@@ -66,8 +66,10 @@ class Examined:
     @property
     def known(self) -> list[Link]:
         """The groups beyond C1 as the decision sees them."""
-        beyond = self.links[1:]
-        return known_links([h.group.name for h in beyond], [h.need for h in beyond], [h.elsewhere for h in beyond])
+        beyond, surface = self.links[1:], self.surface
+        # At the tolerance that was asked for, so that a larger one takes no group away that a smaller one tells.
+        placed = [1.0 - meant(Link(need=h.elsewhere), surface.tolerance, surface.floor) for h in beyond]
+        return known_links([h.group.name for h in beyond], [h.need for h in beyond], placed)
 
     def choices(self, tolerance: float) -> tuple[Alternative, ...]:
         """Every group of the chain, C1 first, as likely as at a tolerance."""
