@@ -60,7 +60,7 @@ class Examined:
 
     def decided(self, tolerance: float, *, shown: bool = False) -> Decision:
         """The likeliest group of the chain at a tolerance; with `shown` as if what no camera saw kept to the rest."""
-        missing = 0.0 if shown or self.surface.openings is None else self.surface.openings.unclosed
+        missing = 0.0 if shown else self.surface.unclosed
         return decide(self.known, tolerance, self.surface.floor, unclosed=missing)
 
     @property

@@ -59,7 +59,9 @@ def match(
         target = np.where(keep, target, 0)
         normals = rows(cloud.normals, target)
         turned = cloud.normals[source] @ turns
-        keep &= _facing(turned, normals) & cloud.faced(moved, turned)
+        keep &= _facing(turned, normals)
+        if cloud.eyes is not None:
+            keep &= cloud.faced(moved, turned)
         error = _dot(moved - rows(cloud.points, target), normals)
         flat = worth(cloud.flatness[source], cloud.flatness[target])
 

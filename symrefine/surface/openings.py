@@ -12,7 +12,7 @@ import numpy as np
 
 from symrefine.geometry import Array, Mask, rows, unit
 from symrefine.shape import Index
-from symrefine.surface.cameras import Camera, outwards, unclosed
+from symrefine.surface.cameras import Camera
 from symrefine.surface.clumps import Clump
 from symrefine.surface.neighbourhoods import (
     WIDEST,
@@ -62,7 +62,6 @@ class Openings:
         evident: whether they are too long to be a whim of the sample.
         cameras: what saw it, in the frame of the surface; none if nothing is known of them.
         clumps: what hides parts of it, in the frame of the surface.
-        unclosed: how much surface they did not see at least, by what they saw; see `cameras.unclosed`.
         links: by stride, pairs [2, E] of every so many-th local planes that are neighbours, both ways.
     """
 
@@ -71,7 +70,6 @@ class Openings:
     evident: bool
     cameras: tuple[Camera, ...] = ()
     clumps: tuple[Clump, ...] = ()
-    unclosed: float = 0.0
     links: dict[int, Index] = field(default_factory=dict)
 
     @property
@@ -191,8 +189,7 @@ def openings(
     """
     none = np.zeros(len(cloud.points), dtype=bool)
     if cameras:
-        missing = unclosed(outwards(cameras, cloud.points, cloud.normals), cloud.reach**2)
-        return Openings(line=none, border=none, evident=True, cameras=cameras, clumps=clumps, unclosed=missing)
+        return Openings(line=none, border=none, evident=True, cameras=cameras, clumps=clumps)
     aside, width = _aside(cloud, points, tree, near)
     far = _lines(cloud, aside > FAR_ASIDE)
     far[far] = ~_folded(cloud.points[far], points, tree, None if near is None else near[far])

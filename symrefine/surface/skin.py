@@ -91,8 +91,9 @@ class LocalPlanes(Planes):
 
     def faced(self, points: Array, normals: Array) -> Mask:
         """Which surfaces at points [..., 3], with normals [..., 3] out of the body, turn to where it was seen from."""
-        found = np.full(points.shape[:-1], self.eyes is None)
-        for eye in () if self.eyes is None else self.eyes:
+        assert self.eyes is not None
+        found = np.zeros(points.shape[:-1], dtype=bool)
+        for eye in self.eyes:
             if not (others := ~found).any():
                 break
             found[others] = np.einsum("ni,ni->n", normals[others], eye - points[others]) > 0.0

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from symrefine.geometry import Array, Axis, Isometry, read_only
+from symrefine.surface.cameras import unclosed
 from symrefine.surface.drift import Drift
 from symrefine.surface.misses import (
     DISCS,
@@ -90,6 +91,11 @@ class Surface:
     def viewed(self) -> bool:
         """Whether cameras are known that saw it: then they say what was not seen, and normals point out of the body."""
         return self.openings is not None and bool(self.openings.cameras)
+
+    @cached_property
+    def unclosed(self) -> float:
+        """How much of it cameras did not see at least, by what they saw; nothing where none are known."""
+        return unclosed(self.cloud.normals, self.cloud.reach**2) if self.viewed else 0.0
 
     @property
     def far(self) -> float:
