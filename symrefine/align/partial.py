@@ -213,7 +213,8 @@ class Judge:
         moved = motion.apply(here.cloud.points)
         misses = self.misses(there, moved, here.cloud.labels)
         met, margin = (there.cloud, there.openings), self.far * self.diagonal
-        unseen = here.openings.unseen(here.cloud, moved, misses > self.far, 1, margin, met=met, most=MOST)
+        away = (misses > self.far)[None]
+        unseen = here.openings.unseen(here.cloud, moved[None], away, 1, margin, met=met, most=MOST)[0]
         return Merit.of(misses, unseen, self.near, self.far), misses[~unseen & (misses <= self.far)]
 
     def misses(self, there: Shown, moved: Array, classes: Index | None) -> Array:

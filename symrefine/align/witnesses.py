@@ -97,7 +97,8 @@ class _Surfaces:
         # Where a wall is too thin for the local planes its points still tell that there is something.
         found = np.minimum(found, there.skin.nearest(moved, classes) / diagonal)
         met, margin = (there.cloud, there.openings), self.far * diagonal
-        unseen = here.openings.unseen(here.cloud, moved, found > self.far, 1, margin, met=met, most=MOST)
+        away = (found > self.far)[None]
+        unseen = here.openings.unseen(here.cloud, moved[None], away, 1, margin, met=met, most=MOST)[0]
         return np.where(unseen, np.nan, found)
 
     def nearest(self, side: int, points: Array) -> tuple[Array, Index]:

@@ -45,7 +45,7 @@ PLACES = 3
 ENCLOSED = 0.12
 # A fit that is not settled may need so many times what it does then.
 COARSE = 3.5
-# Candidates of a surface with openings that are looked at: where little was seen many seem possible at a glance.
+# Candidates of an open surface that are looked at: where little was seen many seem possible at a glance.
 LOOKED = 24
 # Candidates turned down after a look that are fitted all the same where nothing else was: the nearest misses.
 TOLD = 2
@@ -151,7 +151,7 @@ def _with(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
 
 def _hopeless(surface: Surface) -> float:
     """What a candidate may seem to need at a glance, from how far it may be off."""
-    return HOPELESS if surface.openings is None else HOPELESS_VOTES
+    return HOPELESS_VOTES if surface.is_open else HOPELESS
 
 
 def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tuple[Placed, float]]:
@@ -159,7 +159,7 @@ def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tup
     new = [s for s in starts if not pool.has(s)]
     seen = zip(new, glances(surface, new, _hopeless(surface)), strict=True)
     best = sorted(seen, key=lambda k: max(k[1], pool.nothing) / math.log2(1.0 + _size(k[0])))
-    return best if surface.openings is None else best[:LOOKED]
+    return best[:LOOKED] if surface.is_open else best
 
 
 def _is_loose(surface: Surface, found: Hypothesis) -> bool:
@@ -179,7 +179,7 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
         if glance >= _hopeless(surface):
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
             continue
-        look = looked_at(surface, start, COARSE * pool.limit, pool.has)
+        look = looked_at(surface, start, COARSE * pool.limit, pool.has, useful=ALIKE * pool.limit)
         moved, needs = look.placed, look.needs
         pool = replace(pool, looks=(*pool.looks, (glance, moved)))
         if needs > ALIKE * pool.limit:
@@ -187,7 +187,7 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
         elif not pool.has(moved, needs) and not pool.met(moved):
             pool = _joined_at_once(surface, pool, moved) if needs <= pool.limit and pool.largest.elements else pool
             if not pool.has(moved, needs):
-                found = fitted(surface, moved, error_rad=look.error_rad)
+                found = fitted(surface, moved, error_rad=look.error_rad, close=ALIKE * pool.limit)
                 if surface.openings is None or surface.viewed or found.supported >= SUPPORTED:
                     pool = _grown(surface, pool, found)
     return pool
@@ -252,8 +252,8 @@ def _generated(
     same = next((h for h in told if is_at(h.placed, placed)), None)
     if same is not None:
         return same
-    if surface.openings is not None:
-        return fitted(surface, placed, before=before, most=COARSE * most)
+    if surface.is_open:
+        return fitted(surface, placed, before=before, most=ALIKE * most, close=ALIKE * close)
     look = looked_at(surface, placed, COARSE * most)
     if look.needs > most:
         return Hypothesis(placed=placed, elements=(), need=look.needs)
@@ -308,8 +308,11 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
         batch = [h for h in rest if h.need <= level]
         found = _join(surface, [here, *batch], known, most, pool.limit)
         if found is None or _is_loose(surface, found) or not found.elements or found.need > ALIKE * level:
-            singly = [_join(surface, [here, h], known, most, pool.limit) for h in batch[:SINGLY]]
-            tried = [h for h in (found, *singly) if h is not None and not _is_loose(surface, h)]
+            tried = [] if found is None else [found]
+            for other in batch[:SINGLY]:
+                one = _join(surface, [here, other], [*known, *tried], most, pool.limit)
+                tried += [] if one is None else [one]
+            tried = [h for h in tried if not _is_loose(surface, h)]
             known += tried
             found = _best(tried, hidden)
         # Directions may part what together makes the same group again.

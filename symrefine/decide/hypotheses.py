@@ -5,12 +5,13 @@ the table that everything else reads.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from symrefine.decide.looks import GLANCE, START_ERROR, Look, exact_need, slid
+from symrefine.decide.looks import GLANCE, START_ERROR, Look, exact_need, seems, slid
 from symrefine.decide.place import is_told, least_elsewhere
 from symrefine.decide.posterior import EVEN, EVEN_MIRROR
 from symrefine.fit.placed import FITTED, Operations, Placed, elements
@@ -96,31 +97,56 @@ NOTHING = Hypothesis(placed=Placed(group=PointGroup(name="C1"), center=np.zeros(
 
 
 def fitted(
-    surface: Surface, start: Placed, *, error_rad: float = START_ERROR, before: int = 0, most: float = math.inf
+    surface: Surface,
+    start: Placed,
+    *,
+    error_rad: float = START_ERROR,
+    before: int = 0,
+    most: float = math.inf,
+    close: float = math.inf,
 ) -> Hypothesis:
     """The group fitted as a whole from where it stands, which may be off by `error_rad`, and judged.
 
-    One that needs more than `most` by few points where the fit puts it is told without elements. It may stay where it
-    stands if the fit does not settle, or if the surface has openings: what lies behind them is matched with what does
-    not. There it is moved sideways, too, to where edges say that it belongs.
+    It may stay where it stands if the fit does not settle, or if the surface is open: what lies behind its borders is
+    matched with what does not. There it is moved sideways, too, to where edges say that it belongs. One that wherever
+    it may stand seems to need more than `close` is judged by few points; of one that needs more than `most` no elements
+    are told.
     """
     state = start.framed()
     stride = surface.stride(_moved_each(len(state.standard), GLANCE))
     history = tuple(refine(surface.cloud, state, start_error_rad=error_rad, stride=stride))
-    end = start.moved(history[-1].state)
-    if most < math.inf and (rough := _placed(surface, end, history, before, GLANCE)).need > most:
-        return Hypothesis(placed=end, elements=(), need=rough.need)
-    found = _placed(surface, end, history, before)
-    drawn = surface.openings is not None or not history[-1].converged
-    if drawn and found.need > exact_need(surface.floor):
-        found = min(found, _placed(surface, start, history[:1], before), key=lambda h: h.need)
-        aside, _ = slid(surface, found.placed, found.need)
-        if aside is not found.placed:
-            found = min(found, _placed(surface, aside, found.history, before), key=lambda h: h.need)
+    end, exact = start.moved(history[-1].state), exact_need(surface.floor)
+    if not surface.is_open and history[-1].converged:
+        return _placed(surface, end, history, before)
+    every = [(seems(surface, p), p, steps) for p, steps in ((end, history), (start, history[:1]))]
+    needs, first, steps = min(every, key=lambda k: k[0])
+    best, least = slid(surface, first, needs, close) if needs > close else (first, needs)
+    if least > close:
+        found = _placed(surface, best, steps, before, GLANCE, most)
+    else:
+        found = _placed(surface, best, steps, before, most=most)
+        if found.elements and found.need > exact:
+            found = _moved(surface, found, every, mended=best is not first)
     if not surface.viewed:
         return found
     told = is_told(found.placed, [(e.operations, e.coverage.supported) for e in found.elements])
     return replace(found, told=told, elsewhere=least_elsewhere(surface, found.placed))
+
+
+def _moved(
+    surface: Surface, found: Hypothesis, others: Sequence[tuple[float, Placed, tuple[Iterate, ...]]], *, mended: bool
+) -> Hypothesis:
+    """A group that was judged where it needs least: there, where else it may stand, or moved sideways unless it was."""
+
+    def better(placed: Placed, history: tuple[Iterate, ...]) -> Hypothesis:
+        other = _placed(surface, placed, history, found.before, most=found.need)
+        return min(found, other, key=lambda h: h.need)
+
+    for needs, placed, history in others:
+        if placed is not found.placed and needs < found.need:
+            found = better(placed, history)
+    aside = found.placed if mended else slid(surface, found.placed, found.need)[0]
+    return found if aside is found.placed else better(aside, found.history)
 
 
 def judged(surface: Surface, placed: Placed) -> Hypothesis:
@@ -134,24 +160,65 @@ def roughly_judged(surface: Surface, look: Look, *, before: int = 0) -> Hypothes
 
 
 def _placed(
-    surface: Surface, placed: Placed, history: tuple[Iterate, ...], before: int, least: int = MOVED_EACH
+    surface: Surface,
+    placed: Placed,
+    history: tuple[Iterate, ...],
+    before: int,
+    least: int = MOVED_EACH,
+    most: float = math.inf,
 ) -> Hypothesis:
-    """A group judged where a fit put it, by so many points of each element at least."""
+    """A group judged where a fit put it, by so many points of each element at least.
+
+    One of which some elements need more than `most` is told without any.
+    """
     # What holds of a turn need not hold of its powers where the rest was not seen.
     parts = _Parts.of(placed, least, FITTED if surface.viewed else 0)
-    misses = surface.misses(parts.motions, sources=parts.sources)
+    misses, beyond = _misses(surface, parts, most)
+    if beyond > most:
+        return Hypothesis(placed=placed, elements=(), need=beyond)
     found, need = _judged(surface, parts, misses)
-    openings = surface.openings
-    if openings is not None and (surface.viewed or need > exact_need(surface.floor)):
+    if surface.openings is not None and (surface.viewed or need > exact_need(surface.floor)):
         # What holds without it asks for no belief in anything unseen, but cameras tell what nobody saw of it.
         partly, partial = _seen_judged(surface, parts, misses)
-        # What is unseen under no element by more than a detail is rather that: a flag, on one side.
-        most = max(e.coverage.unseen for e in partly)
-        if surface.viewed or (partial < need and (openings.clumps or most > SHARES[1])):
+        unseen = max(e.coverage.unseen for e in partly)
+        if surface.viewed or (partial < need and _counts_unseen(surface, unseen)):
             found, need = partly, partial
     if least == MOVED_EACH:
         found, need = _closely_judged(surface, found, need)
     return Hypothesis(placed=placed, elements=found, need=need, history=history, before=before)
+
+
+def _counts_unseen(surface: Surface, most: float) -> bool:
+    """Whether what nobody saw of operations counts as that, if it is such a share of the surface at most.
+
+    What is no more than a detail is rather missing: a flag, on one side.
+    """
+    openings = surface.openings
+    return openings is not None and (surface.viewed or bool(openings.clumps) or most > SHARES[1])
+
+
+def _misses(surface: Surface, parts: "_Parts", most: float) -> tuple[Array, float]:
+    """The misses [K, N] of the operations of a group, and what those need that were asked.
+
+    From some on that need more than `most`, no others are asked.
+    """
+    count = len(parts.motions)
+    found: Array = np.zeros((count, 0))
+    if math.isinf(most):
+        return surface.misses(parts.motions, sources=parts.sources), 0.0
+    need = 0.0
+    rest, size = np.arange(count), FITTED
+    while rest.size and need <= most:
+        some = rest[:: max(1, len(rest) // size)]
+        motions = [parts.motions[k] for k in some]
+        misses = surface.misses(motions, sources=parts.sources)
+        seen = surface.seen(misses, motions, sources=parts.sources, together=True)
+        told = seen if _counts_unseen(surface, float(np.isnan(seen).mean(axis=1).max())) else misses
+        need = max(need, float(surface.needed(told, motions, len(parts.operations)).max()))
+        found = np.zeros((count, misses.shape[1])) if not found.size else found
+        found[some] = misses
+        rest, size = np.setdiff1d(rest, some), 2 * size
+    return found, need
 
 
 def _closely_judged(surface: Surface, found: tuple[Element, ...], need: float) -> tuple[tuple[Element, ...], float]:
@@ -235,7 +302,7 @@ def _seen_judged(surface: Surface, parts: _Parts, misses: Array) -> tuple[tuple[
         return found, need
     # A lone mirror is forgiven more for being made inexactly, not for what nobody saw of it.
     whole = surface.tolerance * (EVEN_MIRROR / EVEN if parts.placed.group.name == "Cs" else 1.0)
-    beliefs = [whole * _belief(e) for e in found]
+    beliefs = [whole * e.coverage.belief for e in found]
     # More than half of the operations of a group generate it (Lagrange), so that the others follow; of a continuous one
     # that takes turns about its axes, as nearly all are.
     turns = [b for e, b in zip(found, beliefs, strict=True) if math.isinf(e.operations.order)]
@@ -243,15 +310,6 @@ def _seen_judged(surface: Surface, parts: _Parts, misses: Array) -> tuple[tuple[
         tuple(replace(e, need=math.hypot(e.need, b)) for e, b in zip(found, beliefs, strict=True)),
         math.hypot(need, max(turns, default=sorted(beliefs)[len(beliefs) // 2])),
     )
-
-
-def _belief(found: Element) -> float:
-    """What an element asks to believe: 1 where as much of its image was not seen as was; areas grow with lengths.
-
-    Where all that was seen but for a detail slides on itself, there is nothing to believe it for.
-    """
-    told = found.coverage.supported if found.coverage.told > SHARES[0] else 0.0
-    return math.sqrt(found.coverage.unseen / max(told, 1e-9))
 
 
 def _moved_each(operations: int, least: int) -> int:

@@ -38,7 +38,7 @@ def glances(surface: Surface, starts: Sequence[Placed], most: float = math.inf) 
     owner = np.repeat(np.arange(len(starts)), [len(motions) for motions in each])
     every, found = [m for motions in each for m in motions], np.zeros(len(starts))
     # Most candidates are hopeless, and seen to be so without a wide search; of an open surface none is made.
-    for limit in (LIMITS[1], LIMITS[-1]) if surface.openings is None else LIMITS[-1:]:
+    for limit in LIMITS[-1:] if surface.is_open else (LIMITS[1], LIMITS[-1]):
         asked = np.flatnonzero(found[owner] < most)
         if asked.size:
             motions, bound = [every[i] for i in asked], limit * most
@@ -68,7 +68,14 @@ class Look:
         return self.history[-1].converged
 
 
-def looked_at(surface: Surface, start: Placed, most: float, known: Callable[[Placed], bool] = lambda _: False) -> Look:
+def looked_at(
+    surface: Surface,
+    start: Placed,
+    most: float,
+    known: Callable[[Placed], bool] = lambda _: False,
+    *,
+    useful: float = math.inf,
+) -> Look:
     """A fit on a few points; one that needs more than `most` after `SHORT` steps ends, and is judged by fewer.
 
     One that comes to what is `known` to need nothing ends there, and needs nothing.
@@ -83,37 +90,78 @@ def looked_at(surface: Surface, start: Placed, most: float, known: Callable[[Pla
         if known(here):
             needs = 0.0
             break
-        if iterate.index == SHORT and (needs := _seems(surface, here, GLANCE)) > most:
+        if iterate.index == SHORT and (needs := seems(surface, here, GLANCE)) > most:
             break
     else:
-        needs = _seems(surface, start.moved(iterate.state), LOOK)
+        needs = seems(surface, start.moved(iterate.state))
         # Where noise is as thick as a surface it may draw a fit away, step by step.
-        if not iterate.converged and (stayed := _seems(surface, start, LOOK)) < needs:
-            aside, needs = slid(surface, start, stayed)
+        if not iterate.converged and (stayed := seems(surface, start)) < needs:
+            aside, needs = slid(surface, start, stayed, useful)
             return Look(placed=aside, history=tuple(history[:1]), needs=needs, error_rad=error)
     off = max(iterate.step, math.sqrt(max(float(np.diag(iterate.covariance).max()), 0.0)))
-    aside, needs = slid(surface, start.moved(iterate.state), needs)
+    aside = start.moved(iterate.state)
+    if needs <= useful < (asked := _asked(surface, aside)):
+        needs = asked  # where it stands is not worth a search
+    else:
+        aside, needs = slid(surface, aside, needs, useful)
     return Look(placed=aside, history=tuple(history), needs=needs, error_rad=min(error, SPREAD * off))
 
 
-def slid(surface: Surface, placed: Placed, needs: float) -> tuple[Placed, float]:
-    """A group that seems to need so much, moved sideways to where it needs least; of surfaces with openings only.
+def slid(surface: Surface, placed: Placed, needs: float, useful: float = math.inf) -> tuple[Placed, float]:
+    """A group that seems to need so much, moved sideways to where it needs least; of open surfaces only.
 
     Of a sofa one view shows no two sides that a mirror exchanges, and where their middle is no pair of local planes
-    tells: the edges of the seat do, which have to meet one another.
+    tells: the edges of the seat do, which have to meet one another. Where it needs more than is `useful` nowhere, it
+    stays.
     """
     farthest = start_error(surface)
     mends = 2.0 * farthest / (LIMITS[1] * surface.diagonal)  # a mirror takes what it is off by twice
-    if surface.openings is None or not exact_need(surface.floor) < needs <= mends:
+    if not surface.is_open or not exact_need(surface.floor) < needs <= mends:
         return placed, needs
     steps = farthest / ASIDE * np.arange(-ASIDE, ASIDE + 1.0)
     for way in _sideways(placed):
-        tried = [replace(placed, center=placed.center + step * way) for step in steps]
-        found = _lowest(steps, np.array(glances(surface, tried)), surface.tolerance)
+        needs_there = _valley(surface, placed, way, steps, useful)
+        found = _lowest(steps, needs_there, surface.tolerance) if needs_there.min() <= useful else 0.0
         moved = replace(placed, center=placed.center + found * way)
-        if (least := _seems(surface, moved, LOOK)) < needs:
+        if found != 0.0 and (least := seems(surface, moved)) < needs:
             placed, needs = moved, least
     return placed, needs
+
+
+def _valley(surface: Surface, placed: Placed, way: Array, steps: Array, useful: float) -> Array:
+    """What a group needs [N] where it is moved along a way by steps [N], where that is least; elsewhere a lower bound.
+
+    No image moves by more than the group does, times what its operation makes of the way: from what it misses by in one
+    place follows what it misses by at least in others, and of those that need too much none is asked.
+    """
+    still = np.eye(3)
+    pace = np.array([np.linalg.norm((still - m.matrix) @ way) for m in few_motions(placed)]) / surface.diagonal
+    needs, asked = np.zeros(len(steps)), np.zeros(len(steps), dtype=bool)
+    here = len(steps) // 2
+    while True:
+        motions = few_motions(replace(placed, center=placed.center + steps[here] * way))
+        misses = surface.misses(motions, sources=GLANCE, discs=1)
+        seen = surface.seen(misses, motions, sources=GLANCE)
+        asked[here] = True
+        needs[here] = surface.needed(seen, motions, GLANCED).max()
+        ground = float(needs[asked].min())
+        most = min(ground + surface.tolerance, useful)
+        bound, far, away = float(needs[here]), steps[1] - steps[0], np.abs(steps - steps[here])
+        while bound > most and far < 2.0 * (steps[-1] - steps[0]):
+            nearer = np.maximum(seen - far * pace[:, None], 0.0)
+            bound = float(surface.needed(nearer, motions, GLANCED).max())
+            within = ~asked & (away < far + ROUNDED)
+            needs[within] = np.maximum(needs[within], bound)
+            far *= 2.0
+        wanted = ~asked & (needs <= most)
+        if not wanted.any() and ground <= useful:  # between which slopes the valley lies
+            low = np.flatnonzero(asked & (needs == ground))
+            rims = [_rim(needs, low[0], ground + surface.tolerance, side) for side in (-1, 1)]
+            wanted[[r for r in rims if 0 <= r < len(steps) and not asked[r]]] = True
+        if not wanted.any():
+            return needs
+        apart = np.abs(steps[:, None] - steps[asked]).min(axis=1)
+        here = int(np.lexsort((-apart, needs, ~wanted))[0])
 
 
 def _lowest(places: Array, needs: Array, level: float) -> float:
@@ -122,15 +170,22 @@ def _lowest(places: Array, needs: Array, level: float) -> float:
     The ground itself is flat, as what noise explains needs nothing.
     """
     least = int(needs.argmin())
-    high = np.flatnonzero(needs > needs[least] + level)
     ends = []
-    for last, inner in ((high[high < least][-1:], 1), (high[high > least][:1], -1)):
-        if not last.size:
+    for side in (-1, 1):
+        rim = _rim(needs, least, needs[least] + level, side)
+        if not 0 <= rim < len(needs):
             return float(places[least])
-        rim = int(last[0])
-        part = (needs[rim] - needs[least] - level) / (needs[rim] - needs[rim + inner])
-        ends.append(places[rim] + part * (places[rim + inner] - places[rim]))
+        part = (needs[rim] - needs[least] - level) / (needs[rim] - needs[rim - side])
+        ends.append(places[rim] + part * (places[rim - side] - places[rim]))
     return float(0.5 * (ends[0] + ends[1]))
+
+
+def _rim(needs: Array, least: int, level: float, side: int) -> int:
+    """The first place to a side of the least of needs [N] that needs more than a level; beyond all if none does."""
+    rim = least + side
+    while 0 <= rim < len(needs) and needs[rim] <= level:
+        rim += side
+    return rim
 
 
 def _sideways(placed: Placed) -> Array:
@@ -140,14 +195,27 @@ def _sideways(placed: Placed) -> Array:
     return np.asarray(vectors[:, values > ROUNDED * values[-1]].T)
 
 
-def _seems(surface: Surface, placed: Placed, sources: int) -> float:
+def seems(surface: Surface, placed: Placed, sources: int = LOOK) -> float:
     """What a group where it stands needs, as a few operations tell on a few points."""
     return float(surface.needs(few_motions(placed), sources=sources, tests=GLANCED, together=True).max())
 
 
 def start_error(surface: Surface) -> float:
     """How far a start may be off: moments know no more where surface is missing than votes do."""
-    return START_ERROR if surface.openings is None else AGREE_RAD
+    return AGREE_RAD if surface.is_open else START_ERROR
+
+
+def _asked(surface: Surface, placed: Placed) -> float:
+    """What a group needs to be believed where nobody looked, as a few operations tell on a few points.
+
+    Half of the operations of a group have to be believed, or more: the others follow.
+    """
+    if not surface.is_open or surface.viewed:
+        return 0.0
+    motions = few_motions(placed)
+    seen = surface.seen(surface.misses(motions, sources=LOOK), motions, sources=LOOK, together=True)
+    each = [surface.coverage(miss[None], [m], sources=LOOK) for miss, m in zip(seen, motions, strict=True)]
+    return surface.tolerance * sorted(c.belief for c in each)[len(each) // 2]
 
 
 def exact_need(floor: float) -> float:

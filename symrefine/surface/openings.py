@@ -84,12 +84,13 @@ class Openings:
         )
 
     def linked(self, cloud: LocalPlanes, stride: int) -> Index:
-        """Pairs [2, E] of every `stride`-th local planes that are neighbours, both ways."""
+        """Pairs [2, E] of every `stride`-th local planes that are neighbours, both ways, by the first of each."""
         if stride not in self.links:
             points = cloud.points[::stride]
             _, near = Tree(points).query(points, LINKS, skip=1)
             pairs = np.stack([np.repeat(np.arange(len(points)), LINKS), near.ravel()])
-            self.links[stride] = np.concatenate([pairs, pairs[::-1]], axis=1)
+            both = np.concatenate([pairs, pairs[::-1]], axis=1)
+            self.links[stride] = both[:, np.argsort(both[0], kind="stable")]
         return self.links[stride]
 
     def unseen(
@@ -104,53 +105,62 @@ class Openings:
         most: int = MOST,
         turned: Array | None = None,
     ) -> Mask:
-        """Which of every `stride`-th local planes, moved to [N, 3], lie where nobody looked.
+        """Which [K, N] of every `stride`-th local planes, moved by K operations, lie where nobody looked.
 
         Args:
             cloud: the surface.
-            moved: where an operation takes them.
-            away: [N] those that meet no surface.
+            moved: [K, N, 3] where operations take them.
+            away: [K, N] those that meet no surface.
             stride: of the local planes.
             margin: by how much space has to be free.
             met: the surface that they were to meet and its openings, where that is another one.
             most: a patch is unseen if one in so many of the places where it begins is at a border.
-            turned: [N, 3] their normals there, out of the body: what turns its back to all cameras they could not see,
-                though it meets the other side of a wall.
+            turned: [K, N, 3] their normals there, out of the body: what turns its back to all cameras they could not
+                see, though it meets the other side of a wall.
         """
         there_cloud, there_openings = (cloud, self) if met is None else met
         covered = away.copy()
-        covered[away] = _covered(self.clumps, cloud.points[::stride][away])
-        covered[away] |= _covered(there_openings.clumps, moved[away])
+        if self.clumps or there_openings.clumps:
+            still = np.broadcast_to(cloud.points[::stride], moved.shape)
+            covered[away] = _covered(self.clumps, still[away]) | _covered(there_openings.clumps, moved[away])
+        else:
+            covered[:] = False
         away = away & ~covered
         one, other = self.linked(cloud, stride)
+        leave = away.take(one, axis=1)
         if there_openings.cameras:
             found = away.copy()
             for camera in there_openings.cameras:
                 found[found] = ~camera.sees_through(moved[found], margin)
             # What meets the surface next to it already reaches beyond what was seen.
             beyond = np.zeros_like(found)
-            beyond[other[found[one]]] = True
+            which, pair = np.nonzero(found.take(one, axis=1))
+            beyond[which, other[pair]] = True
             if turned is not None:
                 beyond |= ~there_cloud.faced(moved, turned)
             return covered | found | (beyond & ~away)
-        leave = away[one]
-        begins = leave & ~away[other]
-        if not begins.any():
+        enters = ~away.take(other, axis=1)
+        which, pair = np.nonzero(leave & enters)
+        if not which.size:
             return covered
-        patch = connected_parts(one[leave & ~begins], other[leave & ~begins], len(moved))
-        rim, back = renumbered(other[begins], len(moved))
+        # The images of all operations side by side: those of one hang together with none of another.
+        count, whole = away.shape[1], away.size
+        begin, rim_of = which * count + one[pair], which * count + other[pair]
+        inside, within = np.nonzero(leave & ~enters)
+        patch = connected_parts(inside * count + one[within], inside * count + other[within], whole)
+        rim, back = renumbered(rim_of, whole)
         classes = cloud.classes(slice(None, None, stride))
-        _, target = there_cloud.nearest(moved[rim], None if classes is None else classes[rim])
-        there, here = there_openings.border[target][back], self.border[::stride][rim][back]
-        own = patch[one[begins]]
+        _, target = there_cloud.nearest(moved.reshape(-1, 3)[rim], None if classes is None else classes[rim % count])
+        there, here = there_openings.border[target][back], self.border[::stride][other[pair]]
+        own = patch[begin]
         at_border = there & ~here
         # A border that is carried onto a border says nothing: there the object may end on both sides.
-        both = np.bincount(own, there & here, len(moved))
-        every = np.bincount(own, minlength=len(moved))
-        free = (most * np.bincount(own, at_border, len(moved)) >= every - both) & (every > 0)
-        found = away & free[patch]
+        both = np.bincount(own, there & here, whole)
+        every = np.bincount(own, minlength=whole)
+        free = (most * np.bincount(own, at_border, whole) >= every - both) & (every > 0)
+        found = away & free[patch].reshape(away.shape)
         # What lies next to such a patch already reaches beyond the border.
-        found[other[begins][free[own] & at_border]] = True
+        found.reshape(-1)[rim_of[free[own] & at_border]] = True
         return found | covered
 
 

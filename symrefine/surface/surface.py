@@ -13,6 +13,7 @@ from symrefine.surface.drift import Drift
 from symrefine.surface.misses import (
     DISCS,
     LIMITS,
+    SHARES,
     SURE,
     TOLERANCE,
     miss_distances,
@@ -48,6 +49,15 @@ class Coverage:
     contradicted: float
     unseen: float
     told: float
+
+    @property
+    def belief(self) -> float:
+        """What it asks to believe: 1 where as much of the image was not seen as was; areas grow with lengths.
+
+        Where all that was seen but for a detail slides on itself, there is nothing to believe it for.
+        """
+        told = self.supported if self.told > SHARES[0] else 0.0
+        return math.sqrt(self.unseen / max(told, 1e-9))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -92,6 +102,11 @@ class Surface:
         """Whether cameras are known that saw it: then they say what was not seen, and normals point out of the body."""
         return self.openings is not None and bool(self.openings.cameras)
 
+    @property
+    def is_open(self) -> bool:
+        """Whether parts of it may be missing: cameras did not see them, or it ends somewhere. A clump only hides."""
+        return self.viewed or (self.openings is not None and bool(self.openings.line.any()))
+
     @cached_property
     def unclosed(self) -> float:
         """How much of it cameras did not see at least, by what they saw; nothing where none are known."""
@@ -104,7 +119,7 @@ class Surface:
 
     def stride(self, sources: int) -> int:
         """Stride that leaves about `sources` local planes; enough for the patches of an image to hang together."""
-        return max(1, len(self.cloud.points) // max(sources, PATCHES if self.openings is not None else 1))
+        return max(1, len(self.cloud.points) // max(sources, PATCHES if self.is_open else 1))
 
     def misses(
         self, motions: Sequence[Isometry], *, sources: int = 10**9, bound: float = math.inf, discs: int = DISCS
@@ -118,7 +133,7 @@ class Surface:
             discs: as of `disc_distances`.
         """
         stride = self.stride(sources)
-        bound = bound if self.openings is None else min(bound, HOPELESS * LIMITS[-1] * self.tolerance)
+        bound = min(bound, HOPELESS * LIMITS[-1] * self.tolerance) if self.is_open else bound
         bound *= self.diagonal
         return miss_distances(self.cloud, motions, stride=stride, bound=bound, discs=discs) / self.diagonal
 
@@ -132,17 +147,14 @@ class Surface:
         """
         if self.openings is None:
             return misses
-        stride, found = self.stride(sources), misses.copy()
-        moved = [motion.apply(self.cloud.points[::stride]) for motion in motions]
-        for motion, there, miss in zip(motions, moved, found, strict=True):
-            turned = motion.turn(self.cloud.normals[::stride]) if self.viewed else None
-            away, margin = miss > self.far, self.far * self.diagonal
-            miss[self.openings.unseen(self.cloud, there, away, stride, margin, turned=turned)] = np.nan
+        stride, away = self.stride(sources), misses > self.far
+        points, normals = self.cloud.points[::stride], self.cloud.normals[::stride]
+        moved = np.stack([motion.apply(points) for motion in motions])
+        turned = np.stack([motion.turn(normals) for motion in motions]) if self.viewed else None
+        unseen = self.openings.unseen(self.cloud, moved, away, stride, self.far * self.diagonal, turned=turned)
         if together and not self.viewed:
-            away = misses > self.far
-            unseen = agreed(np.stack(moved)[away], np.isnan(found[away]))
-            found[away] = np.where(unseen, np.nan, misses[away])
-        return found
+            unseen[away] = agreed(moved[away], unseen[away])
+        return np.where(unseen, np.nan, misses)
 
     def coverage(self, misses: Array, motions: Sequence[Isometry], *, sources: int = 10**9) -> Coverage:
         """What K operations say that miss by so much where it was seen [K, N]: the one that says least."""
