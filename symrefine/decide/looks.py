@@ -131,8 +131,9 @@ def slid(surface: Surface, placed: Placed, needs: float, useful: float = math.in
 def _valley(surface: Surface, placed: Placed, way: Array, steps: Array, useful: float) -> Array:
     """What a group needs [N] where it is moved along a way by steps [N], where that is least; elsewhere a lower bound.
 
-    No image moves by more than the group does, times what its operation makes of the way: from what it misses by in one
-    place follows what it misses by at least in others, and of those that need too much none is asked.
+    No image moves by more than the group does, times what its operation makes of the way. So from what it misses by in
+    one place follows what it misses by at least in others, as far as the same is seen there: those that need too much
+    are not asked.
     """
     still = np.eye(3)
     pace = np.array([np.linalg.norm((still - m.matrix) @ way) for m in few_motions(placed)]) / surface.diagonal

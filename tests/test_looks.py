@@ -1,0 +1,123 @@
+"""Looks at candidates of open surfaces: what is left out, as it could change nothing, and what is asked together."""
+
+from functools import cache
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from experiments.objects import damage
+from experiments.objects.shapes import mug, table
+from symrefine.decide import hypotheses, looks
+from symrefine.decide.hypotheses import judged
+from symrefine.decide.looks import ASIDE, glances, looked_at, start_error
+from symrefine.detection.measure import gather, measure
+from symrefine.fit.placed import Placed
+from symrefine.fit.refine import refine
+from symrefine.geometry import Isometry, frame_with_z, random_orthogonal
+from symrefine.groups import PointGroup
+from symrefine.shape import Shape
+from symrefine.surface.surface import Surface
+
+MADE = {
+    "hole": lambda rng: damage.hole(table(), 0.15, rng),
+    "cut": lambda rng: damage.cut(table(), 0.2, rng),
+    "mug": lambda rng: damage.hole(mug(), 0.1, rng),
+    "view": lambda rng: damage.view(table(), np.array([0.5, 0.3, 0.8]), rng),
+}
+
+
+@cache
+def surface_of(kind):
+    """A surface that is open, and the centre of the whole in its coordinates."""
+    made = MADE[kind](np.random.default_rng(4))
+    measured = measure(Shape(points=made.points, viewpoint=made.viewpoint))
+    surface = gather(measured, np.random.default_rng(0))[1]
+    assert surface.is_open
+    return surface, -measured.moments.center / measured.moments.scale
+
+
+def mirrors(center, count, seed=0):
+    """Mirrors through a place near the centre: two of a table, and any."""
+    rng = np.random.default_rng(seed)
+    normals = [np.eye(3)[0], np.eye(3)[1], *rng.normal(size=(count - 2, 3))]
+    return [
+        Placed(group=PointGroup(name="Cs", frame=frame_with_z(n)), center=center + 0.05 * rng.normal(size=3))
+        for n in normals
+    ]
+
+
+@pytest.mark.parametrize("kind", MADE)
+def test_what_nobody_saw_of_many_operations_is_what_nobody_saw_of_each(kind):
+    surface, center = surface_of(kind)
+    rng = np.random.default_rng(1)
+    motions = [Isometry.about(center, random_orthogonal(rng, det=det)) for det in (1, -1, 1, -1, 1)]
+    misses = surface.misses(motions)
+    seen = surface.seen(misses, motions)
+    assert np.isnan(seen).any()
+    for k, motion in enumerate(motions):
+        np.testing.assert_array_equal(seen[k], surface.seen(misses[k : k + 1], [motion])[0])
+
+
+@pytest.mark.parametrize("kind", MADE)
+@pytest.mark.parametrize("useful", [0.03, np.inf])
+def test_a_group_is_slid_to_where_asking_everywhere_would_put_it(kind, useful):
+    surface, center = surface_of(kind)
+    steps = start_error(surface) / ASIDE * np.arange(-ASIDE, ASIDE + 1.0)
+    for placed in mirrors(center, 8):
+        way = placed.group.frame[2]
+        told = looks._valley(surface, placed, way, steps, useful)
+        tried = [Placed(group=placed.group, center=placed.center + s * way) for s in steps]
+        every = np.array(glances(surface, tried))
+        if every.min() <= useful:
+            ends = [looks._lowest(steps, needs, surface.tolerance) for needs in (told, every)]
+            assert abs(ends[0] - ends[1]) <= 0.5 * (steps[1] - steps[0])
+        else:
+            assert told.min() > useful
+
+
+def test_what_no_slide_mends_is_asked_for_in_few_places(monkeypatch):
+    surface, center = surface_of("mug")
+    asked = []
+    as_missed = Surface.misses
+    monkeypatch.setattr(Surface, "misses", lambda *args, **options: asked.append(1) or as_missed(*args, **options))
+    frame = frame_with_z(np.array([0.6, 0.0, 0.8]))
+    steps = start_error(surface) / ASIDE * np.arange(-ASIDE, ASIDE + 1.0)
+    hopeless = Placed(group=PointGroup(name="Cs", frame=frame), center=center)
+    assert looks._valley(surface, hopeless, frame[2], steps, 0.03).min() > 0.03
+    assert len(asked) < len(steps) // 2
+
+
+@pytest.mark.parametrize("kind", MADE)
+@pytest.mark.parametrize("name", ["D6h", "C5v", "Ih", "Cs"])
+def test_of_a_group_that_needs_more_than_is_asked_for_no_more_is_judged_than_tells_so(kind, name, monkeypatch):
+    surface, center = surface_of(kind)
+    placed = Placed(group=PointGroup(name=name, frame=np.eye(3)), center=center)
+    whole = judged(surface, placed)
+    again = hypotheses._placed(surface, placed, (), 0, most=2.0 * whole.need)
+    assert again.need == whole.need
+    assert [e.need for e in again.elements] == [e.need for e in whole.elements]
+    least = 0.2 * min(e.need for e in whole.elements)
+    moved = []
+    as_missed = Surface.misses
+    monkeypatch.setattr(
+        Surface, "misses", lambda self, m, **options: moved.append(len(m)) or as_missed(self, m, **options)
+    )
+    short = hypotheses._placed(surface, placed, (), 0, most=least)
+    assert (short.elements, short.history) == ((), ())
+    assert least < short.need <= 1.5 * whole.need
+    assert sum(moved) <= 20
+
+
+def test_what_asks_to_believe_in_as_much_as_was_seen_is_not_slid(monkeypatch):
+    """A mirror through the border carries all to where nobody looked: that nothing contradicts it says little."""
+    surface, center = surface_of("cut")
+    border = surface.cloud.points[surface.openings.line].mean(axis=0)
+    through = Placed(group=PointGroup(name="Cs", frame=frame_with_z(border - center)), center=border)
+    asked = looks._asked(surface, through)
+    assert asked > surface.tolerance
+    monkeypatch.setattr(looks, "seems", lambda *_: 0.0)
+    monkeypatch.setattr(looks, "refine", lambda *args, **options: islice(refine(*args, **options), 1))
+    monkeypatch.setattr(looks, "slid", lambda *_: pytest.fail("it is not worth a search"))
+    look = looked_at(surface, through, np.inf, useful=0.5 * surface.tolerance)
+    assert look.needs == looks._asked(surface, look.placed) > 0.5 * surface.tolerance
