@@ -248,7 +248,7 @@ def _generated(
     placed = next(whole, None) or joined(parts)
     if placed is None:
         return None
-    told = [h for h in known if h.history] + [h for h in known if not h.elements and h.need > most]
+    told = [h for h in known if h.history and h.elements] + [h for h in known if not h.elements and h.need > most]
     same = next((h for h in told if is_at(h.placed, placed)), None)
     if same is not None:
         return same

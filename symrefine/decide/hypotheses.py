@@ -125,8 +125,8 @@ def fitted(
         found = _placed(surface, best, steps, before, GLANCE, most)
     else:
         found = _placed(surface, best, steps, before, most=most)
-        if found.elements and found.need > exact:
-            found = _moved(surface, found, every, mended=best is not first)
+        if found.need > exact:
+            found = _moved(surface, found, every, most, mended=best is not first)
     if not surface.viewed:
         return found
     told = is_told(found.placed, [(e.operations, e.coverage.supported) for e in found.elements])
@@ -134,13 +134,18 @@ def fitted(
 
 
 def _moved(
-    surface: Surface, found: Hypothesis, others: Sequence[tuple[float, Placed, tuple[Iterate, ...]]], *, mended: bool
+    surface: Surface,
+    found: Hypothesis,
+    others: Sequence[tuple[float, Placed, tuple[Iterate, ...]]],
+    most: float,
+    *,
+    mended: bool,
 ) -> Hypothesis:
     """A group that was judged where it needs least: there, where else it may stand, or moved sideways unless it was."""
 
     def better(placed: Placed, history: tuple[Iterate, ...]) -> Hypothesis:
-        other = _placed(surface, placed, history, found.before, most=found.need)
-        return min(found, other, key=lambda h: h.need)
+        other = _placed(surface, placed, history, found.before, most=min(found.need, most))
+        return min(found, other, key=lambda h: (not h.elements, h.need))
 
     for needs, placed, history in others:
         if placed is not found.placed and needs < found.need:
@@ -175,7 +180,7 @@ def _placed(
     parts = _Parts.of(placed, least, FITTED if surface.viewed else 0)
     misses, beyond = _misses(surface, parts, most)
     if beyond > most:
-        return Hypothesis(placed=placed, elements=(), need=beyond)
+        return Hypothesis(placed=placed, elements=(), need=beyond, history=history, before=before)
     found, need = _judged(surface, parts, misses)
     if surface.openings is not None and (surface.viewed or need > exact_need(surface.floor)):
         # What holds without it asks for no belief in anything unseen, but cameras tell what nobody saw of it.
