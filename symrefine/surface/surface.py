@@ -94,8 +94,10 @@ class Surface:
             self.wedges.extend(Wedge.of(self.skin, axis, fold))
 
     def looked_about(self, axis: Axis, fold: int) -> bool:
-        """Whether it was folded so often about an axis, as near as neighbourhoods tell."""
-        return any(w.is_about(axis, fold) for w in self.wedges)
+        """Whether it was folded so often about an axis, as near as neighbourhoods tell, or that would tell no more."""
+        if any(w.is_about(axis, fold) for w in self.wedges):
+            return True
+        return self.skin is None or Wedge.is_needless(self.skin, axis, fold)
 
     @property
     def viewed(self) -> bool:

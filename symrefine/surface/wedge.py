@@ -51,8 +51,7 @@ class Wedge:
         """The wedge of a skin about an axis of so many folds; none where neighbourhoods are small enough without."""
         rng, frame, pitch = np.random.default_rng(0), frame_with_z(axis.direction), 2.0 * np.pi / fold
         local = (skin.points - axis.point) @ frame.T
-        width = pitch * float(np.sqrt((local[:, :2] ** 2).sum(axis=1).mean()))
-        denser = (2.0 * ACROSS * skin.width / width) ** 2
+        denser = _denser(skin, local, pitch)
         if denser <= 1.0:
             return []
         pick = drawn(len(local), round(min(denser / fold, 1.0) * len(local)), rng)
@@ -75,6 +74,11 @@ class Wedge:
                 noise=np.sort(np.concatenate(noise)),
             )
         ]
+
+    @classmethod
+    def is_needless(cls, skin: Skin, axis: Axis, fold: int) -> bool:
+        """Whether the neighbourhoods of a skin are small enough to tell of so many folds about an axis."""
+        return _denser(skin, (skin.points - axis.point) @ frame_with_z(axis.direction).T, 2.0 * np.pi / fold) <= 1.0
 
     @property
     def pitch(self) -> float:
@@ -115,6 +119,12 @@ class Wedge:
         kept = np.zeros((3, 3))
         kept[:2, :2], kept[2, 2] = orthogonal_factor(matrix[:2, :2]), np.sign(matrix[2, 2])
         return Isometry(matrix=kept, shift=np.array([0.0, 0.0, shift[2]]))
+
+
+def _denser(skin: Skin, local: Array, pitch: float) -> float:
+    """How many times as densely a wedge has to be known as a skin is, of points [N, 3] about the third axis."""
+    width = pitch * float(np.sqrt((local[:, :2] ** 2).sum(axis=1).mean()))
+    return float((2.0 * ACROSS * skin.width / width) ** 2)
 
 
 def _kind(motion: Isometry | None, pitch: float) -> Kind | None:
