@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from symrefine.decide.hypotheses import NOTHING, Hypothesis, fitted, has_all, roughly_judged, single
+from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted, has_all, roughly_judged, single
 from symrefine.decide.looks import START_ERROR, exact_need, glances, looked_at
 from symrefine.decide.place import SUPPORTED
 from symrefine.decide.pool import ALIKE, Pool, is_at, is_same
@@ -196,8 +196,11 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
 def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
     """The pool where a candidate and the largest group hold together as far as noise tells: no need to part them.
 
-    Where the largest has it already and holds worse, that is the largest of those in it that need nothing.
+    Where the largest has it already and holds worse, that is the largest of those in it that need nothing; of what is
+    round any two mirrors through its axis make some fold, which says nothing.
     """
+    if pool.largest.holds(start) and not pool.largest.group.is_finite:
+        return pool
     exact = [h for h in pool.small if h.need <= pool.nothing and h.elements] if pool.largest.holds(start) else []
     known = max(exact or [pool.largest], key=lambda h: _size(h.placed))
     if known.holds(start) or has_all(start, known.placed):
@@ -246,7 +249,7 @@ def _generated(
     # Directions of what holds less well may be off by more than one fit tells two of them apart by.
     whole = (p for p in parts if all(has_all(p, other) for other in parts))
     placed = next(whole, None) or joined(parts)
-    if placed is None:
+    if placed is None or _is_by_chance(placed, parts):
         return None
     told = [h for h in known if h.history and h.elements] + [h for h in known if not h.elements and h.need > most]
     same = next((h for h in told if is_at(h.placed, placed)), None)
@@ -260,6 +263,15 @@ def _generated(
     if look.needs > (ALIKE if look.settled else COARSE) * close:
         return roughly_judged(surface, look, before=before)
     return fitted(surface, look.placed, error_rad=look.error_rad, before=before)
+
+
+def _is_by_chance(placed: Placed, parts: Sequence[Placed]) -> bool:
+    """Whether a group turns by less than what tells two directions apart, and none of its parts does.
+
+    Two mirrors that are one, each fitted a little off, make such.
+    """
+    fold = placed.group.symbol.fold
+    return math.inf > fold > math.pi / SAME_RAD and all(fold > p.group.symbol.fold for p in parts)
 
 
 def _worst(found: Hypothesis, hidden: float) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from symrefine.decide.looks import GLANCE, START_ERROR, Look, exact_need, seems, slid
+from symrefine.decide.looks import GLANCE, START_ERROR, Look, beliefs_in, exact_need, seems, slid
 from symrefine.decide.place import is_told, least_elsewhere
 from symrefine.decide.posterior import EVEN, EVEN_MIRROR
 from symrefine.fit.placed import FITTED, Operations, Placed, elements
@@ -211,19 +211,22 @@ def _misses(surface: Surface, parts: "_Parts", most: float) -> tuple[Array, floa
     found: Array = np.zeros((count, 0))
     if math.isinf(most):
         return surface.misses(parts.motions, sources=parts.sources), 0.0
-    need = 0.0
+    need, asked, beliefs = 0.0, 0.0, list[float]()
     rest, size = np.arange(count), FITTED
-    while rest.size and need <= most:
+    while rest.size and math.hypot(need, asked) <= most:
         some = rest[:: max(1, len(rest) // size)]
         motions = [parts.motions[k] for k in some]
         misses = surface.misses(motions, sources=parts.sources)
         seen = surface.seen(misses, motions, sources=parts.sources, together=True)
         told = seen if _counts_unseen(surface, float(np.isnan(seen).mean(axis=1).max())) else misses
         need = max(need, float(surface.needed(told, motions, len(parts.operations)).max()))
+        if told is seen and not surface.viewed:
+            beliefs += beliefs_in(surface, seen, motions, parts.sources)
+            asked = surface.tolerance * sorted(beliefs)[len(beliefs) // 2]
         found = np.zeros((count, misses.shape[1])) if not found.size else found
         found[some] = misses
         rest, size = np.setdiff1d(rest, some), 2 * size
-    return found, need
+    return found, math.hypot(need, asked)
 
 
 def _closely_judged(surface: Surface, found: tuple[Element, ...], need: float) -> tuple[tuple[Element, ...], float]:

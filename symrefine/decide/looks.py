@@ -100,10 +100,10 @@ def looked_at(
             return Look(placed=aside, history=tuple(history[:1]), needs=needs, error_rad=error)
     off = max(iterate.step, math.sqrt(max(float(np.diag(iterate.covariance).max()), 0.0)))
     aside = start.moved(iterate.state)
-    if needs <= useful < (asked := _asked(surface, aside)):
-        needs = asked  # where it stands is not worth a search
-    else:
+    # Where it asks to believe in too much it is not worth a search.
+    if (asked := _asked(surface, aside)) <= useful:
         aside, needs = slid(surface, aside, needs, useful)
+    needs = math.hypot(needs, asked)
     return Look(placed=aside, history=tuple(history), needs=needs, error_rad=min(error, SPREAD * off))
 
 
@@ -215,8 +215,13 @@ def _asked(surface: Surface, placed: Placed) -> float:
         return 0.0
     motions = few_motions(placed)
     seen = surface.seen(surface.misses(motions, sources=LOOK), motions, sources=LOOK, together=True)
-    each = [surface.coverage(miss[None], [m], sources=LOOK) for miss, m in zip(seen, motions, strict=True)]
-    return surface.tolerance * sorted(c.belief for c in each)[len(each) // 2]
+    return surface.tolerance * sorted(beliefs_in(surface, seen, motions, LOOK))[len(motions) // 2]
+
+
+def beliefs_in(surface: Surface, seen: Array, motions: Sequence[Isometry], sources: int) -> list[float]:
+    """What each of K operations asks to believe, given their misses where they were seen [K, N]."""
+    each = zip(seen, motions, strict=True)
+    return [surface.coverage(miss[None], [motion], sources=sources).belief for miss, motion in each]
 
 
 def exact_need(floor: float) -> float:
