@@ -13,14 +13,14 @@ from experiments.objects.boundary import instance
 from experiments.objects.shapes import box, join, sample
 from experiments.studies import groups
 from experiments.studies.boundary import Case, look
-from symrefine.decide.chain import chain, explore
+from symrefine.decide.chain import _told_apart, chain, explore
 from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted
 from symrefine.decide.looks import START_ERROR
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import Link, decide
 from symrefine.detection.measure import gather, measure
 from symrefine.detection.story import detect
-from symrefine.fit.placed import Placed
+from symrefine.fit.placed import Placed, joined
 from symrefine.geometry import frame_with_z, line_angle_rad, random_orthogonal, rotation
 from symrefine.groups import is_subgroup, point_group
 from symrefine.shape import Shape
@@ -349,3 +349,31 @@ def test_of_mirrors_that_noise_does_not_tell_apart_none_is_sure(name):
     truth = groups.true_group(name, True)
     assert found.point_group == "Cs"
     assert all(groups.is_mirror(truth, turn.T @ p.plane.normal) or p.confidence < 0.5 for p in found.planes)
+
+
+def mirror_at(angle_deg):
+    """A mirror through the z axis."""
+    angle = np.radians(angle_deg)
+    return Placed(group=point_group("Cs", frame_with_z([np.cos(angle), np.sin(angle), 0.0])), center=np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("parts", "whole"),
+    [
+        ([mirror_at(0.0), mirror_at(36.0)], "C5v"),
+        ([mirror_at(0.0), mirror_at(4.5)], "C40v"),
+        # Mirrors that no direction tells apart generate nothing but what is round.
+        ([mirror_at(0.0), mirror_at(3.6)], "Cinfv"),
+        ([mirror_at(0.0), mirror_at(36.0), mirror_at(39.6)], "Cinfv"),
+        ([mirror_at(0.0), mirror_at(3.6), Placed(group=point_group("Cs"), center=np.zeros(3))], "Dinfh"),
+        # A fold that was found as one is one.
+        ([Placed(group=point_group("C60"), center=np.zeros(3)), mirror_at(10.0)], "C60v"),
+        ([Placed(group=point_group("C50v"), center=np.zeros(3)), Placed(group=point_group("Cs"), center=np.zeros(3))], "D50h"),
+    ],
+)  # fmt: skip
+def test_what_parts_generate_turns_by_no_less_than_tells_directions_apart(parts, whole):
+    assert _told_apart(joined(parts), parts).group.name == whole
+
+
+def test_what_generates_nothing_is_nothing():
+    assert _told_apart(None, []) is None

@@ -18,6 +18,7 @@ from symrefine.decide.place import SUPPORTED
 from symrefine.decide.pool import ALIKE, Pool, is_at, is_same
 from symrefine.decide.posterior import ALONE, EVEN, certain
 from symrefine.fit.placed import Placed, joined
+from symrefine.groups import PointGroup
 from symrefine.propose.candidates import (
     Evidence,
     about,
@@ -248,8 +249,8 @@ def _generated(
 ) -> Hypothesis | None:
     # Directions of what holds less well may be off by more than one fit tells two of them apart by.
     whole = (p for p in parts if all(has_all(p, other) for other in parts))
-    placed = next(whole, None) or joined(parts)
-    if placed is None or _is_by_chance(placed, parts):
+    placed = next(whole, None) or _told_apart(joined(parts), parts)
+    if placed is None:
         return None
     told = [h for h in known if h.history and h.elements] + [h for h in known if not h.elements and h.need > most]
     same = next((h for h in told if is_at(h.placed, placed)), None)
@@ -265,13 +266,18 @@ def _generated(
     return fitted(surface, look.placed, error_rad=look.error_rad, before=before)
 
 
-def _is_by_chance(placed: Placed, parts: Sequence[Placed]) -> bool:
-    """Whether a group turns by less than what tells two directions apart, and none of its parts does.
+def _told_apart(placed: Placed | None, parts: Sequence[Placed]) -> Placed | None:
+    """What parts generate, or the continuous group about its axis where that turns by less than tells directions apart.
 
-    Two mirrors that are one, each fitted a little off, make such.
+    Mirrors of something round make such folds, each fitted on its own, and so do two that are one.
     """
-    fold = placed.group.symbol.fold
-    return math.inf > fold > math.pi / SAME_RAD and all(fold > p.group.symbol.fold for p in parts)
+    if placed is None:
+        return None
+    group, fold = placed.group, placed.group.symbol.fold
+    if not math.inf > fold > math.pi / SAME_RAD or any(fold <= p.group.symbol.fold for p in parts):
+        return placed
+    name = "Cinfv" if group.symbol.family in ("C", "Cv") else "Dinfh"
+    return replace(placed, group=PointGroup(name=name, frame=group.frame))
 
 
 def _worst(found: Hypothesis, hidden: float) -> tuple[float, float]:
