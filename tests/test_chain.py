@@ -351,6 +351,11 @@ def test_of_mirrors_that_noise_does_not_tell_apart_none_is_sure(name):
     assert all(groups.is_mirror(truth, turn.T @ p.plane.normal) or p.confidence < 0.5 for p in found.planes)
 
 
+def upright(name):
+    """A group about the z axis."""
+    return Placed(group=point_group(name), center=np.zeros(3))
+
+
 def mirror_at(angle_deg):
     """A mirror through the z axis."""
     angle = np.radians(angle_deg)
@@ -365,12 +370,12 @@ def mirror_at(angle_deg):
         # Mirrors that no direction tells apart generate nothing but what is round.
         ([mirror_at(0.0), mirror_at(3.6)], "Cinfv"),
         ([mirror_at(0.0), mirror_at(36.0), mirror_at(39.6)], "Cinfv"),
-        ([mirror_at(0.0), mirror_at(3.6), Placed(group=point_group("Cs"), center=np.zeros(3))], "Dinfh"),
+        ([mirror_at(0.0), mirror_at(3.6), upright("Cs")], "Dinfh"),
         # A fold that was found as one is one.
-        ([Placed(group=point_group("C60"), center=np.zeros(3)), mirror_at(10.0)], "C60v"),
-        ([Placed(group=point_group("C50v"), center=np.zeros(3)), Placed(group=point_group("Cs"), center=np.zeros(3))], "D50h"),
+        ([upright("C60"), mirror_at(10.0)], "C60v"),
+        ([upright("C50v"), upright("Cs")], "D50h"),
     ],
-)  # fmt: skip
+)
 def test_what_parts_generate_turns_by_no_less_than_tells_directions_apart(parts, whole):
     assert _told_apart(joined(parts), parts).group.name == whole
 
