@@ -7,6 +7,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from benchmarks.metric import Metric
+from experiments.objects.built_symmetry import specimen
+from experiments.objects.damage import hole
 from experiments.objects.poses import Pose
 from experiments.objects.shapes import SHAPES, box, join, sample
 from symrefine.detection.story import detect
@@ -31,7 +33,10 @@ def best_of(work: Callable[[], object], repeats: int = REPEATS) -> float:
 
 
 def clouds() -> Iterator[tuple[str, Array]]:
-    """Clouds in a random pose: b-plane, plane, revolution, none, and a cube, on which every n-tuple vanishes."""
+    """Clouds in a random pose: b-plane, plane, revolution, none, and a cube, on which every n-tuple vanishes.
+
+    And surfaces that are open, or that noise makes look so.
+    """
     rng = np.random.default_rng(7)
     cases = [(name, SHAPES[name][0](), noise) for name, noise in CASES]
     cases.append(("cube", join([box((0, 0, 0), (1, 1, 1))]), 0.0))
@@ -39,8 +44,22 @@ def clouds() -> Iterator[tuple[str, Array]]:
         pose = Pose.random(rng)
         yield f"{name} {100 * noise:g} % noise", pose.of(sample(shape, POINTS, noise, rng))
 
+    for name in HOLED:
+        made = hole(specimen("shape", name)[0], HOLE, rng)
+        yield f"{name} {100 * HOLE:g} % missing", Pose.random(rng).of(made.points)
 
-CASES = (("table", 0.0), ("table", 0.01), ("mug", 0.0), ("stool8", 0.005), ("bottle", 0.0), ("asymmetric", 0.0))
+
+# With a hole of such a share of the surface, and the noise that damaged clouds have.
+HOLED, HOLE = ("wheel5", "bottle", "skew_box"), 0.15
+CASES = (
+    ("table", 0.0),
+    ("table", 0.01),
+    ("mug", 0.0),
+    ("mug", 0.01),
+    ("stool8", 0.005),
+    ("bottle", 0.0),
+    ("asymmetric", 0.0),
+)
 
 
 def kd_pass(cloud: Array) -> None:

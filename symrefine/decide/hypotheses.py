@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from symrefine.decide.looks import GLANCE, START_ERROR, Look, beliefs_in, exact_need, seems, slid
+from symrefine.decide.looks import GLANCE, START_ERROR, Look, exact_need, mended, seems, slid
 from symrefine.decide.place import is_told, least_elsewhere
 from symrefine.decide.posterior import EVEN, EVEN_MIRROR
 from symrefine.fit.placed import FITTED, Operations, Placed, elements
@@ -121,13 +121,15 @@ def fitted(
     every = [(seems(surface, p), p, steps) for p, steps in ((end, history), (start, history[:1]))]
     needs, first, steps = min(every, key=lambda k: k[0])
     best, least = slid(surface, first, needs, close) if needs > close else (first, needs)
-    if least > close:
-        found = _placed(surface, best, steps, before, GLANCE, most)
+    if least > max(most, mended(surface)):
+        found = Hypothesis(placed=best, elements=(), need=least, history=steps, before=before)
+    elif least > close:
+        found = _placed(surface, best, steps, before, GLANCE)
     else:
-        found = _placed(surface, best, steps, before, most=most)
+        found = _placed(surface, best, steps, before)
         if found.need > exact:
-            found = _moved(surface, found, every, most, mended=best is not first)
-    if not surface.viewed:
+            found = _moved(surface, found, every, was_slid=best is not first)
+    if not surface.viewed or not found.elements:
         return found
     told = is_told(found.placed, [(e.operations, e.coverage.supported) for e in found.elements])
     return replace(found, told=told, elsewhere=least_elsewhere(surface, found.placed))
@@ -137,20 +139,18 @@ def _moved(
     surface: Surface,
     found: Hypothesis,
     others: Sequence[tuple[float, Placed, tuple[Iterate, ...]]],
-    most: float,
     *,
-    mended: bool,
+    was_slid: bool,
 ) -> Hypothesis:
     """A group that was judged where it needs least: there, where else it may stand, or moved sideways unless it was."""
 
     def better(placed: Placed, history: tuple[Iterate, ...]) -> Hypothesis:
-        other = _placed(surface, placed, history, found.before, most=min(found.need, most))
-        return min(found, other, key=lambda h: (not h.elements, h.need))
+        return min(found, _placed(surface, placed, history, found.before), key=lambda h: h.need)
 
     for needs, placed, history in others:
         if placed is not found.placed and needs < found.need:
             found = better(placed, history)
-    aside = found.placed if mended else slid(surface, found.placed, found.need)[0]
+    aside = found.placed if was_slid else slid(surface, found.placed, found.need)[0]
     return found if aside is found.placed else better(aside, found.history)
 
 
@@ -165,22 +165,12 @@ def roughly_judged(surface: Surface, look: Look, *, before: int = 0) -> Hypothes
 
 
 def _placed(
-    surface: Surface,
-    placed: Placed,
-    history: tuple[Iterate, ...],
-    before: int,
-    least: int = MOVED_EACH,
-    most: float = math.inf,
+    surface: Surface, placed: Placed, history: tuple[Iterate, ...], before: int, least: int = MOVED_EACH
 ) -> Hypothesis:
-    """A group judged where a fit put it, by so many points of each element at least.
-
-    One of which some elements need more than `most` is told without any.
-    """
+    """A group judged where a fit put it, by so many points of each element at least."""
     # What holds of a turn need not hold of its powers where the rest was not seen.
     parts = _Parts.of(placed, least, FITTED if surface.viewed else 0)
-    misses, beyond = _misses(surface, parts, most)
-    if beyond > most:
-        return Hypothesis(placed=placed, elements=(), need=beyond, history=history, before=before)
+    misses = surface.misses(parts.motions, sources=parts.sources)
     found, need = _judged(surface, parts, misses)
     if surface.openings is not None and (surface.viewed or need > exact_need(surface.floor)):
         # What holds without it asks for no belief in anything unseen, but cameras tell what nobody saw of it.
@@ -200,33 +190,6 @@ def _counts_unseen(surface: Surface, most: float) -> bool:
     """
     openings = surface.openings
     return openings is not None and (surface.viewed or bool(openings.clumps) or most > SHARES[1])
-
-
-def _misses(surface: Surface, parts: "_Parts", most: float) -> tuple[Array, float]:
-    """The misses [K, N] of the operations of a group, and what those need that were asked.
-
-    From some on that need more than `most`, no others are asked.
-    """
-    count = len(parts.motions)
-    found: Array = np.zeros((count, 0))
-    if math.isinf(most):
-        return surface.misses(parts.motions, sources=parts.sources), 0.0
-    need, asked, beliefs = 0.0, 0.0, list[float]()
-    rest, size = np.arange(count), FITTED
-    while rest.size and math.hypot(need, asked) <= most:
-        some = rest[:: max(1, len(rest) // size)]
-        motions = [parts.motions[k] for k in some]
-        misses = surface.misses(motions, sources=parts.sources)
-        seen = surface.seen(misses, motions, sources=parts.sources, together=True)
-        told = seen if _counts_unseen(surface, float(np.isnan(seen).mean(axis=1).max())) else misses
-        need = max(need, float(surface.needed(told, motions, len(parts.operations)).max()))
-        if told is seen and not surface.viewed:
-            beliefs += beliefs_in(surface, seen, motions, parts.sources)
-            asked = surface.tolerance * sorted(beliefs)[len(beliefs) // 2]
-        found = np.zeros((count, misses.shape[1])) if not found.size else found
-        found[some] = misses
-        rest, size = np.setdiff1d(rest, some), 2 * size
-    return found, math.hypot(need, asked)
 
 
 def _closely_judged(surface: Surface, found: tuple[Element, ...], need: float) -> tuple[tuple[Element, ...], float]:

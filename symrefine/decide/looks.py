@@ -114,11 +114,9 @@ def slid(surface: Surface, placed: Placed, needs: float, useful: float = math.in
     tells: the edges of the seat do, which have to meet one another. Where it needs more than is `useful` nowhere, it
     stays.
     """
-    farthest = start_error(surface)
-    mends = 2.0 * farthest / (LIMITS[1] * surface.diagonal)  # a mirror takes what it is off by twice
-    if not surface.is_open or not exact_need(surface.floor) < needs <= mends:
+    if not surface.is_open or not exact_need(surface.floor) < needs <= mended(surface):
         return placed, needs
-    steps = farthest / ASIDE * np.arange(-ASIDE, ASIDE + 1.0)
+    steps = start_error(surface) / ASIDE * np.arange(-ASIDE, ASIDE + 1.0)
     for way in _sideways(placed):
         needs_there = _valley(surface, placed, way, steps, useful)
         found = _lowest(steps, needs_there, surface.tolerance) if needs_there.min() <= useful else 0.0
@@ -201,6 +199,11 @@ def seems(surface: Surface, placed: Placed, sources: int = LOOK) -> float:
     return float(surface.needs(few_motions(placed), sources=sources, tests=GLANCED, together=True).max())
 
 
+def mended(surface: Surface) -> float:
+    """What a group may need at most that some start leads to where it needs nothing."""
+    return 2.0 * start_error(surface) / (LIMITS[1] * surface.diagonal)  # a mirror takes what it is off by twice
+
+
 def start_error(surface: Surface) -> float:
     """How far a start may be off: moments know no more where surface is missing than votes do."""
     return AGREE_RAD if surface.is_open else START_ERROR
@@ -215,13 +218,8 @@ def _asked(surface: Surface, placed: Placed) -> float:
         return 0.0
     motions = few_motions(placed)
     seen = surface.seen(surface.misses(motions, sources=LOOK), motions, sources=LOOK, together=True)
-    return surface.tolerance * sorted(beliefs_in(surface, seen, motions, LOOK))[len(motions) // 2]
-
-
-def beliefs_in(surface: Surface, seen: Array, motions: Sequence[Isometry], sources: int) -> list[float]:
-    """What each of K operations asks to believe, given their misses where they were seen [K, N]."""
-    each = zip(seen, motions, strict=True)
-    return [surface.coverage(miss[None], [motion], sources=sources).belief for miss, motion in each]
+    each = [surface.coverage(miss[None], [m], sources=LOOK).belief for miss, m in zip(seen, motions, strict=True)]
+    return surface.tolerance * sorted(each)[len(each) // 2]
 
 
 def exact_need(floor: float) -> float:
