@@ -22,7 +22,7 @@ from symrefine.cli import invoke
 from symrefine.complete import complete
 from symrefine.decide import chain
 from symrefine.decide.hypotheses import judged
-from symrefine.decide.looks import looked_at
+from symrefine.decide.looks import COARSE, looked_at
 from symrefine.detection import examination
 from symrefine.detection.measure import HIDDEN, gather, measure
 from symrefine.detection.story import detect
@@ -243,7 +243,7 @@ def test_a_group_of_an_open_surface_that_a_strict_limit_turned_down_is_fitted_un
     turned_down = chain._generated(surface, parts, (), 0, 1e-4)
     assert turned_down is not None
     assert turned_down.elements == ()
-    assert turned_down.need > chain.COARSE * 1e-4
+    assert turned_down.need > COARSE * 1e-4
     again = chain._generated(surface, parts, (turned_down,), 0, 10.0)
     assert again is not None
     assert len(again.elements) == 1

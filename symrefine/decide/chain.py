@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted, has_all, roughly_judged, single
-from symrefine.decide.looks import START_ERROR, exact_need, glances, looked_at
+from symrefine.decide.looks import COARSE, START_ERROR, exact_need, glances, looked_at
 from symrefine.decide.place import SUPPORTED
 from symrefine.decide.pool import ALIKE, Pool, is_at, is_same
 from symrefine.decide.posterior import ALONE, EVEN, certain
@@ -44,8 +44,6 @@ PLACES = 3
 # Share of a surface that a border encloses at most which is too short to be evident: of a ball that is 3 %, by the
 # isoperimetric inequality, and four times that where half of the border was seen.
 ENCLOSED = 0.12
-# A fit that is not settled may need so many times what it does then.
-COARSE = 3.5
 # Candidates of an open surface that are looked at: where little was seen many seem possible at a glance.
 LOOKED = 24
 # Candidates turned down after a look that are fitted all the same where nothing else was: the nearest misses.

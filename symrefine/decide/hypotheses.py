@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from symrefine.decide.looks import GLANCE, START_ERROR, Look, exact_need, mended, seems, slid
+from symrefine.decide.looks import COARSE, GLANCE, START_ERROR, Look, exact_need, mended, seems, slid
 from symrefine.decide.place import is_told, least_elsewhere
 from symrefine.decide.posterior import EVEN, EVEN_MIRROR
 from symrefine.fit.placed import FITTED, Operations, Placed, elements
@@ -109,8 +109,8 @@ def fitted(
 
     It may stay where it stands if the fit does not settle, or if the surface is open: what lies behind its borders is
     matched with what does not. There it is moved sideways, too, to where edges say that it belongs. One that wherever
-    it may stand seems to need more than `close` is judged by few points; of one that needs more than `most` no elements
-    are told.
+    it may stand seems to need more than `close` is judged by few points, one that needs far more than `most` in one
+    place only; where no start leads to as little, no elements are told.
     """
     state = start.framed()
     stride = surface.stride(_moved_each(len(state.standard), GLANCE))
@@ -127,7 +127,7 @@ def fitted(
         found = _placed(surface, best, steps, before, GLANCE)
     else:
         found = _placed(surface, best, steps, before)
-        if found.need > exact:
+        if exact < found.need <= COARSE * most:
             found = _moved(surface, found, every, was_slid=best is not first)
     if not surface.viewed or not found.elements:
         return found

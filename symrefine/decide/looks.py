@@ -20,6 +20,8 @@ from symrefine.surface.surface import Surface
 
 # Local planes that are moved: at a glance by each operation, in a fit at least; in a look by all together.
 GLANCE, LOOK = 120, 600
+# A fit that is not settled may need so many times what it does then.
+COARSE = 3.5
 # Steps of a look after which those that will not come near end.
 SHORT = 2
 # A glance allows for the worst of the operations of a group that it takes: without, the share that details may have

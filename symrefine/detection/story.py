@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
-from symrefine.decide.chain import COARSE
 from symrefine.decide.hypotheses import Element, Hypothesis, fitted, judged
+from symrefine.decide.looks import COARSE
 from symrefine.decide.posterior import NEAR, Decision, alternatives
 from symrefine.detection.examination import Examined, examined
 from symrefine.detection.measure import Measured, Outliers
