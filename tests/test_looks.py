@@ -1,5 +1,6 @@
 """Looks at candidates of open surfaces: what is left out, as it could change nothing, and what is asked together."""
 
+from dataclasses import replace
 from functools import cache
 from itertools import islice
 
@@ -7,8 +8,8 @@ import numpy as np
 import pytest
 
 from experiments.objects import damage
-from experiments.objects.shapes import mug, table
-from symrefine.decide import looks
+from experiments.objects.shapes import box, join, mug, sample, table
+from symrefine.decide import chain, looks
 from symrefine.decide.looks import ASIDE, glances, looked_at, start_error
 from symrefine.detection.measure import gather, measure
 from symrefine.fit.placed import Placed
@@ -16,6 +17,7 @@ from symrefine.fit.refine import refine
 from symrefine.geometry import Isometry, frame_with_z, random_orthogonal
 from symrefine.groups import PointGroup
 from symrefine.shape import Shape
+from symrefine.surface.openings import Openings
 from symrefine.surface.surface import Surface
 
 MADE = {
@@ -99,3 +101,17 @@ def test_what_asks_to_believe_in_as_much_as_was_seen_is_not_slid(monkeypatch):
     monkeypatch.setattr(looks, "slid", lambda *_: pytest.fail("it is not worth a search"))
     look = looked_at(surface, through, np.inf, useful=0.5 * surface.tolerance)
     assert look.needs == looks._asked(surface, look.placed) > 0.5 * surface.tolerance
+
+
+@pytest.mark.parametrize("evident", [False, True])
+def test_a_border_of_hardly_a_hole_hides_nothing_of_a_group_that_no_hole_leaves(evident, monkeypatch):
+    """A hole leaves what keeps its place: of a brick a mirror or two, never all three."""
+    brick = sample(join([box((0, 0, 0), (1.0, 0.7, 0.4))]), 8000, 0.0, np.random.default_rng(6))
+    evidence, surface = gather(measure(Shape(points=brick)), np.random.default_rng(0))
+    line = np.linalg.norm(surface.cloud.points - surface.cloud.points[0], axis=1) < 0.2
+    surface = replace(surface, openings=Openings(line=line, border=line, evident=evident))
+    asked = []
+    of_part = chain._of_part
+    monkeypatch.setattr(chain, "_of_part", lambda *args: asked.append(1) or of_part(*args))
+    pool = chain.explore(surface, evidence, surface.tolerance)
+    assert (pool.largest.group.name, pool.at_least, bool(asked)) == ("D2h", evident, evident)

@@ -67,18 +67,18 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     whole = _of_whole(replace(surface, openings=closed), evidence, limit, nothing)
     if surface.openings is None or surface.openings is closed:
         return whole
-    ends = _ends_there(surface, whole.largest)
-    if ends and not whole.largest.group.is_polar:
-        return replace(whole, at_least=surface.openings.evident)  # no single hole leaves such a group
+    ends, evident = _ends_there(surface, whole.largest), surface.openings.evident
+    if not whole.largest.group.is_polar and (ends or not evident):
+        return replace(whole, at_least=evident)  # no single hole leaves such a group, and there is hardly one
     part = _of_part(surface, whole)
     more = _size(part.largest.placed) > _size(whole.largest.placed)
     # What may not be open at all is missing a part only where that explains more, and no more than so short a border
     # may enclose.
     hidden = max((e.coverage.unseen for e in part.largest.elements), default=0.0)
-    missing = (surface.openings.evident or (more and hidden <= ENCLOSED)) and not ends
+    missing = (evident or (more and hidden <= ENCLOSED)) and not ends
     if missing or _places(whole.largest, part.largest) >= PLACES:
         return replace(part, at_least=True)
-    whole = replace(whole, at_least=surface.openings.evident or (more and not ends))
+    whole = replace(whole, at_least=evident or (more and not ends))
     if not more:
         return whole
     # To believe that what ends so evenly is missing a part takes as much as to believe in as much as was seen.
