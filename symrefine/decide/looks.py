@@ -80,7 +80,8 @@ def looked_at(
 ) -> Look:
     """A fit on a few points; one that needs more than `most` after `SHORT` steps ends, and is judged by fewer.
 
-    One that comes to what is `known` to need nothing ends there, and needs nothing.
+    One that comes to what is `known` to need nothing ends there. What it asks to believe in is needed as well, and one
+    that asks for more than is `useful`, or needs more wherever it is moved sideways, stays where the fit put it.
     """
     state, error, history = start.roughly_framed(), start_error(surface), []
     stride = surface.stride(max(GLANCE, LOOK // len(state.standard)))
