@@ -10,13 +10,14 @@ import pytest
 from experiments.objects import damage
 from experiments.objects.shapes import box, join, mug, sample, table
 from symrefine.decide import chain, looks
-from symrefine.decide.looks import ASIDE, glances, looked_at, start_error
+from symrefine.decide.looks import ASIDE, LOOK, START_ERROR, glances, looked_at, start_error
 from symrefine.detection.measure import gather, measure
 from symrefine.fit.placed import Placed
 from symrefine.fit.refine import refine
-from symrefine.geometry import Isometry, frame_with_z, random_orthogonal
+from symrefine.geometry import Axis, Isometry, frame_with_z, random_orthogonal
 from symrefine.groups import PointGroup
 from symrefine.shape import Shape
+from symrefine.surface.clumps import Clump
 from symrefine.surface.openings import Openings
 from symrefine.surface.surface import Surface
 
@@ -115,3 +116,22 @@ def test_a_border_of_hardly_a_hole_hides_nothing_of_a_group_that_no_hole_leaves(
     monkeypatch.setattr(chain, "_of_part", lambda *args: asked.append(1) or of_part(*args))
     pool = chain.explore(surface, evidence, surface.tolerance)
     assert (pool.largest.group.name, pool.at_least, bool(asked)) == ("D2h", evident, evident)
+
+
+def test_what_only_hides_leaves_a_surface_closed():
+    surface, _ = surface_of("hole")
+    none = np.zeros(len(surface.cloud.points), dtype=bool)
+    ball = Clump.of(0.05 * np.random.default_rng(7).normal(size=(50, 3)))
+    hidden = replace(surface, openings=Openings(line=none, border=none, evident=False, clumps=(ball,)))
+    assert (surface.is_open, hidden.is_open) == (True, False)
+    assert start_error(hidden) == START_ERROR < start_error(surface)
+    assert hidden.stride(LOOK) > surface.stride(LOOK)
+
+
+def test_a_wedge_that_would_tell_no_more_than_the_surface_counts_as_looked_at():
+    cloud = sample(table(), 20000, 0.003, np.random.default_rng(8))
+    surface = gather(measure(Shape(points=cloud)), np.random.default_rng(0))[1]
+    axis = Axis(direction=np.array([0.0, 0.0, 1.0]), point=np.zeros(3))
+    assert surface.looked_about(axis, 2)
+    assert not surface.wedges
+    assert not surface.looked_about(axis, 200)
