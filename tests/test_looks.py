@@ -95,13 +95,15 @@ def test_what_asks_to_believe_in_as_much_as_was_seen_is_not_slid(monkeypatch):
     surface, center = surface_of("cut")
     border = surface.cloud.points[surface.openings.line].mean(axis=0)
     through = Placed(group=PointGroup(name="Cs", frame=frame_with_z(border - center)), center=border)
-    asked = looks._asked(surface, through)
+    as_told = looks._told
+    asked = as_told(surface, through, LOOK)[1]
     assert asked > surface.tolerance
     monkeypatch.setattr(looks, "seems", lambda *_: 0.0)
+    monkeypatch.setattr(looks, "_told", lambda *args: (0.0, as_told(*args)[1]))
     monkeypatch.setattr(looks, "refine", lambda *args, **options: islice(refine(*args, **options), 1))
     monkeypatch.setattr(looks, "slid", lambda *_: pytest.fail("it is not worth a search"))
     look = looked_at(surface, through, np.inf, useful=0.5 * surface.tolerance)
-    assert look.needs == looks._asked(surface, look.placed) > 0.5 * surface.tolerance
+    assert look.needs == as_told(surface, look.placed, LOOK)[1] > 0.5 * surface.tolerance
 
 
 @pytest.mark.parametrize("evident", [False, True])

@@ -30,7 +30,8 @@ KINDS = {
 KIND_OF = {
     "decides": {
         "align.moment_fit": "MISFIT",
-        "align.partial": "MOST ITS_OWN",
+        "align.partial": "ITS_OWN",
+        "align.shown": "MOST",
         "align.procrustes": "SIGNIFICANT",
         "align.rivals": "GOOD",
         "align.span": "SHARED",

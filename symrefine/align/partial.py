@@ -31,9 +31,6 @@ from symrefine.surface.surface import HOPELESS
 LOOK = 3
 # Maps of each determinant that are polished, if they meet at least such a share of what the best does.
 POLISHED, WORTH = 4, 0.5
-# A patch is unseen if one in so many of the places where it begins is at a border. Of true maps at least one in four
-# is: the two are cut by different planes, and each border is known by a few local planes only.
-MOST = 6
 # Maps nearer than this, radians and diagonals, are one.
 APART = (0.17, 0.04)
 # Maps that are looked at where many do as well: as many as the rotations of a cube, and their images, would be 48.
@@ -212,9 +209,7 @@ class Judge:
         """What one side says of a map, and by how much its local planes miss the other where they meet, diagonals."""
         moved = motion.apply(here.cloud.points)
         misses = self.misses(there, moved, here.cloud.labels)
-        met, margin = (there.cloud, there.openings), self.far * self.diagonal
-        away = (misses > self.far)[None]
-        unseen = here.openings.unseen(here.cloud, moved[None], away, 1, margin, met=met, most=MOST)[0]
+        unseen = here.unseen(there, moved, misses > self.far, self.far * self.diagonal)
         return Merit.of(misses, unseen, self.near, self.far), misses[~unseen & (misses <= self.far)]
 
     def misses(self, there: Shown, moved: Array, classes: Index | None) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 
 from symrefine.align.pair import THIN, Side, sampled
 from symrefine.detection.measure import SAMPLES
-from symrefine.geometry import Array
+from symrefine.geometry import Array, Mask
 from symrefine.propose.maps import PLANES
 from symrefine.shape import Index
 from symrefine.surface.cameras import cameras
@@ -20,6 +20,9 @@ from symrefine.surface.skin import LocalPlanes, Skin, drawn, make_skin
 COARSER, MOST_PLANES = 1.5, 6000
 # One in so many local planes is moved by the polish.
 MOVED = 2
+# A patch is unseen if one in so many of the places where it begins is at a border. Of true maps at least one in four
+# is: the two are cut by different planes, and each border is known by a few local planes only.
+MOST = 6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -93,6 +96,11 @@ class Shown:
         given = (self.cloud, self.skin.points, self.skin.tree, eyes, self.near)
         open_ = None if self.closed else openings(*given, least=0.0)
         return open_ or Openings(line=none, border=none, evident=False)
+
+    def unseen(self, other: "Shown", moved: Array, away: Mask, margin: float) -> Mask:
+        """Which of the local planes [M], moved to [M, 3] of the other side, lie where nobody looked; see `Openings`."""
+        met = (other.cloud, other.openings)
+        return self.openings.unseen(self.cloud, moved[None], away[None], 1, margin, met=met, most=MOST)[0]
 
     @cached_property
     def noise(self) -> Array:

@@ -12,7 +12,6 @@ import numpy as np
 
 from symrefine.align.kinds import nearest_both_ways, with_one_set_of_classes
 from symrefine.align.pair import Side, few
-from symrefine.align.partial import MOST
 from symrefine.align.shown import Shown
 from symrefine.geometry import Array, Isometry, tight_diagonal
 from symrefine.moments.moments import shape_moments
@@ -96,10 +95,7 @@ class _Surfaces:
         found = disc_distances(there.cloud, moved, classes, bound=bound) / diagonal
         # Where a wall is too thin for the local planes its points still tell that there is something.
         found = np.minimum(found, there.skin.nearest(moved, classes) / diagonal)
-        met, margin = (there.cloud, there.openings), self.far * diagonal
-        away = (found > self.far)[None]
-        unseen = here.openings.unseen(here.cloud, moved[None], away, 1, margin, met=met, most=MOST)[0]
-        return np.where(unseen, np.nan, found)
+        return np.where(here.unseen(there, moved, found > self.far, self.far * diagonal), np.nan, found)
 
     def nearest(self, side: int, points: Array) -> tuple[Array, Index]:
         unit = (self.unit / self.scale, self.unit)[side]

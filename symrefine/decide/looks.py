@@ -91,12 +91,14 @@ def looked_at(
             continue
         here = start.moved(iterate.state)
         if known(here):
-            needs = 0.0
+            needs, asked = 0.0, _told(surface, here, LOOK)[1]
             break
-        if iterate.index == SHORT and (needs := seems(surface, here, GLANCE)) > most:
-            break
+        if iterate.index == SHORT:
+            needs, asked = _told(surface, here, GLANCE)
+            if needs > most:
+                break
     else:
-        needs = seems(surface, start.moved(iterate.state))
+        needs, asked = _told(surface, start.moved(iterate.state), LOOK)
         # Where noise is as thick as a surface it may draw a fit away, step by step.
         if not iterate.converged and (stayed := seems(surface, start)) < needs:
             aside, needs = slid(surface, start, stayed, useful)
@@ -104,7 +106,7 @@ def looked_at(
     off = max(iterate.step, math.sqrt(max(float(np.diag(iterate.covariance).max()), 0.0)))
     aside = start.moved(iterate.state)
     # Where it asks to believe in too much it is not worth a search.
-    if (asked := _asked(surface, aside)) <= useful:
+    if asked <= useful:
         aside, needs = slid(surface, aside, needs, useful)
     needs = math.hypot(needs, asked)
     return Look(placed=aside, history=tuple(history), needs=needs, error_rad=min(error, SPREAD * off))
@@ -212,17 +214,18 @@ def start_error(surface: Surface) -> float:
     return AGREE_RAD if surface.is_open else START_ERROR
 
 
-def _asked(surface: Surface, placed: Placed) -> float:
-    """What a group needs to be believed where nobody looked, as a few operations tell on a few points.
+def _told(surface: Surface, placed: Placed, sources: int) -> tuple[float, float]:
+    """What a group needs where it stands as it `seems`, and to be believed where nobody looked.
 
     Half of the operations of a group have to be believed, or more: the others follow.
     """
-    if not surface.is_open or surface.viewed:
-        return 0.0
     motions = few_motions(placed)
-    seen = surface.seen(surface.misses(motions, sources=LOOK), motions, sources=LOOK, together=True)
-    each = [surface.coverage(miss[None], [m], sources=LOOK).belief for miss, m in zip(seen, motions, strict=True)]
-    return surface.tolerance * sorted(each)[len(each) // 2]
+    seen = surface.seen(surface.misses(motions, sources=sources), motions, sources=sources, together=True)
+    needs = float(surface.needed(seen, motions, GLANCED).max())
+    if not surface.is_open or surface.viewed:
+        return needs, 0.0
+    each = [surface.coverage(miss[None], [m], sources=sources).belief for miss, m in zip(seen, motions, strict=True)]
+    return needs, surface.tolerance * sorted(each)[len(each) // 2]
 
 
 def exact_need(floor: float) -> float:

@@ -119,15 +119,12 @@ class Openings:
                 see, though it meets the other side of a wall.
         """
         there_cloud, there_openings = (cloud, self) if met is None else met
-        covered = away.copy()
+        covered = np.zeros_like(away)
         if self.clumps or there_openings.clumps:
             still = np.broadcast_to(cloud.points[::stride], moved.shape)
             covered[away] = _covered(self.clumps, still[away]) | _covered(there_openings.clumps, moved[away])
-        else:
-            covered[:] = False
         away = away & ~covered
         one, other = self.linked(cloud, stride)
-        leave = away.take(one, axis=1)
         if there_openings.cameras:
             found = away.copy()
             for camera in there_openings.cameras:
@@ -139,7 +136,7 @@ class Openings:
             if turned is not None:
                 beyond |= ~there_cloud.faced(moved, turned)
             return covered | found | (beyond & ~away)
-        enters = ~away.take(other, axis=1)
+        leave, enters = away.take(one, axis=1), ~away.take(other, axis=1)
         which, pair = np.nonzero(leave & enters)
         if not which.size:
             return covered
