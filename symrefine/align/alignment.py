@@ -18,23 +18,33 @@ OPEN = "not determined"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Miss:
-    """How well a map holds.
+class Nearness:
+    """How near a map brings two objects.
 
     Attributes:
         rms: distance from the moved source to the target, RMS, as a fraction of the target's diagonal.
-        status: "ok", or why the result should not be relied upon.
-        excess: what the map misses by over what the tolerance, or the noise of the moments, allows.
         overlap: share of the source that the map lays on the target, and share of the target that is met.
+    """
+
+    rms: float
+    overlap: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """Whether a map holds.
+
+    Attributes:
+        status: "ok", or why the result should not be relied upon.
+        excess: what the map misses by over what the tolerance, or the noise of the moments, allows, or more than that
+            where it is sure as well.
         determinant_confidence: probability that the determinant is right.
         hand_is_open: whether the other hand misses by about as much: right where the object is its own mirror image.
         confidence: probability that the map is, where it was not told from the excess.
     """
 
-    rms: float
     status: str
     excess: float
-    overlap: tuple[float, float]
     determinant_confidence: float
     hand_is_open: bool = False
     confidence: float | None = None
@@ -68,7 +78,8 @@ class Alignment(ReadOnly):
     exact: bool
     timings: dict[str, float]
     _coset: Callable[[], Coset] = field(repr=False)
-    _miss: Callable[[], "Miss"] = field(repr=False)
+    _verdict: Callable[[], Verdict] = field(repr=False)
+    _nearness: Callable[[], Nearness] = field(repr=False)
 
     @property
     def determinant(self) -> int:
@@ -114,8 +125,13 @@ class Alignment(ReadOnly):
 
     @cached_property
     @one_thread()
-    def _fit(self) -> Miss:
-        return self._miss()
+    def _said(self) -> Verdict:
+        return self._verdict()
+
+    @cached_property
+    @one_thread()
+    def _near(self) -> Nearness:
+        return self._nearness()
 
     @property
     def rms(self) -> float:
@@ -123,12 +139,12 @@ class Alignment(ReadOnly):
 
         In 3-space between denoised surfaces; elsewhere to the nearest point.
         """
-        return self._fit.rms
+        return self._near.rms
 
     @property
     def status(self) -> str:
         """ "ok", or why the result should not be relied upon."""
-        return self._fit.status
+        return self._said.status
 
     @property
     def confidence(self) -> float:
@@ -139,14 +155,14 @@ class Alignment(ReadOnly):
         """
         if self.status != OK:
             return 0.0
-        if self._fit.confidence is not None:
-            return self._fit.confidence
+        if self._said.confidence is not None:
+            return self._said.confidence
         if self.exact:
             return 1.0
-        agree = meant(Link(need=self._fit.excess), 1.0)
+        agree = meant(Link(need=self._said.excess), 1.0)
         # Where the other hand does about as well though the target has no mirror, either may be right: its details are
         # lost in noise or strays.
-        if self._fit.hand_is_open and len(set(np.sign(np.linalg.det(self.equivalents)))) == 1:
+        if self._said.hand_is_open and len(set(np.sign(np.linalg.det(self.equivalents)))) == 1:
             return min(agree, self.determinant_confidence)
         return agree
 
@@ -156,12 +172,12 @@ class Alignment(ReadOnly):
 
         In 3-space of the surface, elsewhere of the points.
         """
-        return self._fit.overlap
+        return self._near.overlap
 
     @property
     def determinant_confidence(self) -> float:
         """Probability that the determinant is right, 0.5 where a reflection does as well; 1 where none is admitted."""
-        return self._fit.determinant_confidence
+        return self._said.determinant_confidence
 
     @property
     def is_misfit(self) -> bool:

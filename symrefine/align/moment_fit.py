@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.fit.gauss_newton import Linearisations, minimise_all
-from symrefine.fit.refine import MAX_OUTER
+from symrefine.fit.refine import MAX_OUTER, WITHIN_NOISE
 from symrefine.geometry import Array, orthogonal_factor
-from symrefine.moments.action import FLOOR, Action, turned_by
+from symrefine.moments.action import FLOOR, Action, planes, turned_by
 from symrefine.moments.moments import deviations
 from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.shape import Index
@@ -76,7 +76,10 @@ class Fits:
 
 
 def fit(pair: MomentPair, starts: Array) -> Fits:
-    """Gauss-Newton from each start [K, n, n]; the determinants stay."""
+    """Gauss-Newton from each start [K, n, n]; the determinants stay.
+
+    A step well within what the numbers misfit by ends it: the wrong determinant misfits so that it converges slowly.
+    """
     root = np.sqrt(pair.weights)
 
     def linearise(matrices: Array, _: Index) -> Linearisations:
@@ -86,7 +89,15 @@ def fit(pair: MomentPair, starts: Array) -> Fits:
             costs=np.einsum("ki,ki->k", r, r), gradients=(j @ r[:, :, None])[:, :, 0], hessians=j @ j.transpose(0, 2, 1)
         )
 
-    found = minimise_all(linearise, starts, move=turned_by, max_steps=MAX_OUTER, tolerance=ROUNDING, longest=LONGEST)
+    found = minimise_all(
+        linearise,
+        starts,
+        move=turned_by,
+        max_steps=MAX_OUTER,
+        tolerance=ROUNDING,
+        longest=LONGEST,
+        least=WITHIN_NOISE**2 * len(planes(starts.shape[1])) / pair.size,
+    )
     order = np.argsort(found.costs, kind="stable")
     return Fits(matrices=orthogonal_factor(found.x), costs=found.costs, hessians=found.hessians)[order]
 

@@ -1,5 +1,6 @@
 """The two objects of an alignment in 3-space, and what is known of them: each part worked out when first needed."""
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from symrefine.align.landscape import harmonic_pair
 from symrefine.align.moment_fit import MomentPair
-from symrefine.align.polish import Similarity
+from symrefine.align.polish import Polished, Similarity
 from symrefine.align.procrustes import Procrustes, procrustes
 from symrefine.detection.measure import SAMPLES, density_of
 from symrefine.geometry import Array, Isometry, tight_diagonal
@@ -192,18 +193,20 @@ class Evidence:
         ways = [self.misses(motion), self.misses_back(motion)] if self.scale else [self.misses(motion)]
         return max(float(self.judge.needed(misses[None], [motion])[0]) for misses in ways) / self.tolerance
 
-    def agree_at_once(self, motion: Similarity) -> bool:
-        """Whether the surfaces agree under a map even if nothing that they miss by is noise.
+    def excess_at_most(self, done: Polished) -> float:
+        """What the excess after a polish is if nothing that the surfaces miss by is noise; infinite if it did not end.
 
-        That is told from the planes of the target that are met, which the judge need not be made for.
+        That is told from the planes of the target that the last of its steps met: the judge need not be made for it.
         """
-        moved = motion.apply(self.moving.points)
-        away, met = self.met.met_by(moved, self.moving.labels)
-        across = np.abs(np.einsum("ij,ij->i", moved - met.points, met.normals))
+        if not done.converged:
+            return math.inf
+        contact = done.contact
+        off = done.motion.apply(contact.source.points) - contact.target.points
+        across = np.abs(np.einsum("ij,ij->i", off, contact.target.normals))
         # A plane reaches as far as the points that it was fitted to; beyond, the point that is nearest counts.
-        misses = np.where(away < REACH * self.met.spacing, across, np.maximum(away, across))
+        misses = np.where(contact.away < REACH * self.met.spacing, across, np.maximum(contact.away, across))
         misses = np.minimum(misses / tight_diagonal(self.moving.points), 1.0)
-        return float(needs(misses, np.empty(0))) <= self.tolerance
+        return float(needs(misses, np.empty(0))) / self.tolerance
 
     def cleaned(self) -> "Evidence | None":
         """The same without points that belong to no surface; None where there are none."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.align.moment_fit import LONGEST
-from symrefine.fit.matching import SCALE_FLOOR, each_coordinate, geman_mcclure, meet, robust_scale, worth
+from symrefine.fit.matching import SCALE_FLOOR, Contact, each_coordinate, geman_mcclure, meet, robust_scale, worth
 from symrefine.fit.refine import MAX_OUTER, SETTLED, WITHIN_NOISE
 from symrefine.fit.residual import SIZE, design_rows, gram, turn_frame
 from symrefine.geometry import Array, Isometry, cross_matrix
@@ -56,6 +56,7 @@ class Polished:
         scale_sigma: standard deviation of the scale, relative; 0 where it was no unknown.
         steps: outer iterations.
         converged: whether the last step was negligible.
+        contact: where the source met the target before the last step: with all of its planes if that was negligible.
     """
 
     motion: Similarity
@@ -63,6 +64,7 @@ class Polished:
     scale_sigma: float
     steps: int
     converged: bool
+    contact: Contact
 
 
 def polish(
@@ -94,9 +96,10 @@ def polish(
     covariance: Array = np.linalg.pinv(prior, rcond=1e-12, hermitian=True)
     few = COARSE if len(source.points) > COARSE * ENOUGH else 1
     for index in range(1, MAX_OUTER + 1):
-        met = _met(source, target, start.moved(x), reach, few)
+        contact = meet(source, target, start.moved(x), reach, stride=few)
+        met = _Met.of(contact, target, source.redundancy)
         if len(met.worth) == 0 or target.spacing == 0.0:  # of points in one place nothing tells how near is near
-            return _ended(start.moved(x), covariance, index - 1, converged=False)
+            return _ended(start.moved(x), covariance, contact, index - 1, converged=False)
         before, settled = x, False
         for _ in range(MAX_OUTER):
             phi = _phi(start, x)
@@ -110,13 +113,13 @@ def polish(
                 break
         moved = float(np.linalg.norm(x - before))
         if settled and few == 1 and moved < SCALE_FLOOR * target.spacing:
-            return _ended(start.moved(x), covariance, index, converged=True)
+            return _ended(start.moved(x), covariance, contact, index, converged=True)
         if settled and moved < target.spacing:
             few = 1
-    return _ended(start.moved(x), covariance, MAX_OUTER, converged=False)
+    return _ended(start.moved(x), covariance, contact, MAX_OUTER, converged=False)
 
 
-def _ended(motion: Similarity, covariance: Array, steps: int, *, converged: bool) -> Polished:
+def _ended(motion: Similarity, covariance: Array, contact: Contact, steps: int, *, converged: bool) -> Polished:
     """What is told of a map, given the covariance [6 or 7, ...] of all that was unknown."""
     return Polished(
         motion=motion,
@@ -124,6 +127,7 @@ def _ended(motion: Similarity, covariance: Array, steps: int, *, converged: bool
         scale_sigma=float(np.sqrt(np.diag(covariance)[6:].sum())),
         steps=steps,
         converged=converged,
+        contact=contact,
     )
 
 
@@ -135,6 +139,17 @@ class _Met:
     worth: Array
     each: int
     redundancy: float
+
+    @classmethod
+    def of(cls, contact: Contact, target: Skin | LocalPlanes, redundancy: float) -> "_Met":
+        """Those of the pairs that count, given how many planes of the source each of its points takes part in."""
+        own, met = contact.source.chosen(contact.kept), contact.target.chosen(contact.kept)
+        if target.isolated:
+            rows = design_rows(*each_coordinate(own.points, met.points))
+            return cls(rows=rows, worth=np.ones(len(own.points)), each=3, redundancy=1.0)
+        rows = design_rows(own.points, met.points, met.normals)
+        redundancy = max(redundancy, target.shared_by(len(rows)))
+        return cls(rows=rows, worth=worth(own.flatness, met.flatness), each=1, redundancy=redundancy)
 
     def squares(self, phi: Array) -> Array:
         """Squared distances [P] that the pairs are left with under phi [13]."""
@@ -149,16 +164,6 @@ def _phi(start: Similarity, x: Array) -> Array:
     phi[:9] = (stretch * turn_frame(start.matrix, x[:3])).ravel()
     phi[9:12] = start.shift + x[3:6]
     return phi
-
-
-def _met(source: LocalPlanes, target: Skin | LocalPlanes, motion: Similarity, reach: float, stride: int) -> _Met:
-    own, met = meet(source, target, motion, reach, stride=stride)
-    if target.isolated:
-        rows = design_rows(*each_coordinate(own.points, met.points))
-        return _Met(rows=rows, worth=np.ones(len(own.points)), each=3, redundancy=1.0)
-    rows = design_rows(own.points, met.points, met.normals)
-    redundancy = max(source.redundancy, target.shared_by(len(rows)))
-    return _Met(rows=rows, worth=worth(own.flatness, met.flatness), each=1, redundancy=redundancy)
 
 
 def _normal_equations(

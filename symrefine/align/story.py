@@ -7,19 +7,20 @@ map lays on the other side, what contradicts it, and what nobody saw.
 Elsewhere than in 3-space: moments -> n-tuples -> Procrustes -> Gauss-Newton on the moments.
 """
 
+import math
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from symrefine.align.alignment import OK, OPEN, Alignment, Miss
+from symrefine.align.alignment import OK, OPEN, Alignment, Nearness, Verdict
 from symrefine.align.coset import Coset, coset_of_group, coset_of_list, coset_of_maps, lifted
 from symrefine.align.kinds import nearest_both_ways, with_one_set_of_classes
 from symrefine.align.landscape import least_misfit
 from symrefine.align.moment_fit import MISFIT, ROUNDING
 from symrefine.align.pair import Evidence, Side, few
 from symrefine.align.partial import Meeting, partial_meeting
-from symrefine.align.polish import Similarity
+from symrefine.align.polish import Polished, Similarity
 from symrefine.align.rivals import Choice, choose, information, polished
 from symrefine.align.scaled import Size, size_of_parts
 from symrefine.align.sides import (
@@ -36,7 +37,7 @@ from symrefine.align.span import span_fit
 from symrefine.clock import Clock
 from symrefine.decide.doubts import FLAT
 from symrefine.decide.maps import SURE
-from symrefine.decide.posterior import Link, meant
+from symrefine.decide.posterior import Link, certain, meant
 from symrefine.detection.measure import PARTS, SAMPLES
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
@@ -109,7 +110,7 @@ def _looked_at(source: Shape, target: Shape, seed: int) -> tuple[Shape, Shape]:
 
     All of those that may be the same points in another pose, which their spreads tell, and of flat sets.
     """
-    if source.dim != 3:
+    if source.dim != 3 or not any(_is_large(s) for s in (source, target)):
         return source, target
     spreads = [_spread(s) for s in (source, target) if s.faces is None]
     alike = len(spreads) == 2 and np.abs(spreads[0] - spreads[1]).max() < ROUNDING
@@ -128,10 +129,15 @@ def _spread(cloud: Shape) -> Array:
 
 
 def _some(shape: Shape, seed: int) -> Shape:
-    """Of a large cloud without weights as many points as a surface is known by; meshes as they are."""
-    if shape.faces is not None or shape.weights is not None or len(shape.points) <= SAMPLES:
+    """Of a large cloud as many points as a surface is known by; others, and meshes, as they are."""
+    if not _is_large(shape):
         return shape
     return shape.chosen(drawn(len(shape.points), SAMPLES, np.random.default_rng(seed)))
+
+
+def _is_large(shape: Shape) -> bool:
+    """Whether it is a cloud without weights, of more points than a surface is known by."""
+    return shape.faces is None and shape.weights is None and len(shape.points) > SAMPLES
 
 
 def _check(source: Shape, target: Shape, tolerance: float) -> None:
@@ -166,7 +172,7 @@ def _align_solid(
     whole, motion = choice.evidence, choice.motion
     covariance = np.zeros((6, 6)) if choice.exact else np.linalg.inv(information(whole, choice.covariance))
     # Where the sizes differ though nobody said so, it may be that one shows more than the other.
-    agree, at_once = choice.excess <= 1.0 and whole.scale == scale, choice.exact
+    agree, done = choice.excess <= 1.0 and whole.scale == scale, None
     scale_sigma = 0.0 if choice.exact else size_sigma(whole.source, whole.target)
     if polish and (agree or not partly) and not choice.exact and whole.has_points:
         with clock("planes"):
@@ -176,8 +182,7 @@ def _align_solid(
             motion, covariance = done.motion, done.covariance
             # Noise may move all planes of a side outwards or inwards at once, by half of their thickness.
             scale_sigma = float(np.hypot(done.scale_sigma, 0.5 * np.median(whole.moving.thickness)))
-        at_once = surfaces and not scale and whole.agree_at_once(motion)
-    excess = 0.0 if at_once or not surfaces else whole.excess(motion) if agree else np.inf
+    excess = _excess(choice, motion, None if scale else done, agree=agree) if surfaces else 0.0
     likely = meant(Link(need=excess), 1.0) if excess <= 1.0 else 0.0
     if likely < SURE and not cleaned and (clean := evidence.cleaned()) is not None:
         clean = replace(clean, scale=scale or differ_in_size(clean.source, clean.target))
@@ -191,6 +196,7 @@ def _align_solid(
         if part is not None and part.confidence >= max(likely, SURE):
             return part
     evidence = whole
+    known = excess if surfaces and agree else None
     matrix, translation, factor = _in_input_units(evidence, motion, scale)
 
     def coset() -> Coset:
@@ -207,8 +213,17 @@ def _align_solid(
         exact=choice.exact and (scale or same_size(evidence.source, evidence.target)),
         timings=clock.seconds,
         _coset=coset,
-        _miss=lambda: _miss(choice, motion, scale, reflections),
+        _verdict=lambda: _verdict(choice, motion, scale, reflections, known),
+        _nearness=lambda: _nearness(choice, motion, scale),
     )
+
+
+def _excess(choice: Choice, motion: Similarity, done: Polished | None, *, agree: bool) -> float:
+    """By how much surfaces exceed what they may differ by; at most, where they agree beyond doubt or not at all."""
+    if choice.exact:
+        return 0.0
+    most = math.inf if done is None else choice.evidence.excess_at_most(done)
+    return choice.evidence.excess(motion) if agree and most > certain(1.0) else most
 
 
 def _in_part(evidence: Evidence, reflections: bool, clock: Clock, *, scale: bool = False) -> Alignment | None:
@@ -224,11 +239,10 @@ def _met_in_part(meeting: Meeting, evidence: Evidence, size: Size, clock: Clock)
     maps = [_placed(evidence, m.motion, size.factor) for m in (meeting.best, *meeting.equals)]
     (matrix, translation), best = maps[0], meeting.best
     coset = coset_of_maps(*(np.array(parts) for parts in zip(*maps, strict=True)))
-    miss = Miss(
-        rms=best.rms * evidence.target.moments.scale / evidence.target.shape.diagonal,
+    rms = best.rms * evidence.target.moments.scale / evidence.target.shape.diagonal
+    verdict = Verdict(
         status=meeting.status,
         excess=0.0,
-        overlap=best.overlap,
         determinant_confidence=meeting.determinant_confidence,
         confidence=meeting.confidence,
     )
@@ -242,7 +256,8 @@ def _met_in_part(meeting: Meeting, evidence: Evidence, size: Size, clock: Clock)
         exact=False,
         timings=clock.seconds,
         _coset=lambda: coset,
-        _miss=lambda: miss,
+        _verdict=lambda: verdict,
+        _nearness=lambda: Nearness(rms=rms, overlap=best.overlap),
     )
 
 
@@ -279,34 +294,40 @@ def _placed(evidence: Evidence, motion: Similarity, factor: float) -> tuple[Arra
     return motion.matrix, b.center + b.scale * motion.shift - factor * (motion.matrix @ a.center)
 
 
-def _miss(choice: Choice, motion: Similarity, scale: bool, reflections: bool) -> Miss:
-    """How well the map holds in 3-space."""
-    evidence = choice.evidence
-    a, b = evidence.source, evidence.target
-    # Of objects that do not agree at any size, the size is not to blame.
-    status = OK if scale or choice.excess > 1.0 else told_sizes(a, b)
+def _verdict(choice: Choice, motion: Similarity, scale: bool, reflections: bool, excess: float | None) -> Verdict:
+    """Whether the map holds in 3-space, given its excess if that is known."""
+    evidence, status = choice.evidence, _sizes(choice, scale)
     sure = choice.determinant_confidence if reflections else 1.0
     if status != OK or not evidence.has_points:
-        rms, shares = _nearest(a.shape, b.shape, *_in_input_units(evidence, motion, scale), evidence.tolerance)
-        excess = _unlikely(choice.misfit)
-        return Miss(rms=rms, status=status, excess=excess, overlap=shares, determinant_confidence=sure)
-    misses, back = evidence.misses(motion), evidence.misses_back(motion)
-    rms, excess = float(np.sqrt(np.mean(misses**2))), evidence.excess(motion)
-    far = evidence.judge.far
-    shares = float((misses <= far).mean()), float((back <= far).mean())
+        return Verdict(status=status, excess=_unlikely(choice.misfit), determinant_confidence=sure)
+    excess = evidence.excess(motion) if excess is None else excess
     if excess > 1.0 and not choice.exact:
+        farthest = float(np.quantile(evidence.misses(motion), 0.99))
         status = (
             f"the objects differ by {excess:.1f} times what the tolerance allows: 99 % of the source comes within "
-            f"{100 * float(np.quantile(misses, 0.99)):.2g} % of the diagonal"
+            f"{100 * farthest:.2g} % of the diagonal"
         )
-    return Miss(
-        rms=rms,
-        status=status,
-        excess=excess,
-        overlap=shares,
-        determinant_confidence=sure,
-        hand_is_open=reflections and choice.hand_is_open,
-    )
+    hand_is_open = reflections and choice.hand_is_open
+    return Verdict(status=status, excess=excess, determinant_confidence=sure, hand_is_open=hand_is_open)
+
+
+def _nearness(choice: Choice, motion: Similarity, scale: bool) -> Nearness:
+    """How near the map brings the objects in 3-space."""
+    evidence = choice.evidence
+    if _sizes(choice, scale) != OK or not evidence.has_points:
+        matrix, translation, factor = _in_input_units(evidence, motion, scale)
+        shapes = evidence.source.shape, evidence.target.shape
+        return _nearest(*shapes, matrix, translation, factor, evidence.tolerance)
+    misses, back, far = evidence.misses(motion), evidence.misses_back(motion), evidence.judge.far
+    shares = float((misses <= far).mean()), float((back <= far).mean())
+    return Nearness(rms=float(np.sqrt(np.mean(misses**2))), overlap=shares)
+
+
+def _sizes(choice: Choice, scale: bool) -> str:
+    """The status as the sizes have it: of objects that do not agree at any size, the size is not to blame."""
+    if scale or choice.excess > 1.0:
+        return OK
+    return told_sizes(choice.evidence.source, choice.evidence.target)
 
 
 def _unlikely(misfit: float) -> float:
@@ -316,15 +337,12 @@ def _unlikely(misfit: float) -> float:
 
 def _nearest(
     source: Shape, target: Shape, matrix: Array, translation: Array, scale: float, tolerance: float
-) -> tuple[float, tuple[float, float]]:
-    """Root mean square distance of the moved source points to the nearest point of the target, over its diagonal.
-
-    And the shares of the points of either side that the other has one within the tolerance of.
-    """
+) -> Nearness:
+    """How near the points of the moved source and of the target come to one another."""
     moved, labels = scale * (source.points @ matrix.T) + translation, (source.labels, target.labels)
     there, back = nearest_both_ways(moved, target.points, labels, target.diagonal)
     shares = float((there <= tolerance).mean()), float((back <= tolerance).mean())
-    return float(np.sqrt(np.mean(there**2))), shares
+    return Nearness(rms=float(np.sqrt(np.mean(there**2))), overlap=shares)
 
 
 def _align_moments(
@@ -348,21 +366,15 @@ def _align_moments(
         coset = lifted(inner, bases[0], bases[1], centers, factor, reflections=reflections)
     matrix, translation = coset.matrices[0], coset.translations[0]
 
-    def miss() -> Miss:
+    def verdict() -> Verdict:
         status = OK if scale else told_sizes(a, b)
         if found.misfit > MISFIT and not found.exact:
             status = f"the moments differ by {found.misfit:.0f} times what sampling explains"
         if status == OK and not np.isfinite(found.sigma_rad) and not found.exact:
             status = f"{OPEN}: the noise of the moments hides every direction; give more points"
-        rms, shares = _nearest(a.shape, b.shape, matrix, translation, factor, tolerance)
         both = len(np.unique(np.sign(np.linalg.det(coset.matrices)))) > 1
-        return Miss(
-            rms=rms,
-            status=status,
-            excess=_unlikely(found.misfit),
-            overlap=shares,
-            determinant_confidence=0.5 if both else 1.0,
-        )
+        sure = 0.5 if both else 1.0
+        return Verdict(status=status, excess=_unlikely(found.misfit), determinant_confidence=sure)
 
     return Alignment(
         matrix=matrix,
@@ -374,7 +386,8 @@ def _align_moments(
         exact=found.exact and (scale or same_size(a, b)),
         timings=clock.seconds,
         _coset=(lambda: _planar_coset(b.shape, coset, reflections)) if dim == rank == 2 else (lambda: coset),
-        _miss=miss,
+        _verdict=verdict,
+        _nearness=lambda: _nearest(a.shape, b.shape, matrix, translation, factor, tolerance),
     )
 
 

@@ -26,6 +26,23 @@ class Pairs:
     weights: Array
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Contact:
+    """Local planes of one object, and those of another that they lie nearest to under a motion.
+
+    Attributes:
+        source: [M] as they stand.
+        target: [M] what each is nearest to.
+        away: [M] from the moved point to the nearest of the other object's.
+        kept: [M] which of these pairs count.
+    """
+
+    source: Planes
+    target: Planes
+    away: Array
+    kept: Mask
+
+
 def match(
     cloud: LocalPlanes, motions: Sequence[Isometry], uncertainty: float, *, stride: int = 1, robust: float = ROBUST
 ) -> tuple[Pairs, ...]:
@@ -76,15 +93,15 @@ def match(
 
 def meet(
     source: LocalPlanes, target: Skin | LocalPlanes, motion: Isometry, uncertainty: float, *, stride: int = 1
-) -> tuple[Planes, Planes]:
-    """Every `stride`-th local plane of one object that, moved, meets one of another by the same rules, and these."""
+) -> Contact:
+    """Every `stride`-th local plane of one object, moved, with those of another; pairs count by the same rules."""
     every = slice(None, None, stride)
     some = source.chosen(every)
-    distance, met = target.met_by(motion.apply(some.points), source.classes(every))
-    keep = distance < _reach(target.spacing, uncertainty)
+    away, met = target.met_by(motion.apply(some.points), source.classes(every))
+    kept = away < _reach(target.spacing, uncertainty)
     if not target.isolated:
-        keep &= _facing(motion.turn(some.normals), met.normals)
-    return some.chosen(keep), met.chosen(keep)
+        kept &= _facing(motion.turn(some.normals), met.normals)
+    return Contact(source=some, target=met, away=away, kept=kept)
 
 
 def _reach(spacing: float, uncertainty: float) -> float:

@@ -4,16 +4,17 @@ Notation: `m_p = sum_i w_i prod_j x_ij^p_j` (paper, eq. MomentsNDdiscrete); `mu`
 mass 1 and RMS radius 1, so every quantity made of them is dimensionless and comparable across objects.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import combinations_with_replacement, product
+from itertools import combinations_with_replacement, pairwise, product
 from math import comb, factorial, prod
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.errors import DegenerateShapeError
-from symrefine.geometry import Array, ReadOnly
+from symrefine.geometry import Array, ReadOnly, rows
 from symrefine.moments.quadrature import mesh_nodes, triangle_areas_and_normals
 from symrefine.shape import Shape
 
@@ -65,43 +66,77 @@ def _split(dim: int, order: int) -> tuple[NDArray[np.int64], NDArray[np.int64], 
 
 
 @lru_cache(maxsize=64)
-def _ladder(dim: int, order: int) -> list[tuple[int, int]]:
-    """For each monomial but the first: the monomial it is a multiple of, and by which coordinate."""
-    table = exponents(dim, order).tolist()
-    position = {tuple(e): i for i, e in enumerate(table)}
+def _ladder(dim: int, order: int) -> list[tuple[int, slice, slice]]:
+    """Runs of monomials that are one coordinate times a run of the degree before: the coordinate, the run, that run.
+
+    Of degree d those with x_1 are x_1 times all of degree d - 1; of the others those with x_2 are x_2 times the last of
+    degree d - 1, which are without x_1 themselves; and so on.
+    """
     steps = []
-    for e in table[1:]:
-        axis = next(j for j in range(dim) if e[j])
-        parent = list(e)
-        parent[axis] -= 1
-        steps.append((position[tuple(parent)], axis))
+    start, before = 1, [0] * dim  # where those of this degree begin; and of the last degree those without x_1 .. x_axis
+    for degree in range(1, order + 1):
+        end = start
+        firsts = []
+        for axis, first in enumerate(before):
+            firsts.append(end)
+            end += start - first
+            steps.append((axis, slice(firsts[-1], end), slice(first, start)))
+        start, before = end, firsts
+        assert end == comb(dim + degree, degree)
     return steps
 
 
-def monomials(points: Array, order: int) -> Array:
-    """All monomials of degree <= `order` at points [N, n], as rows [K, N]."""
+def monomials(points: Array, order: int, out: Array | None = None) -> Array:
+    """All monomials of degree <= `order` at points [N, n], as rows [K, N], those of `out` if it is given."""
     columns = np.ascontiguousarray(points.T)
-    out = np.empty((len(exponents(points.shape[1], order)), len(points)))
+    if out is None:
+        out = np.empty((len(exponents(points.shape[1], order)), len(points)))
     out[0] = 1.0
-    for row, (parent, axis) in enumerate(_ladder(points.shape[1], order), start=1):
-        np.multiply(out[parent], columns[axis], out=out[row])
+    for axis, run, before in _ladder(points.shape[1], order):
+        np.multiply(out[before], columns[axis], out=out[run])
     return out
 
 
-def raw_moments(points: Array, weights: Array, order: int, *, width: int = BLOCK) -> Array:
-    """Raw moments [K] of points [N, n] with weights [N], in the order of `exponents(n, order)`.
+def raw_moments(points: Array, weights: Array, order: int) -> Array:
+    """Raw moments [K] of points [N, n] with weights [N], in the order of `exponents(n, order)`."""
+    return raw_moments_of_parts(points, weights, order, [0, len(points)])[0]
 
-    `width` is how many points of a block are added up in one product.
+
+def raw_moments_of_parts(
+    points: Array, weights: Array, order: int, ends: Sequence[int], *, width: int = BLOCK
+) -> Array:
+    """Raw moments [P, K] of points [N, n] that stand part by part: where each begins, and where the last ends [P + 1].
+
+    `width` is how many points are added up in one product.
     """
     a, b, lead = _split(points.shape[1], order)
-    total = np.zeros((a.max() + 1, b.max() + 1))
-    for start in range(0, len(points), BLOCK):
-        block = points[start : start + BLOCK]
-        left, right = monomials(block[:, :lead], order), monomials(block[:, lead:], order)
-        left *= weights[start : start + BLOCK]
-        for k in range(0, len(block), width):
-            total += left[:, k : k + width] @ right[:, k : k + width].T
-    return total[a, b]
+    totals = np.zeros((len(ends) - 1, a.max() + 1, b.max() + 1))
+    # One place for all blocks: memory that is asked for anew comes page by page, which takes longer than the sums.
+    room = [np.empty((min(BLOCK, len(points)), count)) for count in totals.shape[1:]]
+    for pieces in _blocks(ends, width):
+        start, end = pieces[0][1].start, pieces[-1][1].stop
+        block, (left, right) = points[start:end], (whole[: end - start].reshape(-1, end - start) for whole in room)
+        left = monomials(block[:, :lead], order, left)
+        left *= weights[start:end]
+        right = monomials(block[:, lead:], order, right)
+        for part, piece in pieces:
+            own = slice(piece.start - start, piece.stop - start)
+            totals[part] += left[:, own] @ right[:, own].T
+    return totals[:, a, b]
+
+
+def _blocks(ends: Sequence[int], width: int) -> Iterator[list[tuple[int, slice]]]:
+    """Pieces of at most `width` points, each with its part, as many together as a block has room for."""
+    block: list[tuple[int, slice]] = []
+    for part, (begin, end) in enumerate(pairwise(ends)):
+        for start in range(begin, end, width):
+            piece = slice(start, min(start + width, end))
+            if block and piece.stop - block[0][1].start > BLOCK:
+                yield block
+                block = []
+            block.append((part, piece))
+    if block:
+        yield block
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -246,17 +281,18 @@ def _jackknife(points: Array, weights: Array, order: int, parts: int) -> tuple[A
 
     Interleaving after a fixed shuffle keeps the parts alike even where the file orders its points.
     """
-    sums = np.stack([raw_moments(points[part], weights[part], order) for part in dealt(len(points), parts)])
+    deal, ends = dealt(len(points), parts)
+    sums = raw_moments_of_parts(rows(points, deal), weights[deal], order, ends)
     total = sums.sum(axis=0)
     rest = total - sums
     return total, recentred(rest / rest[:, :1], points.shape[1], order)
 
 
 @lru_cache(maxsize=2)
-def dealt(count: int, parts: int) -> list[NDArray[np.int64]]:
-    """Indices of the points of each part, dealt in turn after a fixed shuffle."""
+def dealt(count: int, parts: int) -> tuple[NDArray[np.int64], list[int]]:
+    """Indices of the points of one part after the other, dealt in turn after a fixed shuffle, and where each ends."""
     turn = np.random.default_rng(0).permutation(count) % parts
-    return [np.flatnonzero(turn == part) for part in range(parts)]
+    return np.argsort(turn, kind="stable"), [0, *np.cumsum(np.bincount(turn, minlength=parts)).tolist()]
 
 
 @lru_cache(maxsize=16)

@@ -7,15 +7,12 @@ about the mean of both (Chan, Golub and LeVeque 1979; for any order Pebay 2008).
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 
 from symrefine.errors import DegenerateShapeError
 from symrefine.geometry import Array
-from symrefine.moments.moments import Moments, dealt, exponents, raw_moments, recentred, shifted
-from symrefine.shape import Index
+from symrefine.moments.moments import Moments, dealt, exponents, raw_moments_of_parts, recentred, shifted
 
 # Points to a product: larger ones (2^18 multiplications at order 8) OpenBLAS deals out to threads, which on a busy
 # machine wait for one another twenty times as long as they work; einsum, unlike a product with a vector, never does.
@@ -35,7 +32,7 @@ class _Sums:
     def of(cls, points: Array, weights: Array, origin: Array, order: int, parts: int) -> "_Sums":
         """The sums of points [N, n] with weights [N], dealt to the parts at random; `center` is told from an origin."""
         mass = weights.sum()
-        deal, ends = _deal(len(points), parts)
+        deal, ends = dealt(len(points), parts)
         # `take` reads rows from memory in any order five times as fast as an index does.
         local, own = np.take(points, deal, axis=0), np.take(weights, deal)
         local -= origin
@@ -43,8 +40,8 @@ class _Sums:
         local -= center
         scale = _radius(float(np.einsum("i,ij,ij->", own, local, local)), mass)
         local /= scale
-        each = [raw_moments(local[a:b], own[a:b], order, width=WIDTH) for a, b in pairwise(ends)]
-        return cls(values=np.stack(each), center=center, scale=scale, order=order)
+        values = raw_moments_of_parts(local, own, order, ends, width=WIDTH)
+        return cls(values=values, center=center, scale=scale, order=order)
 
     @property
     def mass(self) -> float:
@@ -109,13 +106,6 @@ def running_moments(chunks: Iterable[tuple[Array, Array]], order: int, *, parts:
         center=origin + found.center,
         scale=found.scale,
     )
-
-
-@lru_cache(maxsize=2)
-def _deal(count: int, parts: int) -> tuple[Index, list[int]]:
-    """Indices of the points of one part after the other, and where each begins and ends."""
-    each = dealt(count, parts)
-    return np.concatenate(each), [0, *np.cumsum([len(part) for part in each]).tolist()]
 
 
 def _radius(squares: float, mass: float) -> float:

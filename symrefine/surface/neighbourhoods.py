@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import combinations_with_replacement
 
 import numpy as np
 
@@ -22,8 +23,8 @@ VOLUME = 0.8
 PROBES = 60
 UNCERTAIN = 0.08
 WIDEST_BLOB = 0.5
-# Angles of the corners of an equilateral triangle, and what rounding leaves of the length of a cross product.
-THIRDS, ROUNDING = 2.0 * np.pi / 3.0 * np.array([1.0, 2.0, 0.0]), 1e-6
+# Height of an equilateral triangle of unit side, and what rounding leaves of the length of a cross product.
+HALF_ROOT_3, ROUNDING = 0.5 * math.sqrt(3.0), 1e-6
 # Cells that larger neighbourhoods are put together from: with half as many, the rims alone add a tenth to the noise.
 CELLS = 48
 
@@ -45,30 +46,33 @@ def smallest_eigenvectors(covariance: Array) -> tuple[Array, Array]:
     radius = np.sqrt(variance)
     determinant = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz)
     cosine = determinant / np.maximum(2.0 * variance * radius, 1e-300)
-    turned = np.arccos(np.clip(cosine, -1.0, 1.0))[:, None] / 3.0 + THIRDS
-    values = middle[:, None] + 2.0 * radius[:, None] * np.cos(turned)
-    a, b, c = xx - values[:, 0], yy - values[:, 0], zz - values[:, 0]
-    across = np.array(
-        [
-            [b * c - yz * yz, yz * xz - xy * c, xy * yz - b * xz],
-            [yz * xz - xy * c, a * c - xz * xz, xy * xz - a * yz],
-            [xy * yz - b * xz, xy * xz - a * yz, a * b - xy * xy],
-        ]
-    )
-    best = (across * across).sum(axis=1).argmax(axis=0)
-    vectors = across[best, :, np.arange(len(best))]
+    turned = np.arccos(np.clip(cosine, -1.0, 1.0)) / 3.0
+    along, across = radius * np.cos(turned), HALF_ROOT_3 * radius * np.sin(turned)
+    values = np.array([middle - along - 2.0 * across, middle - along + 2.0 * across, middle + 2.0 * along])
+    a, b, c = xx - values[0], yy - values[0], zz - values[0]
+    # What is left is of rank two: its adjugate is v v' but for a factor, and the longest of its rows the surest.
+    rest = np.array([yz * xz - xy * c, xy * yz - b * xz, xy * xz - a * yz])
+    own = np.array([b * c - yz * yz, a * c - xz * xz, a * b - xy * xy])
+    adjugate = np.array([[own[0], rest[0], rest[1]], [rest[0], own[1], rest[2]], [rest[1], rest[2], own[2]]])
+    best = np.abs(own).argmax(axis=0)
+    vectors = np.take_along_axis(adjugate, best[None, None], axis=0)[0].T
     length = np.linalg.norm(vectors, axis=1)
     double = length <= ROUNDING * variance
     vectors /= np.maximum(length, 1e-300)[:, None]
     if double.any():
         vectors[double] = np.linalg.eigh(covariance[double])[1][:, :, 0]
-    return np.clip(values, 0.0, None), vectors
+    return np.clip(values.T, 0.0, None), vectors
 
 
 def sums_of(points: Array) -> Array:
-    """What plane fits need of points [N, d]: 1, x and x x', [N, 1 + d + d d]."""
-    products = points[:, :, None] * points[:, None, :]
-    return np.column_stack([np.ones(len(points)), points, products.reshape(len(points), -1)])
+    """What plane fits need of points [N, d]: 1, x and each product of two coordinates, [N, 1 + d + d (d + 1) / 2]."""
+    dim, columns = points.shape[1], np.ascontiguousarray(points.T)
+    pairs = list(combinations_with_replacement(range(dim), 2))
+    sums = np.empty((len(points), 1 + dim + len(pairs)))
+    sums[:, 0], sums[:, 1 : 1 + dim] = 1.0, points
+    for k, (i, j) in enumerate(pairs, start=1 + dim):
+        np.multiply(columns[i], columns[j], out=sums[:, k])
+    return sums
 
 
 def _added(sums: Array, members: Index, ends: Index) -> Array:
@@ -91,15 +95,18 @@ def in_cells(values: Array, points: Array, count: int, rng: np.random.Generator)
 
 
 def spreads_of(sums: Array) -> tuple[Array, Array]:
-    """Means [M, d] and covariances [M, d, d] of neighbourhoods, from their sums [M, 1 + d + d d]."""
-    dim = math.isqrt(sums.shape[1])
-    averages = sums[:, 1:] / sums[:, :1]
-    mean, squares = averages[:, :dim], averages[:, dim:].reshape(-1, dim, dim)
-    return mean, squares - mean[:, :, None] * mean[:, None, :]
+    """Means [M, d] and covariances [M, d, d] of neighbourhoods, from their sums [M, 1 + d + d (d + 1) / 2]."""
+    dim = (math.isqrt(8 * sums.shape[1] + 1) - 3) // 2
+    averages = sums[:, 1:].T / sums[:, 0]
+    mean, squares = averages[:dim], averages[dim:]
+    covariance = np.empty((dim, dim, len(sums)))
+    for k, (i, j) in enumerate(combinations_with_replacement(range(dim), 2)):
+        covariance[i, j] = covariance[j, i] = squares[k] - mean[i] * mean[j]
+    return np.ascontiguousarray(mean.T), covariance.transpose(2, 0, 1)
 
 
 def fit_planes(sums: Array, normals: Array | None = None) -> tuple[Array, Array, Array]:
-    """Means, normals and variances (across first), all [M, d], of neighbourhoods, from their sums [M, 1 + d + d d].
+    """Means, normals and variances (across first), all [M, d], of neighbourhoods, from the sums of these.
 
     With `normals` [M, d] these are taken, and the first variance is that along them.
     """
@@ -119,7 +126,7 @@ class Neighbourhoods:
 
     Attributes:
         tree: kd-tree over the middles of the cells.
-        sums: [C, 1 + d + d d] of each cell: number, coordinates and their products.
+        sums: of each cell: number, coordinates and their products; see `sums_of`.
         count: cells to a neighbourhood.
     """
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from symrefine.geometry import Array, Mask, ReadOnly, rows
 from symrefine.shape import Index
 from symrefine.surface.neighbourhoods import (
+    CELLS,
     NEIGHBOURS,
     PROBES,
     Neighbourhoods,
@@ -216,8 +217,13 @@ class Skin:
 
         Infinite where that point is not of the class [Q] of the query.
         """
-        distance, near = self.tree.nearest(queries)
-        return self._of_class(distance, near, classes), self._planes(queries, near)
+        near: Index | None = None
+        if 1 < self.neighbours <= CELLS:  # what a plane is fitted to begins with the nearest point
+            away, near = self.tree.query(queries, self.neighbours)
+            distance, nearest = away[:, 0], near[:, 0]
+        else:
+            distance, nearest = self.tree.nearest(queries)
+        return self._of_class(distance, nearest, classes), self._planes(queries, nearest, near)
 
     def nearest(self, queries: Array, classes: Index | None = None) -> Array:
         """Distance [Q] from each query [Q, 3] to the nearest point; infinite where that is not of its class [Q]."""
