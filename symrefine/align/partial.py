@@ -16,6 +16,7 @@ from symrefine.align.pair import Evidence
 from symrefine.align.polish import Polished, Similarity, polish
 from symrefine.align.shown import Shown
 from symrefine.decide.maps import Merit, ahead, as_good, fits, said_by_both, score, well_met
+from symrefine.decide.posterior import LEAST
 from symrefine.fit.matching import AGREE
 from symrefine.geometry import Array, Isometry, Mask, householder, tight_diagonal
 from symrefine.groups.orthogonal import chord_angles
@@ -228,12 +229,17 @@ class Judge:
         return max(found)
 
     def slid(self, met: Met) -> float:
-        """The best score of a map that slides or turns to either side in the way that is known worst."""
+        """The best score, at most, of a map that slides or turns to either side in the way that is known worst.
+
+        What it may reach where that leaves less doubt than is worth telling.
+        """
         worst = np.linalg.eigh(met.covariance)[1][:, -1]
         points = self.source.moving.points
         travel = np.linalg.norm(met.motion.moved(SMALL * worst).apply(points) - met.motion.apply(points), axis=1).mean()
         step = SMALL * APART[1] * self.diagonal / travel * worst
-        return max(self._score(met.motion.moved(x)) for x in (step, -step))
+        moved = [met.motion.moved(x) for x in (step, -step)]
+        most = max(self.within_reach(m) for m in moved)
+        return most if ahead(met.score, [most]) > 1.0 - LEAST else max(self._score(m) for m in moved)
 
     def _score(self, motion: Similarity) -> float:
         there, back = (self.source, self.target, motion), (self.target, self.source, motion.inverse)

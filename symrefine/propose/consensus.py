@@ -22,6 +22,8 @@ Single = np.ndarray[tuple[int, ...], np.dtype[np.float32]]
 INVARIANT, HANDEDNESS = 0.3, 0.15
 # Maps that are grown from the best matches for each determinant, how many are told, and rounds that each takes.
 SEEDS, TOLD, ROUNDS = 20, 8, 3
+# Maps that are grown at once: the quickest of 4 to 20, with no say in which are found.
+TOGETHER = 8
 # Share of the most that a match has in common with a seed, from which on it belongs to it.
 COMMON = 0.3
 # Cosine of the largest angle between normals that agree, and of the angle between matrices that are one map.
@@ -87,45 +89,53 @@ def pair_invariants(points: Array, normals: Array) -> tuple[Single, ...]:
 
 def _grown(matches: Matches, common: Array, within: float, det: int) -> list[Proposal]:
     """Maps of one determinant, each from a match and those that have most in common [N, N] with it."""
-    score = common.sum(axis=1)
+    score, left = common.sum(axis=1), SEEDS
     found: list[Proposal] = []
-    for _ in range(min(SEEDS, len(score))):
-        seed = int(score.argmax())
-        if score[seed] <= 0.0:
-            break
-        row = common[seed]
-        inside = row >= COMMON * row.max()
-        inside[seed], score[seed] = True, 0.0
-        map_, agreeing = _settled(matches, inside, within, det)
-        score[agreeing] = 0.0
-        if agreeing.sum() > 2 and not any(_same(map_, p, within) for p in found):
-            found.append(Proposal(matrix=map_[0], shift=map_[1], support=int(agreeing.sum())))
+    while left > 0 and score.max() > 0.0:
+        # Some at once; those that turn out to agree with one before are no seeds of their own.
+        seeds = np.argsort(-score, kind="stable")[: min(TOGETHER, np.count_nonzero(score))]
+        rows = common[seeds]
+        inside = rows >= COMMON * rows.max(axis=1, keepdims=True)
+        inside[np.arange(len(seeds)), seeds] = True
+        for seed, matrix, shift, agreeing in zip(seeds, *_settled(matches, inside, within, det), strict=True):
+            if score[seed] == 0.0 or left == 0:
+                continue
+            score[agreeing], score[seed], left = 0.0, 0.0, left - 1
+            map_ = Proposal(matrix=matrix, shift=shift, support=int(agreeing.sum()))
+            if map_.support > 2 and not any(_same(map_, p, within) for p in found):
+                found.append(map_)
     return sorted(found, key=lambda p: -p.support)[:TOLD]
 
 
-def _settled(matches: Matches, inside: Mask, within: float, det: int) -> tuple[tuple[Array, Array], Mask]:
-    """The map of some matches [N], fitted again to those that agree with it, and these."""
-    map_ = _fitted(matches, inside, det)
+def _settled(matches: Matches, inside: Mask, within: float, det: int) -> tuple[Array, Array, Mask]:
+    """Maps of some matches each [K, N], fitted again to those that agree with them: matrices, shifts, and these."""
+    inside = inside.copy()
+    matrices, shifts = _fitted(matches, inside, det)
+    moving = np.arange(len(inside))
     for _ in range(ROUNDS):
-        matrix, shift = map_
-        off = matches.source @ matrix.T + shift - matches.target
-        facing = np.abs(np.einsum("ij,ij->i", matches.source_normals @ matrix.T, matches.target_normals))
-        before, inside = inside, (np.einsum("ij,ij->i", off, off) < within**2) & (facing > FACING)
-        if np.count_nonzero(inside) < 3 or (inside == before).all():
+        turns = matrices[moving].transpose(0, 2, 1)
+        off = matches.source @ turns + shifts[moving, None] - matches.target
+        facing = np.abs(np.einsum("kij,ij->ki", matches.source_normals @ turns, matches.target_normals))
+        agree = (np.einsum("kij,kij->ki", off, off) < within**2) & (facing > FACING)
+        changed = (np.count_nonzero(agree, axis=1) > 2) & (agree != inside[moving]).any(axis=1)
+        inside[moving], moving = agree, moving[changed]
+        if not moving.size:
             break
-        map_ = _fitted(matches, inside, det)
-    return map_, inside
+        matrices[moving], shifts[moving] = _fitted(matches, inside[moving], det)
+    return matrices, shifts, inside
 
 
 def _fitted(matches: Matches, some: Mask, det: int) -> tuple[Array, Array]:
-    """Least squares over some matches: orthogonal matrix of a determinant, and shift."""
-    a, b = matches.source[some], matches.target[some]
-    a_mean, b_mean = a.sum(axis=0) / len(a), b.sum(axis=0) / len(b)
-    matrix = det * orthogonal_factor(det * (b - b_mean).T @ (a - a_mean), proper=True)
-    return matrix, b_mean - matrix @ a_mean
+    """Least squares over some matches [K, N] each: orthogonal matrices [K, 3, 3] of a determinant, and shifts [K, 3]."""
+    share = some / np.maximum(np.count_nonzero(some, axis=1), 1)[:, None]
+    a_mean, b_mean = share @ matches.source, share @ matches.target
+    products = (matches.target[:, :, None] * matches.source[:, None]).reshape(-1, 9)
+    spread = (share @ products).reshape(-1, 3, 3) - b_mean[:, :, None] * a_mean[:, None]
+    matrices = det * orthogonal_factor(det * spread, proper=True)
+    return matrices, b_mean - (matrices @ a_mean[:, :, None])[:, :, 0]
 
 
-def _same(map_: tuple[Array, Array], known: Proposal, within: float) -> bool:
+def _same(map_: Proposal, known: Proposal, within: float) -> bool:
     """Whether a map is a known one."""
-    turned = (np.trace(map_[0] @ known.matrix.T) - 1.0) / 2.0
-    return bool(turned > SAME and np.linalg.norm(map_[1] - known.shift) < 2.0 * within)
+    turned = (np.trace(map_.matrix @ known.matrix.T) - 1.0) / 2.0
+    return bool(turned > SAME and np.linalg.norm(map_.shift - known.shift) < 2.0 * within)
