@@ -304,6 +304,13 @@ def tight_diagonal(points: Array) -> float:
     return best
 
 
+def span(points: Array) -> float:
+    """Distance between two points [N, 3] far apart: no more than their diameter, nor the diagonal of any box."""
+    centred = points - points.mean(axis=0)
+    end = points[np.einsum("ij,ij->i", centred, centred).argmax()]
+    return float(np.sqrt(((points - end) ** 2).sum(axis=1).max()))
+
+
 def corners(points: Array) -> Array:
     """Corners [k, n] of the convex hull of points [N, n], in the space that they span: flat sets have no volume."""
     from scipy.spatial import ConvexHull

@@ -11,7 +11,7 @@ from symrefine.align.moment_fit import MomentPair
 from symrefine.align.polish import Polished, Similarity
 from symrefine.align.procrustes import Procrustes, procrustes
 from symrefine.detection.measure import SAMPLES, density_of
-from symrefine.geometry import Array, Isometry, tight_diagonal
+from symrefine.geometry import Array, Isometry, span, tight_diagonal
 from symrefine.moments.moments import Moments, central_moments
 from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import ntuples
@@ -193,10 +193,11 @@ class Evidence:
         ways = [self.misses(motion), self.misses_back(motion)] if self.scale else [self.misses(motion)]
         return max(float(self.judge.needed(misses[None], [motion])[0]) for misses in ways) / self.tolerance
 
-    def excess_at_most(self, done: Polished) -> float:
+    def excess_at_most(self, done: Polished, enough: float) -> float:
         """What the excess after a polish is if nothing that the surfaces miss by is noise; infinite if it did not end.
 
         That is told from the planes of the target that the last of its steps met: the judge need not be made for it.
+        Where a size that is too small tells as little as is `enough`, that is told.
         """
         if not done.converged:
             return math.inf
@@ -205,8 +206,11 @@ class Evidence:
         across = np.abs(np.einsum("ij,ij->i", off, contact.target.normals))
         # A plane reaches as far as the points that it was fitted to; beyond, the point that is nearest counts.
         misses = np.where(contact.away < REACH * self.met.spacing, across, np.maximum(contact.away, across))
-        misses = np.minimum(misses / tight_diagonal(self.moving.points), 1.0)
-        return float(needs(misses, np.empty(0))) / self.tolerance
+        most = math.inf
+        for size in (span, tight_diagonal):
+            if most > enough:
+                most = float(needs(np.minimum(misses / size(self.moving.points), 1.0), np.empty(0))) / self.tolerance
+        return most
 
     def cleaned(self) -> "Evidence | None":
         """The same without points that belong to no surface; None where there are none."""

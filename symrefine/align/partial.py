@@ -181,7 +181,8 @@ class Judge:
         if len(some.points) < VOTERS // 10:
             return []
         points, normals = best.motion.apply(some.points), best.motion.turn(some.normals)
-        votes = mirror_votes(points[:VOTERS], normals[:VOTERS], np.random.default_rng(0), told=MIRRORS)
+        voters = slice(None, None, -(-len(points) // VOTERS))
+        votes = mirror_votes(points[voters], normals[voters], np.random.default_rng(0), told=MIRRORS)
         planes = [Isometry.about(v.foot, householder(v.direction)) for v in votes]
         starts = [_after(Similarity(matrix=p.matrix, shift=p.shift), best.motion) for p in planes]
         return [s for s in starts if self.meets(s).sum() >= ITS_OWN * meets.sum()]

@@ -110,5 +110,5 @@ class Shown:
 
 def _planes(skin: Skin, pick: Index) -> tuple[LocalPlanes, Index | None]:
     """The local planes of some points, and what is near these: their borders are told from the same points."""
-    near = skin.near(pick, NEIGHBOURS) if len(skin.points) >= NEIGHBOURS else None
+    near = skin.near(pick, NEIGHBOURS, scattered=True) if len(skin.points) >= NEIGHBOURS else None
     return skin.local_planes(pick, near=near), near

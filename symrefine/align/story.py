@@ -222,8 +222,9 @@ def _excess(choice: Choice, motion: Similarity, done: Polished | None, *, agree:
     """By how much surfaces exceed what they may differ by; at most, where they agree beyond doubt or not at all."""
     if choice.exact:
         return 0.0
-    most = math.inf if done is None else choice.evidence.excess_at_most(done)
-    return choice.evidence.excess(motion) if agree and most > certain(1.0) else most
+    enough = certain(1.0)
+    most = math.inf if done is None else choice.evidence.excess_at_most(done, enough)
+    return choice.evidence.excess(motion) if agree and most > enough else most
 
 
 def _in_part(evidence: Evidence, reflections: bool, clock: Clock, *, scale: bool = False) -> Alignment | None:

@@ -86,12 +86,12 @@ def _ladder(dim: int, order: int) -> list[tuple[int, slice, slice]]:
     return steps
 
 
-def monomials(points: Array, order: int, out: Array | None = None) -> Array:
-    """All monomials of degree <= `order` at points [N, n], as rows [K, N], those of `out` if it is given."""
+def monomials(points: Array, order: int, out: Array | None = None, *, times: float | Array = 1.0) -> Array:
+    """All monomials of degree <= `order` at points [N, n], `times` a factor [N], as rows [K, N]: of `out` if given."""
     columns = np.ascontiguousarray(points.T)
     if out is None:
         out = np.empty((len(exponents(points.shape[1], order)), len(points)))
-    out[0] = 1.0
+    out[0] = times
     for axis, run, before in _ladder(points.shape[1], order):
         np.multiply(out[before], columns[axis], out=out[run])
     return out
@@ -116,8 +116,7 @@ def raw_moments_of_parts(
     for pieces in _blocks(ends, width):
         start, end = pieces[0][1].start, pieces[-1][1].stop
         block, (left, right) = points[start:end], (whole[: end - start].reshape(-1, end - start) for whole in room)
-        left = monomials(block[:, :lead], order, left)
-        left *= weights[start:end]
+        left = monomials(block[:, :lead], order, left, times=weights[start:end])
         right = monomials(block[:, lead:], order, right)
         for part, piece in pieces:
             own = slice(piece.start - start, piece.stop - start)

@@ -126,7 +126,7 @@ def _settled(matches: Matches, inside: Mask, within: float, det: int) -> tuple[A
 
 
 def _fitted(matches: Matches, some: Mask, det: int) -> tuple[Array, Array]:
-    """Least squares over some matches [K, N] each: orthogonal matrices [K, 3, 3] of a determinant, and shifts [K, 3]."""
+    """Least squares over some matches [K, N] each: matrices [K, 3, 3] of a determinant, and shifts [K, 3]."""
     share = some / np.maximum(np.count_nonzero(some, axis=1), 1)[:, None]
     a_mean, b_mean = share @ matches.source, share @ matches.target
     products = (matches.target[:, :, None] * matches.source[:, None]).reshape(-1, 9)

@@ -247,9 +247,14 @@ class Skin:
         across = np.einsum("ij,ij->i", fitted.normals, points - fitted.points)
         return replace(fitted, points=points - fitted.normals * across[:, None])
 
-    def near(self, pick: Index, most: int) -> Index | None:
-        """The neighbours [M, most] of some of the points, or None where planes are made of other things or more."""
-        return self.tree.query(rows(self.points, pick), most)[1] if 1 < self.neighbours <= most else None
+    def near(self, pick: Index, most: int, *, scattered: bool = False) -> Index | None:
+        """The neighbours [M, most] of some of the points, or None where planes are made of other things or more.
+
+        `scattered` as of `Tree.query`.
+        """
+        if not 1 < self.neighbours <= most:
+            return None
+        return self.tree.query(rows(self.points, pick), most, scattered=scattered)[1]
 
     def _planes(self, queries: Array, nearest: Index, near: Index | None = None) -> Planes:
         normals = None if self.normals is None else rows(self.normals, nearest)

@@ -34,7 +34,7 @@ class Surroundings:
     def of(cls, points: Array) -> "Surroundings":
         """The surroundings of points [N, 3]; N > AROUND."""
         tree = Tree(points)
-        away, near = tree.query(points, AROUND, skip=1)
+        away, near = tree.query(points, AROUND, skip=1, scattered=True)
         return cls(points=points, tree=tree, away=away, near=near)
 
     def without(self, some: Mask) -> "Surroundings":

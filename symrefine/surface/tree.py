@@ -1,7 +1,7 @@
 """Nearest neighbours: the kd-tree that all of detection asks, about twice as quick as scipy's."""
 
 import math
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,9 @@ class Tree:
         with one_thread():
             self._tree: Any = KDTree(self.points, leafsize=LEAF) if len(self.points) else None
 
-    def query(self, queries: Array, count: int, *, skip: int = 0, bound: float = math.inf) -> tuple[Array, Index]:
+    def query(
+        self, queries: Array, count: int, *, skip: int = 0, bound: float = math.inf, scattered: bool = False
+    ) -> tuple[Array, Index]:
         """Distances and indices, both [Q, count], of the points nearest to queries [Q, d], nearest first.
 
         Args:
@@ -33,7 +35,14 @@ class Tree:
             count: neighbours that are told.
             skip: how many nearer ones are left out: 1 for queries that are points of the tree.
             bound: neighbours so far away, and those that there are not, are told with an infinite distance and index N.
+            scattered: whether the queries stand in no order, so that it takes less time to put them into one first.
         """
+        if scattered:
+            order = morton_order(queries)
+            sorted_away, sorted_near = self.query(queries[order], count, skip=skip, bound=bound)
+            away, near = np.empty_like(sorted_away), np.empty_like(sorted_near)
+            away[order], near[order] = sorted_away, sorted_near
+            return away, near
         last = skip + count
         if last > ROW:
             away, near = self._heap.query(queries, k=[*range(1 + skip, 1 + last)], distance_upper_bound=bound)
@@ -62,10 +71,35 @@ class Tree:
 
 
 def side_by_side(points: Array) -> Index:
-    """Order [N] of points [N, d] in which neighbours stand together."""
+    """Order [N] of points [N, d] in which neighbours stand together, and any stride takes an even part of them."""
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(points, leafsize=LEAF, balanced_tree=False, compact_nodes=False).indices)
+
+
+def morton_order(points: Array) -> Index:
+    """Order [N] of points [N, d] along a Morton curve.
+
+    Through as many cells as 15 bits can number, which are sorted faster than anything wider.
+    """
+    columns = np.ascontiguousarray(points.T)
+    if not columns.size:
+        return np.zeros(0, dtype=np.int64)
+    bits = max(1, 15 // len(columns))
+    low = columns.min(axis=1, keepdims=True)
+    widest = max(float((columns.max(axis=1, keepdims=True) - low).max()), 1e-300)
+    cells = np.minimum((columns - low) * (2**bits / widest), 2**bits - 1).astype(np.int16)
+    spread = _spread(bits, len(columns))
+    code = np.zeros(len(points), dtype=np.int16)
+    for axis, cell in enumerate(cells):
+        code |= spread[cell] << axis
+    return np.argsort(code, kind="stable")
+
+
+@cache
+def _spread(bits: int, apart: int) -> "np.ndarray[tuple[int], np.dtype[np.int16]]":
+    """Numbers of so many bits with their bits set apart, [2^bits]."""
+    return np.array([sum((v >> b & 1) << apart * b for b in range(bits)) for v in range(2**bits)], dtype=np.int16)
 
 
 def pairs_within(points: Array, radius: float) -> Index:
