@@ -16,9 +16,11 @@ from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sampl
 from experiments.studies import partial_alignment
 from symrefine.align.landscape import grid_rotations, harmonic_pair, hills, landscape, least_misfit
 from symrefine.align.moment_fit import as_good, best_fits, covariance, exact, fit, misfit
+from symrefine.align.pair import Evidence
 from symrefine.align.partial import Judge
 from symrefine.align.polish import Similarity, polish
 from symrefine.align.procrustes import procrustes
+from symrefine.align.rivals import choose, polished
 from symrefine.align.shown import Shown
 from symrefine.align.sides import side_of
 from symrefine.align.span import monomial_pair, span_fit
@@ -850,6 +852,54 @@ def test_a_flat_part_in_common_says_that_it_slides_or_is_chance(seed: int) -> No
     assert found.confidence == 0.0
 
 
+@pytest.mark.parametrize("seed", [21, 22, 24])
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_parts_end_where_no_slide_does_better(det: int, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Half of an object: a polish may end on a ridge, from where the map goes on along it.
+    told = []
+    as_slid = Judge.slid
+    monkeypatch.setattr(Judge, "slid", lambda self, met: told.append((met, *as_slid(self, met))) or told[-1][1:])
+    pair = partial_alignment.given(
+        partial_alignment.Case(name="asymmetric", condition="overlap 50 %", det=det, seed=seed)
+    )
+    found = align(*pair[:2])
+    ((first, best, most),) = told
+    assert best.score >= first.score
+    assert most <= best.score or found.status != "ok"
+    assert angle_deg(found.matrix, pair[2].matrix) < 5.0 or found.status != "ok"
+
+
+def test_a_map_that_slides_aside_to_a_better_one_is_right() -> None:
+    row = partial_alignment.run(partial_alignment.Case(name="asymmetric", condition="overlap 50 %", det=1, seed=22))
+    assert row.right
+    assert row.status == "ok"
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.003, 0.01])
+@pytest.mark.parametrize("det", DETERMINANTS)
+def test_what_the_polish_met_says_at_most_what_the_judge_does(det: int, noise: float) -> None:
+    # No noise is forgiven there, so that what is sure by it is sure.
+    rng = rng_of(57, det + 1)
+    source, target = (sample(asymmetric(), 6000, noise, rng) for _ in range(2))
+    sides = side_of(Shape(points=source), 16), side_of(Shape(points=target @ random_orthogonal(rng, det=det)), 16)
+    evidence = Evidence(source=sides[0], target=sides[1], scale=False, tolerance=0.01, seed=0)
+    choice = choose(evidence)
+    done = polished(evidence, evidence.met, choice.motion, choice.covariance)
+    most = evidence.excess_at_most(done, 0.0)
+    assert most >= evidence.excess(done.motion)
+    assert evidence.excess_at_most(done, 1e9) >= most  # told of a size that is too small, as that is enough
+    assert evidence.excess_at_most(replace(done, converged=False), 0.0) == np.inf
+
+
+def test_clean_objects_agree_without_a_judge(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = rng_of(58)
+    source, target = (sample(asymmetric(), 6000, 0.0, rng) for _ in range(2))
+    monkeypatch.setattr(Evidence, "excess", lambda *_: pytest.fail("it is sure without"))
+    found = align(source, target)
+    assert found.status == "ok"
+    assert found.confidence > 0.99
+
+
 @pytest.mark.parametrize("det", DETERMINANTS)
 def test_the_covariance_is_that_of_the_errors(det: int) -> None:
     # Whitened errors of rotation vector and translation, 6 numbers each: their mean square is 1 but for what is shared
@@ -897,6 +947,26 @@ def test_consensus_finds_a_fifth_of_true_matches(det: int) -> None:
 def test_consensus_of_too_few_matches_is_none(count: int) -> None:
     points, normals = np.eye(3)[:count], np.eye(3)[:count]
     assert consensus(Matches(source=points, source_normals=normals, target=points, target_normals=normals), 0.1) == []
+
+
+def test_maps_grown_together_are_those_grown_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Half of the matches are of a rotation, a third of a reflection, the others of nothing.
+    rng = rng_of(91)
+    points, normals = rng.standard_normal((90, 3)), unit(rng.standard_normal((90, 3)))
+    target, there = rng.standard_normal((90, 3)), unit(rng.standard_normal((90, 3)))
+    for some, det in ((slice(0, 45), 1), (slice(45, 75), -1)):
+        matrix = random_orthogonal(rng, det=det)
+        target[some], there[some] = points[some] @ matrix.T + 0.3, normals[some] @ matrix.T
+    matches = Matches(source=points, source_normals=normals, target=target, target_normals=there)
+    found = []
+    for together in (1, 8, 90):
+        monkeypatch.setattr("symrefine.propose.consensus.TOGETHER", together)
+        found.append(consensus(matches, 0.1))
+    assert [p.support for p in found[0]][:2] == [45, 30]
+    for other in found[1:]:
+        assert [p.support for p in other] == [p.support for p in found[0]]
+        for one, two in zip(found[0], other, strict=True):
+            np.testing.assert_allclose(one.matrix, two.matrix, atol=1e-9)
 
 
 def test_signatures_do_not_know_pose_hand_or_signs() -> None:

@@ -155,6 +155,15 @@ def test_each_start_ends_where_it_would_alone(residual, jacobian):
         assert (found.steps[k], found.converged[k]) == (alone.steps, alone.converged)
 
 
+def test_a_start_ends_where_its_step_gains_less_than_is_asked_for():
+    """The exponential does not fit, so that its cost has a floor: steps of less than a hundredth of it are left out."""
+    starts, linearise = np.array([[1.0, 0.1], [0.5, 0.5], [2.0, 1.5]]), many(exponential, exponential_jacobian)
+    best, found = (minimise_all(linearise, starts, max_steps=40, least=least) for least in (0.0, 0.01))
+    assert found.converged.all()
+    assert (found.steps < best.steps).all()
+    np.testing.assert_allclose(found.costs, best.costs, rtol=0.02)
+
+
 def test_no_step_is_longer_than_allowed():
     A, b = np.eye(2), np.array([3.0, 4.0])
     for count in range(1, 5):

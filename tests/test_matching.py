@@ -23,7 +23,7 @@ from symrefine.surface.neighbourhoods import (
     smallest_eigenvectors,
 )
 from symrefine.surface.skin import isolated_points, local_planes
-from symrefine.surface.tree import Tree, side_by_side
+from symrefine.surface.tree import Tree, morton_order, side_by_side
 
 BOX = join([box((0, 0, 0), (1, 0.7, 0.4))])
 
@@ -494,9 +494,20 @@ def test_neighbours_that_there_are_not_are_infinitely_far():
     assert np.isinf(Tree(np.empty((0, 3))).nearest(points)[0]).all()
 
 
-def test_points_side_by_side_are_near_one_another():
+@pytest.mark.parametrize("dim", [1, 2, 3, 6])
+def test_queries_that_are_put_in_order_are_answered_as_they_stand(dim):
+    points, queries = np.random.default_rng(8).standard_normal((2, 900, dim))
+    tree = Tree(points)
+    for options in ({}, {"skip": 1}, {"bound": 0.3}):
+        for one, other in zip(*(tree.query(queries, 5, scattered=s, **options) for s in (True, False)), strict=True):
+            np.testing.assert_array_equal(one, other)
+    assert tree.query(queries[:0], 5, scattered=True)[0].shape == (0, 5)
+
+
+@pytest.mark.parametrize("ordered", [side_by_side, morton_order])
+def test_points_side_by_side_are_near_one_another(ordered):
     points = np.random.default_rng(7).random((4000, 3))
-    order = side_by_side(points)
+    order = ordered(points)
     np.testing.assert_array_equal(np.sort(order), np.arange(4000))
     steps = [np.linalg.norm(np.diff(points[o], axis=0), axis=1).mean() for o in (order, slice(None))]
     assert steps[0] < 0.3 * steps[1]

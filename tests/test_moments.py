@@ -17,6 +17,7 @@ from symrefine.moments.moments import (
     exponents,
     monomials,
     raw_moments,
+    raw_moments_of_parts,
     recentred,
     shape_moments,
     tensor_index,
@@ -90,10 +91,24 @@ def test_raw_moments_are_the_sum_over_points(dim, order, count):
     assert (np.abs(raw_moments(points, weights, order) - exact) / bound).max() < 1e-13
 
 
-def test_monomials_are_rows_of_powers():
-    points, _ = cloud(2, 11, 3)
-    expected = np.prod(points[None] ** exponents(3, 5)[:, None], axis=2)
+@pytest.mark.parametrize("dim", [1, 2, 3, 5])
+def test_monomials_are_rows_of_powers(dim):
+    points, weights = cloud(2, 11, dim)
+    expected = np.prod(points[None] ** exponents(dim, 5)[:, None], axis=2)
     np.testing.assert_allclose(monomials(points, 5), expected, rtol=1e-14)
+    np.testing.assert_allclose(monomials(points, 5, times=weights), weights * expected, rtol=1e-13)
+
+
+@pytest.mark.parametrize("width", [50, BLOCK])
+def test_the_moments_of_parts_are_those_of_each_alone(width):
+    """Of parts that share a block, fill some, and are empty."""
+    ends = [0, 10, 10, 700, 700 + BLOCK // 2, 2000 + 3 * BLOCK, 2001 + 3 * BLOCK]
+    points, weights = cloud(6, ends[-1], 3)
+    found = raw_moments_of_parts(points, weights, 6, ends, width=width)
+    for moments, start, end in zip(found, ends[:-1], ends[1:], strict=True):
+        alone = raw_moments(points[start:end], weights[start:end], 6)
+        bound = brute(np.abs(points[start:end]), weights[start:end], 6) + 1e-300
+        assert (np.abs(moments - alone) / bound).max() < 1e-13
 
 
 # Centre and unit

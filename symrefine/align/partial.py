@@ -127,9 +127,10 @@ def partial_meeting(evidence: Evidence, *, reflections: bool, factor: float = 1.
     best = max(admitted, key=lambda m: m.score)
     found = judge.closed(judge.polished_all(found, judge.mirrored(best)), best)
     best = max((m for m in found if reflections or m.determinant > 0), key=lambda m: m.score)
-    rivals = sorted((m for m in found if m is not best), key=lambda m: -m.score)
+    first, (best, slid) = best, judge.slid(best)
+    rivals = [m for m in found if m is not first and not judge.same(m.motion, best.motion)]
     open_ = source.openings.evident or target.openings.evident
-    return _weighed(best, rivals, judge.slid(best), reflections=reflections, open_=open_)
+    return _weighed(best, sorted(rivals, key=lambda m: -m.score), slid, reflections=reflections, open_=open_)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -229,8 +230,19 @@ class Judge:
             found.append(merit.score + SIGNIFICANT * merit.sigma(len(misses)))
         return max(found)
 
-    def slid(self, met: Met) -> float:
-        """The best score, at most, of a map that slides or turns to either side in the way that is known worst.
+    def slid(self, met: Met) -> tuple[Met, float]:
+        """A map, or what it leads to where it does better slid aside; and the best score, at most, slid from there.
+
+        The polish ends where too few of the local planes tell it to go on along a ridge.
+        """
+        while True:
+            aside, most = self._aside(met)
+            if most <= met.score or (further := self.polished(aside)).score <= met.score:
+                return met, most
+            met = further
+
+    def _aside(self, met: Met) -> tuple[Similarity, float]:
+        """A map slid or turned in the way that is known worst, to the better side, and its score, at most.
 
         What it may reach where that leaves less doubt than is worth telling.
         """
@@ -239,8 +251,10 @@ class Judge:
         travel = np.linalg.norm(met.motion.moved(SMALL * worst).apply(points) - met.motion.apply(points), axis=1).mean()
         step = SMALL * APART[1] * self.diagonal / travel * worst
         moved = [met.motion.moved(x) for x in (step, -step)]
-        most = max(self.within_reach(m) for m in moved)
-        return most if ahead(met.score, [most]) > 1.0 - LEAST else max(self._score(m) for m in moved)
+        scores = [self.within_reach(m) for m in moved]
+        if ahead(met.score, scores) <= 1.0 - LEAST:
+            scores = [self._score(m) for m in moved]
+        return max(zip(moved, scores, strict=True), key=lambda pair: pair[1])
 
     def _score(self, motion: Similarity) -> float:
         there, back = (self.source, self.target, motion), (self.target, self.source, motion.inverse)
