@@ -45,9 +45,14 @@ def rows(names: Sequence[str], seeds: int) -> Iterator[tuple[str, str, str, floa
     for name, motion, seed, method in product(names, RANDOM, range(seeds), METHODS):
         case = Case(name=name, motion=motion, method=method, seed=seed)
         pair = given(case)
-        work = estimator(case, pair)
-        found = work()
-        matrix = found.matrix if isinstance(found, Alignment) else found
+        estimate = estimator(case, pair)
+
+        def work(estimate: Callable[[], object] = estimate) -> object:
+            """What a user asks for: whether the map is to be relied upon, too."""
+            found = estimate()
+            return (found.matrix, found.status, found.confidence)[0] if isinstance(found, Alignment) else found
+
+        matrix = work()
         error, det = error_deg(name, matrix, pair.truth), np.linalg.det(matrix) * np.linalg.det(pair.truth) > 0
         yield name, motion, method, error, bool(det), best_of(work)
 
@@ -68,7 +73,8 @@ def beside_open3d(seeds: int) -> Iterator[Metric]:
     print(f"    all pairs: align {np.median(theirs / seconds):.1f} times as fast as Open3D in the median")
     yield Metric(key="align independent samples, worst", value=float(error.max()), unit="degrees", target=0.5)
     ratio = float(np.median(seconds / theirs))
-    yield Metric(key="align over Open3D, processor time", value=ratio, unit="ratio", target=0.1)
+    yield Metric(key="align over Open3D, processor time", value=ratio, unit="ratio", target=0.025)
+    yield Metric(key="align whole, processor time", value=1e3 * float(np.median(seconds)), unit="ms", target=15.0)
 
 
 def _columns(

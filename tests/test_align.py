@@ -949,24 +949,25 @@ def test_consensus_of_too_few_matches_is_none(count: int) -> None:
     assert consensus(Matches(source=points, source_normals=normals, target=points, target_normals=normals), 0.1) == []
 
 
-def test_maps_grown_together_are_those_grown_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_map_is_told_once_with_all_matches_that_agree_with_it() -> None:
     # Half of the matches are of a rotation, a third of a reflection, the others of nothing.
     rng = rng_of(91)
     points, normals = rng.standard_normal((90, 3)), unit(rng.standard_normal((90, 3)))
     target, there = rng.standard_normal((90, 3)), unit(rng.standard_normal((90, 3)))
-    for some, det in ((slice(0, 45), 1), (slice(45, 75), -1)):
-        matrix = random_orthogonal(rng, det=det)
+    true = [(slice(0, 45), random_orthogonal(rng, det=1)), (slice(45, 75), random_orthogonal(rng, det=-1))]
+    for some, matrix in true:
         target[some], there[some] = points[some] @ matrix.T + 0.3, normals[some] @ matrix.T
-    matches = Matches(source=points, source_normals=normals, target=target, target_normals=there)
-    found = []
-    for together in (1, 8, 90):
-        monkeypatch.setattr("symrefine.propose.consensus.TOGETHER", together)
-        found.append(consensus(matches, 0.1))
-    assert [p.support for p in found[0]][:2] == [45, 30]
-    for other in found[1:]:
-        assert [p.support for p in other] == [p.support for p in found[0]]
-        for one, two in zip(found[0], other, strict=True):
-            np.testing.assert_allclose(one.matrix, two.matrix, atol=1e-9)
+    within = 0.1
+    found = consensus(Matches(source=points, source_normals=normals, target=target, target_normals=there), within)
+    for map_, (some, matrix) in zip(found[:2], true, strict=True):
+        np.testing.assert_allclose(map_.matrix, matrix, atol=1e-9)
+        assert map_.support == some.stop - some.start
+    for map_ in found:
+        near = np.linalg.norm(points @ map_.matrix.T + map_.shift - target, axis=1) < within
+        facing = np.abs(np.einsum("ij,ij->i", normals @ map_.matrix.T, there)) > 0.7
+        assert map_.support == (near & facing).sum()
+    maps = [np.append(p.matrix.ravel(), p.shift) for p in found]
+    assert all(np.linalg.norm(a - b) > within for i, a in enumerate(maps) for b in maps[:i])
 
 
 def test_signatures_do_not_know_pose_hand_or_signs() -> None:

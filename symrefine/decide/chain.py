@@ -16,8 +16,9 @@ from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted, h
 from symrefine.decide.looks import COARSE, START_ERROR, exact_need, glances, looked_at
 from symrefine.decide.place import SUPPORTED
 from symrefine.decide.pool import ALIKE, Pool, is_at, is_same
-from symrefine.decide.posterior import ALONE, EVEN, certain
+from symrefine.decide.posterior import ALONE, EVEN, LEAST, Link, certain, meant
 from symrefine.fit.placed import Placed, joined
+from symrefine.geometry import Isometry
 from symrefine.groups import PointGroup
 from symrefine.propose.candidates import (
     Evidence,
@@ -41,6 +42,8 @@ HOPELESS, HOPELESS_VOTES = 0.5 * START_ERROR / LIMITS[0], 0.5 * AGREE_RAD / LIMI
 KEPT = 2.0 / 3.0
 # Mirrors or axes of a group from which on a hole often lies on one of them by chance, and its border is kept by that.
 PLACES = 3
+# Places of a surface that tell where else a hole may be, and local planes that tell its border there.
+AROUND = (50, 1000)
 # Share of a surface that a border encloses at most which is too short to be evident: of a ball that is 3 %, by the
 # isoperimetric inequality, and four times that where half of the border was seen.
 ENCLOSED = 0.12
@@ -75,10 +78,14 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     # What may not be open at all is missing a part only where that explains more, and no more than so short a border
     # may enclose.
     hidden = max((e.coverage.unseen for e in part.largest.elements), default=0.0)
+    ends = ends and not (more and _kept_anywhere(surface, whole.largest, hidden))
     missing = (evident or (more and hidden <= ENCLOSED)) and not ends
     if missing or _places(whole.largest, part.largest) >= PLACES:
         return replace(part, at_least=True)
-    whole = replace(whole, at_least=evident or (more and not ends))
+    # What a border hides may be why a larger group is in doubt.
+    doubted = (h for h in (part.largest, *part.small) if _size(h.placed) > _size(whole.largest.placed))
+    hides = not ends and any(meant(Link(need=h.need), surface.tolerance) > LEAST for h in doubted)
+    whole = replace(whole, at_least=evident or hides)
     if not more:
         return whole
     # To believe that what ends so evenly is missing a part takes as much as to believe in as much as was seen.
@@ -96,9 +103,28 @@ def _ends_there(surface: Surface, found: Hypothesis) -> bool:
     if surface.openings is None or surface.viewed:
         return False
     line, cloud = surface.openings.line, surface.cloud
-    motions = [m for e in found.elements for m in e.operations.motions(e.center)]
-    near = [cloud.nearest(m.apply(cloud.points[line]), cloud.classes(np.flatnonzero(line)))[1] for m in motions]
+    near = [cloud.nearest(m.apply(cloud.points[line]), cloud.classes(np.flatnonzero(line)))[1] for m in _motions(found)]
     return bool(near) and float(np.median([surface.openings.border[n].mean() for n in near])) > KEPT
+
+
+def _motions(found: Hypothesis) -> list[Isometry]:
+    return [m for e in found.elements for m in e.operations.motions(e.center)]
+
+
+def _kept_anywhere(surface: Surface, found: Hypothesis, share: float) -> bool:
+    """Whether a group would often keep the border of a hole of such a share of the surface, wherever that is.
+
+    So does the mirror that lies in a plate: what it says of one border is chance.
+    """
+    some = surface.cloud.points[:: max(1, len(surface.cloud.points) // AROUND[1])]
+    places, width = some[:: max(1, len(some) // AROUND[0])], 2.0 * float(np.median(surface.cloud.reach))
+    away = np.linalg.norm(some - places[:, None], axis=2)
+    radii = np.quantile(away, share, axis=1, keepdims=True)
+    border, kept = np.abs(away - radii) < width, []
+    for motion in _motions(found):
+        there = np.abs(np.linalg.norm(motion.apply(some) - places[:, None], axis=2) - radii) < width
+        kept.append((border & there).sum(axis=1) > KEPT * border.sum(axis=1))
+    return bool(kept) and float(np.mean(np.median(kept, axis=0))) * PLACES > 1.0
 
 
 def _places(seen: Hypothesis, found: Hypothesis) -> float:

@@ -22,8 +22,6 @@ Single = np.ndarray[tuple[int, ...], np.dtype[np.float32]]
 INVARIANT, HANDEDNESS = 0.3, 0.15
 # Maps that are grown from the best matches for each determinant, how many are told, and rounds that each takes.
 SEEDS, TOLD, ROUNDS = 20, 8, 3
-# Maps that are grown at once: the quickest of 4 to 20, with no say in which are found.
-TOGETHER = 8
 # Share of the most that a match has in common with a seed, from which on it belongs to it.
 COMMON = 0.3
 # Cosine of the largest angle between normals that agree, and of the angle between matrices that are one map.
@@ -92,8 +90,8 @@ def _grown(matches: Matches, common: Array, within: float, det: int) -> list[Pro
     score, left = common.sum(axis=1), SEEDS
     found: list[Proposal] = []
     while left > 0 and score.max() > 0.0:
-        # Some at once; those that turn out to agree with one before are no seeds of their own.
-        seeds = np.argsort(-score, kind="stable")[: min(TOGETHER, np.count_nonzero(score))]
+        # Many at once, which takes no longer; those that turn out to agree with one before are no seeds of their own.
+        seeds = np.argsort(-score, kind="stable")[: min(SEEDS, np.count_nonzero(score))]
         rows = common[seeds]
         inside = rows >= COMMON * rows.max(axis=1, keepdims=True)
         inside[np.arange(len(seeds)), seeds] = True
