@@ -97,7 +97,9 @@ def _choose(evidence: Evidence, reflections: bool, *, brief: bool = False) -> Ch
     rivals, unlike, spread = fitted[as_good(pair, fitted.matrices)], misfit(pair, fitted), covariance(pair, fitted)
     motion, excess, lead = Similarity(matrix=rivals.matrices[0], shift=np.zeros(3)), 0.0, math.inf
     if (len(rivals.costs) > 1 or unlike > MISFIT) and evidence.has_points:
-        motion, excess, lead = _judged(evidence, rivals, spread, brief=brief and unlike > MISFIT)
+        sure = _sure(evidence, motion, spread) if len(set(rivals.signs)) == 1 else None
+        judged = (*sure, lead) if sure else _judged(evidence, rivals, spread, brief=brief and unlike > MISFIT)
+        motion, excess, lead = judged
     return Choice(
         evidence=evidence, motion=motion, covariance=spread, exact=False, misfit=unlike, excess=excess, lead=lead
     )
@@ -114,6 +116,15 @@ def candidates(evidence: Evidence, determinants: tuple[int, ...]) -> Fits:
     scores = dict(zip((1, -1), landscape(evidence.source.moments, evidence.target.moments), strict=True))
     climbed = [hills(scores[d], d, count=RIVALS) for d in determinants]
     return best_fits(pair, np.concatenate([starts, *climbed]))
+
+
+def _sure(evidence: Evidence, start: Similarity, covariance: Array) -> tuple[Similarity, float] | None:
+    """The map that the moments favour, after the polish, and its excess at most; None where that leaves a doubt."""
+    if evidence.scale or few(evidence.source.shape, evidence.target.shape):
+        return None
+    done = polished(evidence, evidence.met, start, covariance)
+    most = evidence.excess_at_most(done, GOOD)
+    return (done.motion, most) if most <= GOOD else None
 
 
 def _judged(evidence: Evidence, rivals: Fits, covariance: Array, *, brief: bool) -> tuple[Similarity, float, float]:
