@@ -304,8 +304,8 @@ def tight_diagonal(points: Array) -> float:
     return best
 
 
-def span(points: Array) -> float:
-    """Distance between two points [N, 3] far apart: no more than their diameter, nor the diagonal of any box."""
+def least_diagonal(points: Array) -> float:
+    """Distance between two of points [N, 3] that lie far apart: no box around them has a shorter diagonal."""
     centred = points - points.mean(axis=0)
     end = points[np.einsum("ij,ij->i", centred, centred).argmax()]
     return float(np.sqrt(((points - end) ** 2).sum(axis=1).max()))

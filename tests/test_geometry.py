@@ -4,9 +4,10 @@ from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
+from scipy.spatial.distance import pdist
 
 from symrefine.errors import InputError
 from symrefine.geometry import (
@@ -16,6 +17,7 @@ from symrefine.geometry import (
     cross_matrix,
     frame_with_z,
     householder,
+    least_diagonal,
     line_angle_rad,
     random_orthogonal,
     read_only,
@@ -253,6 +255,17 @@ def test_tight_diagonal_moves_with_the_points_and_their_unit(size):
     turned = [tight_diagonal(1e3 * points @ random_orthogonal(rng, 3, d).T + 1e3) / 1e3 for d in (1, -1, 1, -1)]
     np.testing.assert_allclose(turned, once, rtol=0.02)
     assert tight_diagonal(rng.permutation(points)) == pytest.approx(once, rel=1e-9)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(1e-3, 1e3))
+def test_no_box_has_a_diagonal_less_than_the_least(seed, size):
+    """Two far points are half of the diameter apart or more, and the diameter is no more than any box's diagonal."""
+    rng = np.random.default_rng(seed)
+    points = size * rng.standard_normal((40, 3)) * rng.uniform(0.0, 1.0, 3) + size * rng.uniform(-5, 5, 3)
+    least, diameter = least_diagonal(points), float(pdist(points).max())
+    assert 0.5 * diameter <= least <= diameter * (1.0 + 1e-12)
+    assert diameter <= tight_diagonal(points) * (1.0 + 1e-9)
 
 
 def test_tight_diagonal_of_a_segment_and_of_a_disc():

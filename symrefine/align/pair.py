@@ -11,7 +11,7 @@ from symrefine.align.moment_fit import MomentPair
 from symrefine.align.polish import Polished, Similarity
 from symrefine.align.procrustes import Procrustes, procrustes
 from symrefine.detection.measure import SAMPLES, density_of
-from symrefine.geometry import Array, Isometry, span, tight_diagonal
+from symrefine.geometry import Array, Isometry, least_diagonal, tight_diagonal
 from symrefine.moments.moments import Moments, central_moments
 from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import ntuples
@@ -207,7 +207,7 @@ class Evidence:
         # A plane reaches as far as the points that it was fitted to; beyond, the point that is nearest counts.
         misses = np.where(contact.away < REACH * self.met.spacing, across, np.maximum(contact.away, across))
         most = math.inf
-        for size in (span, tight_diagonal):
+        for size in (least_diagonal, tight_diagonal):
             if most > enough:
                 most = float(needs(np.minimum(misses / size(self.moving.points), 1.0), np.empty(0))) / self.tolerance
         return most
