@@ -79,7 +79,7 @@ KIND_OF = {
         "align.sides": "ORDERS",
         "align.witnesses": "ASKED",
         "complete": "ROUND",
-        "decide.chain": "AROUND HOPELESS HOPELESS_VOTES LOOKED SINGLY",
+        "decide.chain": "HOLES HOPELESS HOPELESS_VOTES LOOKED RIMS SINGLY",
         "decide.hypotheses": "MOVED MOVED_EACH",
         "decide.looks": "GLANCE LOOK COARSE SHORT GLANCED ASIDE START_ERROR",
         "decide.posterior": "BEYOND",

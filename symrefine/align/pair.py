@@ -193,11 +193,13 @@ class Evidence:
         ways = [self.misses(motion), self.misses_back(motion)] if self.scale else [self.misses(motion)]
         return max(float(self.judge.needed(misses[None], [motion])[0]) for misses in ways) / self.tolerance
 
-    def excess_at_most(self, done: Polished, enough: float) -> float:
-        """What the excess after a polish is if nothing that the surfaces miss by is noise; infinite if it did not end.
+    def excess_without_noise(self, done: Polished, enough: float) -> float:
+        """The excess after a polish on `met`, of one size, if none of it is noise; infinite if the polish did not end.
 
         That is told from the planes of the target that the last of its steps met: the judge need not be made for it.
-        Where a size that is too small tells as little as is `enough`, that is told.
+        It is about the most that the judge tells (an eighth less where one side has a thin detail that the other has
+        not). At first the objects are taken to be as small as they may be; their sizes are asked for where that is not
+        `enough`.
         """
         if not done.converged:
             return math.inf
@@ -206,11 +208,12 @@ class Evidence:
         across = np.abs(np.einsum("ij,ij->i", off, contact.target.normals))
         # A plane reaches as far as the points that it was fitted to; beyond, the point that is nearest counts.
         misses = np.where(contact.away < REACH * self.met.spacing, across, np.maximum(contact.away, across))
-        most = math.inf
-        for size in (least_diagonal, tight_diagonal):
-            if most > enough:
-                most = float(needs(np.minimum(misses / size(self.moving.points), 1.0), np.empty(0))) / self.tolerance
-        return most
+        excess = math.inf
+        for diagonal in (least_diagonal, tight_diagonal):
+            if excess > enough:
+                size = min(diagonal(points) for points in (self.moving.points, contact.target.points))
+                excess = float(needs(np.minimum(misses / size, 1.0), np.empty(0))) / self.tolerance
+        return excess
 
     def cleaned(self) -> "Evidence | None":
         """The same without points that belong to no surface; None where there are none."""

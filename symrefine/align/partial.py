@@ -18,6 +18,7 @@ from symrefine.align.shown import Shown
 from symrefine.decide.maps import Merit, ahead, as_good, fits, said_by_both, score, well_met
 from symrefine.decide.posterior import LEAST
 from symrefine.fit.matching import AGREE
+from symrefine.fit.refine import MAX_OUTER
 from symrefine.geometry import Array, Isometry, Mask, householder, tight_diagonal
 from symrefine.groups.orthogonal import chord_angles
 from symrefine.ntuples.rank import SIGNIFICANT
@@ -127,8 +128,9 @@ def partial_meeting(evidence: Evidence, *, reflections: bool, factor: float = 1.
     best = max(admitted, key=lambda m: m.score)
     found = judge.closed(judge.polished_all(found, judge.mirrored(best)), best)
     best = max((m for m in found if reflections or m.determinant > 0), key=lambda m: m.score)
-    first, (best, slid) = best, judge.slid(best)
-    rivals = [m for m in found if m is not first and not judge.same(m.motion, best.motion)]
+    ridge = best
+    best, slid = judge.uphill(ridge)
+    rivals = [m for m in found if m is not ridge and not judge.same(m.motion, best.motion)]  # what leads to it is none
     open_ = source.openings.evident or target.openings.evident
     return _weighed(best, sorted(rivals, key=lambda m: -m.score), slid, reflections=reflections, open_=open_)
 
@@ -230,21 +232,22 @@ class Judge:
             found.append(merit.score + SIGNIFICANT * merit.sigma(len(misses)))
         return max(found)
 
-    def slid(self, met: Met) -> tuple[Met, float]:
+    def uphill(self, met: Met) -> tuple[Met, float]:
         """A map, or what it leads to where it does better slid aside; and the best score, at most, slid from there.
 
         The polish ends where too few of the local planes tell it to go on along a ridge.
         """
-        while True:
-            aside, most = self._aside(met)
-            if most <= met.score or (further := self.polished(aside)).score <= met.score:
-                return met, most
+        for _ in range(MAX_OUTER):
+            aside, slid = self._aside(met)
+            if slid <= met.score or (further := self.polished(aside)).score <= met.score:
+                break
             met = further
+        return met, slid
 
     def _aside(self, met: Met) -> tuple[Similarity, float]:
         """A map slid or turned in the way that is known worst, to the better side, and its score, at most.
 
-        What it may reach where that leaves less doubt than is worth telling.
+        The score is the bound `within_reach` where that leaves less doubt than is worth telling.
         """
         worst = np.linalg.eigh(met.covariance)[1][:, -1]
         points = self.source.moving.points

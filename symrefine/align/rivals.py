@@ -119,12 +119,12 @@ def candidates(evidence: Evidence, determinants: tuple[int, ...]) -> Fits:
 
 
 def _sure(evidence: Evidence, start: Similarity, covariance: Array) -> tuple[Similarity, float] | None:
-    """The map that the moments favour, after the polish, and its excess at most; None where that leaves a doubt."""
+    """The map that the moments favour, after the polish, and its excess without noise; None if that leaves a doubt."""
     if evidence.scale or few(evidence.source.shape, evidence.target.shape):
         return None
     done = polished(evidence, evidence.met, start, covariance)
-    most = evidence.excess_at_most(done, GOOD)
-    return (done.motion, most) if most <= GOOD else None
+    excess = evidence.excess_without_noise(done, GOOD)
+    return (done.motion, excess) if excess <= GOOD else None
 
 
 def _judged(evidence: Evidence, rivals: Fits, covariance: Array, *, brief: bool) -> tuple[Similarity, float, float]:

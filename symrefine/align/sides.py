@@ -6,11 +6,12 @@ from symrefine.align.alignment import OK
 from symrefine.align.moment_fit import ROUNDING
 from symrefine.align.pair import Side, shares
 from symrefine.decide.doubts import FLAT
-from symrefine.detection.measure import class_moments
+from symrefine.detection.measure import SAMPLES, class_moments
 from symrefine.geometry import Array
 from symrefine.moments.moments import Moments, central_moments, deviations, tensor_index
 from symrefine.moments.quadrature import mesh_nodes
 from symrefine.shape import Shape
+from symrefine.surface.skin import drawn
 
 # Highest order of the moments in so many dimensions: some 100 to 500 moments, of n^order components.
 ORDERS = {1: 8, 2: 8, 3: 8, 4: 5, 5: 5, 6: 5, 7: 3, 8: 3, 9: 3, 10: 3}
@@ -28,6 +29,41 @@ def side_of(shape: Shape, parts: int) -> Side:
         moments=class_moments(shape, shape.labels, parts, ORDERS[shape.dim]),
         weights=shares(shape, np.ones(len(shape.points)) if shape.weights is None else shape.weights),
     )
+
+
+def looked_at(source: Shape, target: Shape, seed: int) -> tuple[Shape, Shape]:
+    """Some of the points of large clouds in 3-space: a polish on the points makes up for what moments lose by that.
+
+    All of those that may be the same points in another pose, which their spreads tell, and of flat sets.
+    """
+    if source.dim != 3 or not any(_is_large(s) for s in (source, target)):
+        return source, target
+    spreads = [_spread(s) for s in (source, target) if s.faces is None]
+    alike = len(spreads) == 2 and np.abs(spreads[0] - spreads[1]).max() < ROUNDING
+    if (alike and len(source.points) == len(target.points)) or min((s[0] for s in spreads), default=0.0) <= FLAT:
+        return source, target
+    return _some(source, seed), _some(target, seed)
+
+
+def _spread(cloud: Shape) -> Array:
+    """Variances [n] of the points along their principal axes, ascending, as shares of all."""
+    weights = np.ones(len(cloud.points)) if cloud.weights is None else cloud.weights
+    local = cloud.points - cloud.points[0]
+    local -= weights @ local / weights.sum()
+    values = np.linalg.eigvalsh((local * weights[:, None]).T @ local)
+    return np.asarray(values / max(float(values.sum()), 1e-300))
+
+
+def _some(shape: Shape, seed: int) -> Shape:
+    """Of a large cloud as many points as a surface is known by; others, and meshes, as they are."""
+    if not _is_large(shape):
+        return shape
+    return shape.chosen(drawn(len(shape.points), SAMPLES, np.random.default_rng(seed)))
+
+
+def _is_large(shape: Shape) -> bool:
+    """Whether it is a cloud without weights, of more points than a surface is known by."""
+    return shape.faces is None and shape.weights is None and len(shape.points) > SAMPLES
 
 
 def rank_of(moments: Moments) -> int:

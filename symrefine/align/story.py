@@ -17,7 +17,7 @@ from symrefine.align.alignment import OK, OPEN, Alignment, Nearness, Verdict
 from symrefine.align.coset import Coset, coset_of_group, coset_of_list, coset_of_maps, lifted
 from symrefine.align.kinds import nearest_both_ways, with_one_set_of_classes
 from symrefine.align.landscape import least_misfit
-from symrefine.align.moment_fit import MISFIT, ROUNDING
+from symrefine.align.moment_fit import MISFIT
 from symrefine.align.pair import Evidence, Side, few
 from symrefine.align.partial import Meeting, partial_meeting
 from symrefine.align.polish import Polished, Similarity
@@ -26,6 +26,7 @@ from symrefine.align.scaled import Size, size_of_parts
 from symrefine.align.sides import (
     ORDERS,
     differ_in_size,
+    looked_at,
     rank_of,
     same_size,
     side_of,
@@ -35,10 +36,9 @@ from symrefine.align.sides import (
 )
 from symrefine.align.span import span_fit
 from symrefine.clock import Clock
-from symrefine.decide.doubts import FLAT
 from symrefine.decide.maps import SURE
 from symrefine.decide.posterior import Link, certain, meant
-from symrefine.detection.measure import PARTS, SAMPLES
+from symrefine.detection.measure import PARTS
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, check_tolerance, cross_matrix
@@ -47,7 +47,6 @@ from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
 from symrefine.plane import detect_planar
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
-from symrefine.surface.skin import drawn
 from symrefine.threads import one_thread
 
 __all__ = ["Alignment", "align"]
@@ -70,7 +69,7 @@ def align(
         source: a `Shape`, or points [N, n]. Labels count where both have them: only what is of one class meets.
         target: a `Shape`, or points [M, n].
         scale: whether the objects may differ in size; then `target ~ scale * matrix @ source + translation`.
-        polish: refine on the points (3-space only); without it the moments have the last word, in half of the time.
+        polish: refine on the points (3-space only); without it the moments have the last word.
         allow_reflection: whether determinant -1 is an answer.
         tolerance: largest miss that still counts as agreement, as in `detect`: decides between rivals, and symmetry.
         seed: of the random choices (samples of meshes, subsets of clouds).
@@ -84,7 +83,7 @@ def align(
     a, b = with_one_set_of_classes(a, b)
     clock = Clock()
     with clock("moments"):
-        a, b = _looked_at(a, b, seed) if polish else (a, b)
+        a, b = looked_at(a, b, seed) if polish else (a, b)
         parts = 0 if few(a, b) else PARTS
         sides = side_of(a, parts), side_of(b, parts)
     ranks = [rank_of(s.moments) for s in sides]
@@ -103,41 +102,6 @@ def align(
 
 def _shape(values: Shape | ArrayLike, name: str) -> Shape:
     return values if isinstance(values, Shape) else Shape(points=np.asarray(values), source=name)
-
-
-def _looked_at(source: Shape, target: Shape, seed: int) -> tuple[Shape, Shape]:
-    """Some of the points of large clouds in 3-space: a polish on the points makes up for what moments lose by that.
-
-    All of those that may be the same points in another pose, which their spreads tell, and of flat sets.
-    """
-    if source.dim != 3 or not any(_is_large(s) for s in (source, target)):
-        return source, target
-    spreads = [_spread(s) for s in (source, target) if s.faces is None]
-    alike = len(spreads) == 2 and np.abs(spreads[0] - spreads[1]).max() < ROUNDING
-    if (alike and len(source.points) == len(target.points)) or min((s[0] for s in spreads), default=0.0) <= FLAT:
-        return source, target
-    return _some(source, seed), _some(target, seed)
-
-
-def _spread(cloud: Shape) -> Array:
-    """Variances [n] of the points along their principal axes, ascending, as shares of all."""
-    weights = np.ones(len(cloud.points)) if cloud.weights is None else cloud.weights
-    local = cloud.points - cloud.points[0]
-    local -= weights @ local / weights.sum()
-    values = np.linalg.eigvalsh((local * weights[:, None]).T @ local)
-    return np.asarray(values / max(float(values.sum()), 1e-300))
-
-
-def _some(shape: Shape, seed: int) -> Shape:
-    """Of a large cloud as many points as a surface is known by; others, and meshes, as they are."""
-    if not _is_large(shape):
-        return shape
-    return shape.chosen(drawn(len(shape.points), SAMPLES, np.random.default_rng(seed)))
-
-
-def _is_large(shape: Shape) -> bool:
-    """Whether it is a cloud without weights, of more points than a surface is known by."""
-    return shape.faces is None and shape.weights is None and len(shape.points) > SAMPLES
 
 
 def _check(source: Shape, target: Shape, tolerance: float) -> None:
@@ -196,7 +160,9 @@ def _align_solid(
         if part is not None and part.confidence >= max(likely, SURE):
             return part
     evidence = whole
-    known = excess if surfaces and agree else None
+    # Copies of another size have the same moments at one size, which says nothing of how they miss as they are.
+    exact = choice.exact and (scale or same_size(whole.source, whole.target))
+    known = excess if surfaces and agree and exact == choice.exact else None
     matrix, translation, factor = _in_input_units(evidence, motion, scale)
 
     def coset() -> Coset:
@@ -210,7 +176,7 @@ def _align_solid(
         scale_sigma=factor * scale_sigma if scale else 0.0,
         sigma_rad=float(np.sqrt(np.trace(covariance[:3, :3]))),
         covariance=_of_transform(covariance, evidence, matrix, factor),
-        exact=choice.exact and (scale or same_size(evidence.source, evidence.target)),
+        exact=exact,
         timings=clock.seconds,
         _coset=coset,
         _verdict=lambda: _verdict(choice, motion, scale, reflections, known),
@@ -219,12 +185,15 @@ def _align_solid(
 
 
 def _excess(choice: Choice, motion: Similarity, done: Polished | None, *, agree: bool) -> float:
-    """By how much surfaces exceed what they may differ by; at most, where they agree beyond doubt or not at all."""
+    """By how much surfaces exceed what they may differ by: as the polish has it, where that leaves no doubt.
+
+    Infinite, or what the polish has, where they were not found to agree before.
+    """
     if choice.exact:
         return 0.0
     enough = certain(1.0)
-    most = math.inf if done is None else choice.evidence.excess_at_most(done, enough)
-    return choice.evidence.excess(motion) if agree and most > enough else most
+    unforgiven = math.inf if done is None else choice.evidence.excess_without_noise(done, enough)
+    return choice.evidence.excess(motion) if agree and unforgiven > enough else unforgiven
 
 
 def _in_part(evidence: Evidence, reflections: bool, clock: Clock, *, scale: bool = False) -> Alignment | None:

@@ -18,7 +18,7 @@ from symrefine.decide.place import SUPPORTED
 from symrefine.decide.pool import ALIKE, Pool, is_at, is_same
 from symrefine.decide.posterior import ALONE, EVEN, LEAST, Link, certain, meant
 from symrefine.fit.placed import Placed, joined
-from symrefine.geometry import Isometry
+from symrefine.geometry import Array, Isometry
 from symrefine.groups import PointGroup
 from symrefine.propose.candidates import (
     Evidence,
@@ -42,8 +42,8 @@ HOPELESS, HOPELESS_VOTES = 0.5 * START_ERROR / LIMITS[0], 0.5 * AGREE_RAD / LIMI
 KEPT = 2.0 / 3.0
 # Mirrors or axes of a group from which on a hole often lies on one of them by chance, and its border is kept by that.
 PLACES = 3
-# Places of a surface that tell where else a hole may be, and local planes that tell its border there.
-AROUND = (50, 1000)
+# Places where a hole is tried, and local planes that tell its rim: a share of one in three is told to a fifteenth.
+HOLES, RIMS = 50, 1000
 # Share of a surface that a border encloses at most which is too short to be evident: of a ball that is 3 %, by the
 # isoperimetric inequality, and four times that where half of the border was seen.
 ENCLOSED = 0.12
@@ -78,7 +78,8 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     # What may not be open at all is missing a part only where that explains more, and no more than so short a border
     # may enclose.
     hidden = max((e.coverage.unseen for e in part.largest.elements), default=0.0)
-    ends = ends and not (more and _kept_anywhere(surface, whole.largest, hidden))
+    # A group that a single hole leaves may keep its border because it keeps the border of almost any.
+    ends = ends and not (more and _often_kept(surface, whole.largest, hidden))
     missing = (evident or (more and hidden <= ENCLOSED)) and not ends
     if missing or _places(whole.largest, part.largest) >= PLACES:
         return replace(part, at_least=True)
@@ -111,20 +112,24 @@ def _motions(found: Hypothesis) -> list[Isometry]:
     return [m for e in found.elements for m in e.operations.motions(e.center)]
 
 
-def _kept_anywhere(surface: Surface, found: Hypothesis, share: float) -> bool:
-    """Whether a group would often keep the border of a hole of such a share of the surface, wherever that is.
+def _often_kept(surface: Surface, found: Hypothesis, share: float) -> bool:
+    """Whether a group keeps the border of a hole of such a share of the surface in one place of so many or more.
 
-    So does the mirror that lies in a plate: what it says of one border is chance.
+    So does the mirror that lies in a plate, wherever the hole is: what it says of one border is chance.
     """
-    some = surface.cloud.points[:: max(1, len(surface.cloud.points) // AROUND[1])]
-    places, width = some[:: max(1, len(some) // AROUND[0])], 2.0 * float(np.median(surface.cloud.reach))
-    away = np.linalg.norm(some - places[:, None], axis=2)
-    radii = np.quantile(away, share, axis=1, keepdims=True)
-    border, kept = np.abs(away - radii) < width, []
-    for motion in _motions(found):
-        there = np.abs(np.linalg.norm(motion.apply(some) - places[:, None], axis=2) - radii) < width
-        kept.append((border & there).sum(axis=1) > KEPT * border.sum(axis=1))
-    return bool(kept) and float(np.mean(np.median(kept, axis=0))) * PLACES > 1.0
+    every = surface.cloud.points
+    some = every[:: -(-len(every) // RIMS)]
+    places, width = some[:: -(-len(some) // HOLES)], 2.0 * float(np.median(surface.cloud.reach))
+
+    def off(points: Array, radii: Array) -> Array:
+        """How far points [N, 3] are from spheres about the places, [P, N]."""
+        return np.abs(np.linalg.norm(points - places[:, None], axis=2) - radii)
+
+    radii = np.quantile(off(some, np.zeros((1, 1))), share, axis=1, keepdims=True)
+    border = off(some, radii) < width
+    count = np.maximum(border.sum(axis=1), 1)
+    kept = [(border & (off(m.apply(some), radii) < width)).sum(axis=1) / count for m in _motions(found)]
+    return bool(kept) and PLACES * float((np.median(kept, axis=0) > KEPT).mean()) > 1.0
 
 
 def _places(seen: Hypothesis, found: Hypothesis) -> float:

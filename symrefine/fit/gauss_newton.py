@@ -101,7 +101,7 @@ def minimise_all(
     longest: float = np.inf,
     least: float = 0.0,
 ) -> Solutions:
-    """`minimise` from K starts [K, ...] at once; each ends where it would alone.
+    """`minimise` from K starts [K, ...] at once; each ends where it would alone, or sooner with `least`.
 
     Args:
         linearise: at x [A, ...] of those [A] of the starts that have not converged.
@@ -110,7 +110,7 @@ def minimise_all(
         max_steps: evaluations after the first.
         tolerance: a start has converged once its step is shorter than this.
         longest: steps are cut to this length.
-        least: it has as well once its step is promised to lower the cost by less than this share.
+        least: it has as well once a step that it took was promised to lower the cost by less than this share.
     """
     x, first = np.array(starts, dtype=np.float64), linearise(starts, np.arange(len(starts)))
     costs, gradients, hessians = first.costs.copy(), first.gradients.copy(), first.hessians.copy()
@@ -123,7 +123,7 @@ def minimise_all(
         step = _steps(gradients[active], hessians[active], damping[active])
         length, gain = np.linalg.norm(step, axis=1), -np.einsum("ki,ki->k", gradients[active], step)
         step *= np.minimum(1.0, longest / np.maximum(length, 1e-300))[:, None]
-        trial, small = move(x[active], step), (length < tolerance) | (gain < least * costs[active])
+        trial, worth = move(x[active], step), gain >= least * costs[active]
         there = linearise(trial, active)
         better = there.costs <= costs[active]
         taken = active[better]
@@ -131,7 +131,9 @@ def minimise_all(
         gradients[taken], hessians[taken] = there.gradients[better], there.hessians[better]
         steps[taken] += 1
         damping[active] = _next_damping(damping[active], better)
-        converged[active] = small | (np.trace(hessians[active], axis1=1, axis2=2) <= 0.0)
+        converged[active] = (
+            (length < tolerance) | (better & ~worth) | (np.trace(hessians[active], axis1=1, axis2=2) <= 0.0)
+        )
     return Solutions(x=x, costs=costs, hessians=hessians, steps=steps, converged=converged)
 
 

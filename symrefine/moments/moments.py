@@ -107,13 +107,13 @@ def raw_moments_of_parts(
 ) -> Array:
     """Raw moments [P, K] of points [N, n] that stand part by part: where each begins, and where the last ends [P + 1].
 
-    `width` is how many points are added up in one product.
+    `width` is how many points are added up in one product, at most a block of them.
     """
     a, b, lead = _split(points.shape[1], order)
     totals = np.zeros((len(ends) - 1, a.max() + 1, b.max() + 1))
     # One place for all blocks: memory that is asked for anew comes page by page, which takes longer than the sums.
     room = [np.empty((min(BLOCK, len(points)), count)) for count in totals.shape[1:]]
-    for pieces in _blocks(ends, width):
+    for pieces in _blocks(ends, min(width, BLOCK)):
         start, end = pieces[0][1].start, pieces[-1][1].stop
         block, (left, right) = points[start:end], (whole[: end - start].reshape(-1, end - start) for whole in room)
         left = monomials(block[:, :lead], order, left, times=weights[start:end])

@@ -89,14 +89,16 @@ def _grown(matches: Matches, common: Array, within: float, det: int) -> list[Pro
     """Maps of one determinant, each from a match and those that have most in common [N, N] with it."""
     score, left = common.sum(axis=1), SEEDS
     found: list[Proposal] = []
-    while left > 0 and score.max() > 0.0:
+    while left and score.any():
         # Many at once, which takes no longer; those that turn out to agree with one before are no seeds of their own.
         seeds = np.argsort(-score, kind="stable")[: min(SEEDS, np.count_nonzero(score))]
         rows = common[seeds]
         inside = rows >= COMMON * rows.max(axis=1, keepdims=True)
         inside[np.arange(len(seeds)), seeds] = True
         for seed, matrix, shift, agreeing in zip(seeds, *_settled(matches, inside, within, det), strict=True):
-            if score[seed] == 0.0 or left == 0:
+            if not left:
+                break
+            if score[seed] == 0.0:
                 continue
             score[agreeing], score[seed], left = 0.0, 0.0, left - 1
             map_ = Proposal(matrix=matrix, shift=shift, support=int(agreeing.sum()))
