@@ -60,14 +60,17 @@ class MomentPair:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Fits:
-    """Orthogonal matrices [K, n, n] by rising cost [K], with their Gauss-Newton matrices [K, A, A]."""
+    """Orthogonal matrices R [K, n, n] by rising cost [K], their Gauss-Newton matrices [K, A, A], and D(R) a [K, C]."""
 
     matrices: Array
     costs: Array
     hessians: Array
+    moved: Array
 
     def __getitem__(self, index: slice | NDArray[Any] | Sequence[int]) -> "Fits":
-        return Fits(matrices=self.matrices[index], costs=self.costs[index], hessians=self.hessians[index])
+        parts = (self.matrices, self.costs, self.hessians, self.moved)
+        matrices, costs, hessians, moved = (part[index] for part in parts)
+        return Fits(matrices=matrices, costs=costs, hessians=hessians, moved=moved)
 
     @property
     def signs(self) -> Array:
@@ -98,8 +101,8 @@ def fit(pair: MomentPair, starts: Array) -> Fits:
         longest=LONGEST,
         least=WITHIN_NOISE**2 * len(planes(starts.shape[1])) / pair.size,
     )
-    order = np.argsort(found.costs, kind="stable")
-    return Fits(matrices=orthogonal_factor(found.x), costs=found.costs, hessians=found.hessians)[order]
+    order, matrices = np.argsort(found.costs, kind="stable"), orthogonal_factor(found.x)
+    return Fits(matrices=matrices, costs=found.costs, hessians=found.hessians, moved=pair.moved(matrices))[order]
 
 
 def best_fits(pair: MomentPair, starts: Array) -> Fits:
@@ -112,23 +115,23 @@ def best_fits(pair: MomentPair, starts: Array) -> Fits:
     return fits[kept]
 
 
-def as_good(pair: MomentPair, matrices: Array) -> NDArray[np.bool_]:
-    """Which of the matrices [K, n, n] sampling noise cannot tell from the first.
+def as_good(pair: MomentPair, fits: Fits) -> NDArray[np.bool_]:
+    """Which [K] of the fits sampling noise cannot tell from the first.
 
     With d = D(R) a - D(R') a the difference of the costs is linear in the residual r = D(R) a - b, namely
     `|d|^2 - 2 d.r`; its noise is that of 2 d.r. Unlike the costs themselves, whose many numbers err together, this
     tells chiral objects (3.6 standard deviations and more on 10,000 points) from mirror-symmetric ones (below 2.5).
     """
-    moved = pair.moved(matrices)
+    moved = fits.moved
     costs, directions = (moved - pair.target[0]) ** 2 @ pair.weights, pair.weights * (moved[0] - moved)
-    variances = np.diag(_jackknife(pair, matrices[:1], directions)) + FLOOR * (directions**2).sum(axis=1)
+    variances = np.diag(_jackknife(pair, fits.matrices[:1], directions)) + FLOOR * (directions**2).sum(axis=1)
     unlike = max(1.0, float(costs[0]) / pair.size)
     return np.asarray(costs - costs[0] <= 2.0 * SIGNIFICANT * np.sqrt(unlike * variances))
 
 
 def exact(pair: MomentPair, fits: Fits) -> Fits:
     """The fits after which every number agrees to rounding."""
-    return fits[np.abs(pair.moved(fits.matrices) - pair.target[0]).max(axis=1) < ROUNDING]
+    return fits[np.abs(fits.moved - pair.target[0]).max(axis=1) < ROUNDING]
 
 
 def misfit(pair: MomentPair, fits: Fits) -> float:
@@ -143,8 +146,8 @@ def covariance(pair: MomentPair, fits: Fits) -> Array:
     matrix is too small by up to a factor of fifty; re-fitting the replicates, by one step, is not.
     """
     matrix, inverse = fits.matrices[:1], np.linalg.pinv(fits.hessians[0], rcond=1e-12, hermitian=True)
-    moved = pair.action.tangents(pair.moved(matrix))[0] * pair.weights
-    return inverse @ _jackknife(pair, matrix, moved) @ inverse + max(1.0, misfit(pair, fits)) * inverse
+    tangents = pair.action.tangents(fits.moved[:1])[0] * pair.weights
+    return inverse @ _jackknife(pair, matrix, tangents) @ inverse + max(1.0, misfit(pair, fits)) * inverse
 
 
 def _jackknife(pair: MomentPair, matrix: Array, directions: Array) -> Array:

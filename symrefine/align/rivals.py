@@ -94,7 +94,7 @@ def _choose(evidence: Evidence, reflections: bool, *, brief: bool = False) -> Ch
         lead = 0.0 if same.signs.min() < same.signs.max() else math.inf
         none = np.zeros((3, 3))
         return Choice(evidence=evidence, motion=best, covariance=none, exact=True, misfit=0.0, excess=0.0, lead=lead)
-    rivals, unlike, spread = fitted[as_good(pair, fitted.matrices)], misfit(pair, fitted), covariance(pair, fitted)
+    rivals, unlike, spread = fitted[as_good(pair, fitted)], misfit(pair, fitted), covariance(pair, fitted)
     motion, excess, lead = Similarity(matrix=rivals.matrices[0], shift=np.zeros(3)), 0.0, math.inf
     if (len(rivals.costs) > 1 or unlike > MISFIT) and evidence.has_points:
         sure = _sure(evidence, motion, spread) if len(set(rivals.signs)) == 1 else None

@@ -57,7 +57,7 @@ def span_fit(source: Moments, target: Moments, tuples: tuple[NTuples, NTuples], 
     starts = np.stack(_starts(procrustes(*tuples), source_axes, axes))
     fits = best_fits(pair, starts[(np.linalg.det(axes @ starts) > 0.0) | reflections])
     same = exact(pair, fits)
-    good = same if len(same.costs) else fits[as_good(pair, fits.matrices)]
+    good = same if len(same.costs) else fits[as_good(pair, fits)]
     free = _free(pair, good, exact=bool(len(same.costs))) @ axes.T
     matrices = sorted(axes @ good.matrices, key=lambda m: -np.sign(np.linalg.det(m)))
     return SpanFit(
