@@ -876,6 +876,26 @@ def test_a_map_that_slides_aside_to_a_better_one_is_right() -> None:
     assert row.status == "ok"
 
 
+def test_the_same_points_miss_by_nothing_and_the_same_surface_by_little() -> None:
+    rng, body = rng_of(60), asymmetric()
+    points = sample(body, 4000, 0.002, rng)
+    matrix, other = random_orthogonal(rng, det=-1), Shape(points=rng.permutation(points))
+    for shape, mate in ((Shape(points=points), other), (body, body)):
+        found = align(shape, turned(mate, matrix, np.ones(3)))
+        assert found.exact
+        assert found.rms < 1e-12
+        assert found.overlap == (1.0, 1.0)
+    corners = body.points[body.faces]
+    middle = corners.mean(axis=1, keepdims=True)
+    fans = np.stack([np.stack([corners[:, i], corners[:, (i + 1) % 3], middle[:, 0]], axis=1) for i in range(3)])
+    finer = Shape(points=fans.reshape(-1, 3), faces=np.arange(fans.size // 3).reshape(-1, 3))
+    for source, target in ((body, finer), (finer, body)):
+        found = align(source, turned(target, matrix, np.ones(3)))
+        assert found.exact
+        assert found.rms < 0.005
+        assert min(found.overlap) > 0.97
+
+
 @pytest.mark.parametrize("factor", [1.05, 0.92])
 @pytest.mark.parametrize("is_mesh", [False, True])
 def test_a_copy_of_another_size_is_not_sure_to_agree(factor: float, is_mesh: bool) -> None:

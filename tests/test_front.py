@@ -12,6 +12,7 @@ from matplotlib import pyplot as plt
 
 import symrefine
 from symrefine.errors import InputError
+from symrefine.load.open3d import open3d
 
 mpl.use("Agg")
 jsonschema = pytest.importorskip("jsonschema")
@@ -43,8 +44,7 @@ def of_trimesh():
 
 
 def of_open3d():
-    pytest.importorskip("symrefine.load.open3d")
-    o3d = pytest.importorskip("open3d")
+    o3d = open3d()
     mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(CORNERS), o3d.utility.Vector3iVector(TRIANGLES))
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(POINTS))
     return [mesh, cloud, o3d.t.geometry.TriangleMesh.from_legacy(mesh), o3d.t.geometry.PointCloud.from_legacy(cloud)]

@@ -17,7 +17,7 @@ from symrefine.align.alignment import OK, OPEN, Alignment, Nearness, Verdict
 from symrefine.align.coset import Coset, coset_of_group, coset_of_list, coset_of_maps, lifted
 from symrefine.align.kinds import nearest_both_ways, with_one_set_of_classes
 from symrefine.align.landscape import least_misfit
-from symrefine.align.moment_fit import MISFIT
+from symrefine.align.moment_fit import MISFIT, ROUNDING
 from symrefine.align.pair import Evidence, Side, few
 from symrefine.align.partial import Meeting, partial_meeting
 from symrefine.align.polish import Polished, Similarity
@@ -284,10 +284,14 @@ def _verdict(choice: Choice, motion: Similarity, scale: bool, reflections: bool,
 def _nearness(choice: Choice, motion: Similarity, scale: bool) -> Nearness:
     """How near the map brings the objects in 3-space."""
     evidence = choice.evidence
-    if _sizes(choice, scale) != OK or not evidence.has_points:
+    surfaces = _sizes(choice, scale) == OK and evidence.has_points
+    if choice.exact or not surfaces:
         matrix, translation, factor = _in_input_units(evidence, motion, scale)
         shapes = evidence.source.shape, evidence.target.shape
-        return _nearest(*shapes, matrix, translation, factor, evidence.tolerance)
+        points = _nearest(*shapes, matrix, translation, factor, evidence.tolerance)
+        # The same points; of the same surface either side may have others, too.
+        if not surfaces or (points.rms < ROUNDING and points.overlap == (1.0, 1.0)):
+            return points
     misses, back, far = evidence.misses(motion), evidence.misses_back(motion), evidence.judge.far
     shares = float((misses <= far).mean()), float((back <= far).mean())
     return Nearness(rms=float(np.sqrt(np.mean(misses**2))), overlap=shares)
