@@ -36,8 +36,8 @@ class Verdict:
 
     Attributes:
         status: "ok", or why the result should not be relied upon.
-        excess: what the map misses by over what the tolerance, or the noise of the moments, allows, or more than that
-            where it is sure as well.
+        excess: what the map misses by over what the tolerance, or the noise of the moments, allows; where that is sure
+            even so, as if no miss were noise.
         determinant_confidence: probability that the determinant is right.
         hand_is_open: whether the other hand misses by about as much: right where the object is its own mirror image.
         confidence: probability that the map is, where it was not told from the excess.
@@ -137,7 +137,7 @@ class Alignment(ReadOnly):
     def rms(self) -> float:
         """Root mean square distance from the moved source to the target as a fraction of the target's diagonal.
 
-        In 3-space between denoised surfaces; elsewhere to the nearest point.
+        In 3-space between denoised surfaces; elsewhere, and of points that are the same, to the nearest point.
         """
         return self._near.rms
 
@@ -170,7 +170,7 @@ class Alignment(ReadOnly):
     def overlap(self) -> tuple[float, float]:
         """Share of the source that comes to lie on the target within the tolerance, and share of the target it meets.
 
-        In 3-space of the surface, elsewhere of the points.
+        In 3-space of the surface; elsewhere, and where the points are the same, of the points.
         """
         return self._near.overlap
 

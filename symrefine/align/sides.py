@@ -31,7 +31,7 @@ def side_of(shape: Shape, parts: int) -> Side:
     )
 
 
-def looked_at(source: Shape, target: Shape, seed: int) -> tuple[Shape, Shape]:
+def thinned(source: Shape, target: Shape, seed: int) -> tuple[Shape, Shape]:
     """Some of the points of large clouds in 3-space: a polish on the points makes up for what moments lose by that.
 
     All of those that may be the same points in another pose, which their spreads tell, and of flat sets.

@@ -26,11 +26,11 @@ from symrefine.align.scaled import Size, size_of_parts
 from symrefine.align.sides import (
     ORDERS,
     differ_in_size,
-    looked_at,
     rank_of,
     same_size,
     side_of,
     size_sigma,
+    thinned,
     told_sizes,
     within,
 )
@@ -83,7 +83,7 @@ def align(
     a, b = with_one_set_of_classes(a, b)
     clock = Clock()
     with clock("moments"):
-        a, b = looked_at(a, b, seed) if polish else (a, b)
+        a, b = thinned(a, b, seed) if polish else (a, b)
         parts = 0 if few(a, b) else PARTS
         sides = side_of(a, parts), side_of(b, parts)
     ranks = [rank_of(s.moments) for s in sides]

@@ -121,14 +121,14 @@ def _often_kept(surface: Surface, found: Hypothesis, share: float) -> bool:
     some = every[:: -(-len(every) // RIMS)]
     places, width = some[:: -(-len(some) // HOLES)], 2.0 * float(np.median(surface.cloud.reach))
 
-    def off(points: Array, radii: Array) -> Array:
-        """How far points [N, 3] are from spheres about the places, [P, N]."""
-        return np.abs(np.linalg.norm(points - places[:, None], axis=2) - radii)
+    def away(points: Array) -> Array:
+        """Distances [P, N] of points [N, 3] from the places."""
+        return np.asarray(np.linalg.norm(points - places[:, None], axis=2))
 
-    radii = np.quantile(off(some, np.zeros((1, 1))), share, axis=1, keepdims=True)
-    border = off(some, radii) < width
+    radii = np.quantile(away(some), share, axis=1, keepdims=True)
+    border = np.abs(away(some) - radii) < width
     count = np.maximum(border.sum(axis=1), 1)
-    kept = [(border & (off(m.apply(some), radii) < width)).sum(axis=1) / count for m in _motions(found)]
+    kept = [(border & (np.abs(away(m.apply(some)) - radii) < width)).sum(axis=1) / count for m in _motions(found)]
     return bool(kept) and PLACES * float((np.median(kept, axis=0) > KEPT).mean()) > 1.0
 
 

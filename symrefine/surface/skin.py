@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from symrefine.geometry import Array, Mask, ReadOnly, rows
 from symrefine.shape import Index
 from symrefine.surface.neighbourhoods import (
-    CELLS,
     NEIGHBOURS,
     PROBES,
     Neighbourhoods,
@@ -218,8 +217,9 @@ class Skin:
         Infinite where that point is not of the class [Q] of the query.
         """
         near: Index | None = None
-        if 1 < self.neighbours <= CELLS:  # what a plane is fitted to begins with the nearest point
-            away, near = self.tree.query(queries, self.neighbours)
+        # Where cells are the points themselves, what a plane is fitted to begins with the nearest of them.
+        if self.neighbours > 1 and self._neighbourhoods.tree is self.tree:
+            away, near = self.tree.query(queries, self._neighbourhoods.count)
             distance, nearest = away[:, 0], near[:, 0]
         else:
             distance, nearest = self.tree.nearest(queries)
