@@ -20,7 +20,7 @@ from symrefine.shape import Shape
 from symrefine.surface.misses import disc_distances, needs
 from symrefine.surface.neighbourhoods import NEIGHBOURS
 from symrefine.surface.sampling import Sampling, sampling
-from symrefine.surface.skin import FEW, LocalPlanes, Skin, isolated_points, make_skin
+from symrefine.surface.skin import FEW, LocalPlanes, Patches, Skin, isolated_points, make_skin
 from symrefine.surface.surface import Surface
 
 # Local planes of the source and of the target.
@@ -139,24 +139,24 @@ class Evidence:
         first, second = (s.skin(unit, samples, self._rng()) for s, unit in zip(sides, self._units, strict=True))
         return first, second
 
-    def _planes(self, index: int, count: int) -> LocalPlanes:
+    def _planes(self, index: int, count: int) -> Patches:
         side = (self.source, self.target)[index]
         if few(self.source.shape, self.target.shape):
             local = (side.shape.points - side.moments.center) / self._units[index]
             return isolated_points(local, side.shape.labels)
         skin = self._skins[index]
         pick = self._rng().choice(len(skin.points), min(count, len(skin.points)), replace=False)
-        return skin.local_planes(np.sort(pick))
+        return skin.patches(np.sort(pick))
 
     @cached_property
-    def moving(self) -> LocalPlanes:
+    def moving(self) -> Patches:
         """Local planes of the source, or its points where they stand for themselves."""
         return self._planes(0, SOURCE_PLANES)
 
     @cached_property
     def met(self) -> Skin | LocalPlanes:
         """The target, with planes wherever they are asked for."""
-        return self._planes(1, 0) if few(self.source.shape, self.target.shape) else self._skins[1]
+        return self._planes(1, 0).surface if few(self.source.shape, self.target.shape) else self._skins[1]
 
     @cached_property
     def judge(self) -> Surface:
@@ -165,9 +165,9 @@ class Evidence:
         Its noise is what sampling alone explains: each surface against itself, and what only one of the two blurs.
         Local planes merge the two faces of a thin sheet, or follow each, as the density of the points has it.
         """
-        target = self._planes(1, TARGET_PLANES)
+        target = self._planes(1, TARGET_PLANES).surface
         diagonal = tight_diagonal(target.points)
-        own = [disc_distances(s, s.points, s.labels, skip_self=True) for s in (self.moving, target)]
+        own = [disc_distances(s, s.points, s.labels, skip_self=True) for s in (self.moving.surface, target)]
         blurred = abs(float(self.moving.thickness.mean() - target.thickness.mean()))
         return Surface(cloud=target, diagonal=diagonal, noise=(np.concatenate(own) + blurred) / diagonal)
 
@@ -182,7 +182,8 @@ class Evidence:
     def misses_back(self, motion: Similarity) -> Array:
         """Distances from the target to the moved source, fractions of the diagonal."""
         cloud, size = self.judge.cloud, self.judge.diagonal
-        back = disc_distances(self.moving, motion.inverse.apply(cloud.points), cloud.labels, bound=size / motion.scale)
+        own, moved, bound = self.moving.surface, motion.inverse.apply(cloud.points), size / motion.scale
+        back = disc_distances(own, moved, cloud.labels, bound=bound)
         return motion.scale * back / size
 
     def excess(self, motion: Similarity) -> float:

@@ -70,6 +70,11 @@ class Met:
         return score(self.sides)
 
     @property
+    def is_promising(self) -> bool:
+        """Whether more speaks for it than against it."""
+        return self.score > 0.0
+
+    @property
     def determinant(self) -> int:
         """+1 or -1."""
         return int(np.sign(np.linalg.det(self.motion.matrix)))
@@ -121,13 +126,17 @@ def partial_meeting(evidence: Evidence, *, reflections: bool, factor: float = 1.
         tolerance=evidence.tolerance,
     )
     promising = judge.promising(maps_between(source.cloud, target.cloud, judge.diagonal))
-    found = judge.polished_all([], [Similarity(matrix=p.matrix, shift=p.shift) for p in promising])
+    starts = [Similarity(matrix=p.matrix, shift=p.shift) for p in promising]
+    found = judge.polished_all([], starts)
+    if not any(m.is_promising for m in found):
+        found = judge.polished_all([], starts, patient=True)
     admitted = [m for m in found if reflections or m.determinant > 0]
     if not admitted:
         return None
     best = max(admitted, key=lambda m: m.score)
-    found = judge.closed(judge.polished_all(found, judge.mirrored(best)), best)
-    best = max((m for m in found if reflections or m.determinant > 0), key=lambda m: m.score)
+    if best.is_promising:
+        found = judge.closed(judge.polished_all(found, judge.mirrored(best)), best)
+        best = max((m for m in found if reflections or m.determinant > 0), key=lambda m: m.score)
     ridge = best
     best, slid = judge.uphill(ridge)
     rivals = [m for m in found if m is not ridge and not judge.same(m.motion, best.motion)]  # what leads to it is none
@@ -194,9 +203,11 @@ class Judge:
         """A map after the polish, judged from both sides."""
         return self._judged(self._polish(start))
 
-    def _polish(self, start: Similarity) -> Polished:
-        known = np.zeros((6, 6))
-        return polish(self.source.moving, self.target.cloud, start, error=WITHIN * self.diagonal, known=known)
+    def _polish(self, start: Similarity, *, patient: bool = True) -> Polished:
+        """A map after the polish, which is given up early where nothing comes of it, unless one is `patient`."""
+        error, known, worth = WITHIN * self.diagonal, np.zeros((6, 6)), lambda m: self.within_reach(m) > 0.0
+        asked = None if patient else worth
+        return polish(self.source.moving, self.target.cloud, start, error=error, known=known, worthwhile=asked)
 
     def _judged(self, done: Polished) -> Met:
         there, back = (self.source, self.target, done.motion), (self.target, self.source, done.motion.inverse)
@@ -263,18 +274,28 @@ class Judge:
         there, back = (self.source, self.target, motion), (self.target, self.source, motion.inverse)
         return score([self.side(*way)[0] for way in (there, back)])
 
-    def polished_all(self, known: Sequence[Met], starts: Sequence[Similarity]) -> list[Met]:
-        """The maps that are known, and those that starts lead to and are none of them, nor far behind the best."""
-        every = list(known)
+    def polished_all(self, known: Sequence[Met], starts: Sequence[Similarity], *, patient: bool = False) -> list[Met]:
+        """The maps that are known, and those that starts lead to and are none of them, nor far behind the best.
+
+        The most promising are judged first, which shows how good the others would have to be; one is told if one is
+        `patient`.
+        """
+        every, ends, there = list(known), list[Polished](), [m.motion for m in known]
         for start in starts:
-            if any(self.same(start, m.motion) for m in every):
+            if self._among(start, there):
                 continue
-            done = self._polish(start)
-            if any(self.same(done.motion, m.motion) for m in every):
-                continue
-            if not every or as_good(max(m.score for m in every), self.within_reach(done.motion)):
+            done = self._polish(start, patient=patient)
+            if not done.given_up and not self._among(done.motion, there):
+                ends.append(done)
+                there.append(done.motion)
+        bounds = [self.within_reach(done.motion) for done in ends]
+        for bound, done in sorted(zip(bounds, ends, strict=True), key=lambda pair: -pair[0]):
+            if not every or (bound > 0.0 and as_good(max(m.score for m in every), bound)):
                 every.append(self._judged(done))
         return every
+
+    def _among(self, one: Similarity, others: Sequence[Similarity]) -> bool:
+        return any(self.same(one, other) for other in others)
 
     def same(self, one: Similarity, other: Similarity) -> bool:
         """Whether two maps are one."""

@@ -5,7 +5,8 @@ phi = (s R, t, 1), as the residual of a symmetry is; here the unknowns are a sma
 the scale. Everything is in units of the target: RMS radius 1 about its centre.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,11 +15,13 @@ from symrefine.fit.matching import SCALE_FLOOR, Contact, each_coordinate, geman_
 from symrefine.fit.refine import MAX_OUTER, SETTLED, WITHIN_NOISE
 from symrefine.fit.residual import SIZE, design_rows, gram, turn_frame
 from symrefine.geometry import Array, Isometry, cross_matrix
-from symrefine.surface.skin import LocalPlanes, Skin
+from symrefine.surface.skin import LocalPlanes, Patches, Skin
 
 # One in so many of the planes of the source moves until the motion changes by less than the spacing, of sources with
 # more planes than so many for each.
 COARSE, ENOUGH = 4, 100
+# Outer iterations that settle what can be settled soon.
+SOON = 3
 # What small turns about the three axes add to a vector.
 TURNS = np.stack([cross_matrix(axis) for axis in np.eye(3)])
 
@@ -57,6 +60,7 @@ class Polished:
         steps: outer iterations.
         converged: whether the last step was negligible.
         contact: where the source met the target before the last step: with all of its planes if that was negligible.
+        given_up: whether it was not worthwhile to go on.
     """
 
     motion: Similarity
@@ -65,16 +69,18 @@ class Polished:
     steps: int
     converged: bool
     contact: Contact
+    given_up: bool = False
 
 
 def polish(
-    source: LocalPlanes,
+    source: Patches,
     target: Skin | LocalPlanes,
     start: Similarity,
     *,
     error: float,
     known: Array,
     scale: bool = False,
+    worthwhile: Callable[[Similarity], bool] | None = None,
 ) -> Polished:
     """Alternate matching and Gauss-Newton on the matched planes until the step is negligible.
 
@@ -88,6 +94,7 @@ def polish(
         known: [6, 6] information (inverse covariance) that the start carries; zeros if none. Under noise the moments
             know some motions better than the points do; without noise the points know all of them better.
         scale: whether the scale is an unknown too.
+        worthwhile: asked of a map that is not settled when most are, whether to go on.
     """
     prior: Array = np.zeros((7, 7))
     prior[:6, :6] = known
@@ -114,6 +121,8 @@ def polish(
         moved = float(np.linalg.norm(x - before))
         if settled and few == 1 and moved < SCALE_FLOOR * target.spacing:
             return _ended(start.moved(x), covariance, contact, index, converged=True)
+        if index == SOON and worthwhile is not None and not worthwhile(start.moved(x)):
+            return replace(_ended(start.moved(x), covariance, contact, index, converged=False), given_up=True)
         if settled and moved < target.spacing:
             few = 1
     return _ended(start.moved(x), covariance, contact, MAX_OUTER, converged=False)

@@ -14,7 +14,7 @@ from symrefine.surface.cameras import cameras
 from symrefine.surface.misses import disc_distances
 from symrefine.surface.neighbourhoods import fills_volume
 from symrefine.surface.openings import NEIGHBOURS, Openings, openings
-from symrefine.surface.skin import LocalPlanes, Skin, drawn, make_skin
+from symrefine.surface.skin import LocalPlanes, Patches, Skin, drawn, make_skin
 
 # A side with so many times the surface gets as many more local planes, up to a number.
 COARSER, MOST_PLANES = 1.5, 6000
@@ -83,10 +83,10 @@ class Shown:
         return replace(self, skin=skin, cloud=self.cloud.scaled(factor), views=views)
 
     @cached_property
-    def moving(self) -> LocalPlanes:
+    def moving(self) -> Patches:
         """Local planes that stand for all in the polish; of other points than those that judge, more maps come true."""
         pick = drawn(len(self.skin.points), len(self.cloud.points) // MOVED, self.rng, self.weights)
-        return self.skin.local_planes(pick)
+        return self.skin.patches(pick)
 
     @cached_property
     def openings(self) -> Openings:

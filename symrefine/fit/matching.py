@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from symrefine.geometry import Array, Isometry, Mask, rows
 from symrefine.shape import Index
-from symrefine.surface.skin import LocalPlanes, Planes, Skin
+from symrefine.surface.skin import LocalPlanes, Patches, Planes, Skin
 
 # Robust scale over the median absolute residual (three standard deviations), and its bound from below in spacings.
 ROBUST = 4.4
@@ -92,7 +92,7 @@ def match(
 
 
 def meet(
-    source: LocalPlanes, target: Skin | LocalPlanes, motion: Isometry, uncertainty: float, *, stride: int = 1
+    source: Patches, target: Skin | LocalPlanes, motion: Isometry, uncertainty: float, *, stride: int = 1
 ) -> Contact:
     """Every `stride`-th local plane of one object, moved, with those of another; pairs count by the same rules."""
     every = slice(None, None, stride)

@@ -58,26 +58,61 @@ class Planes(ReadOnly):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LocalPlanes(Planes):
-    """Points projected on the planes fitted to their neighbours.
+class Patches(Planes):
+    """Points projected on the planes fitted to their neighbours: what moves, while another surface is met.
+
+    Attributes:
+        redundancy: how many of the local planes each point of the cloud takes part in; >= 1.
+        labels: [M] class of each point, which only meets points of its own class; None where all are of one.
+    """
+
+    redundancy: float
+    labels: Index | None = None
+
+    def classes(self, chosen: Index | slice) -> Index | None:
+        """Classes of some of the points."""
+        return None if self.labels is None else self.labels[chosen]
+
+    @cached_property
+    def surface(self) -> "LocalPlanes":
+        """The same as a surface that others meet."""
+        tree = Tree(self.points)
+        distance, _ = tree.query(self.points, min(AROUND, len(self.points)))
+        return LocalPlanes(
+            points=self.points,
+            normals=self.normals,
+            thickness=self.thickness,
+            flatness=self.flatness,
+            reach=distance[:, -1],
+            spacing=_spacing(distance),
+            redundancy=self.redundancy,
+            tree=tree if self.labels is None else Tree(_with_class(self.points, self.labels)),
+            labels=self.labels,
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LocalPlanes(Patches):
+    """Local planes that stand for the surface around them.
 
     Attributes:
         reach: [M] radius of the disc each local plane stands for: the distance to its fifth neighbour among these M.
         spacing: median distance from a point to the nearest other one of these M.
-        redundancy: how many of the local planes each point of the cloud takes part in; >= 1.
         tree: kd-tree over `points`, with the class as a fourth coordinate where there are classes.
         body: what the points are: samples of a surface, atoms that stand for themselves, or samples of a volume.
-        labels: [M] class of each point, which only meets points of its own class; None where all are of one.
         eyes: [c, 3] where it was seen from, so that the normals point out of the body; None if that is not known.
     """
 
     reach: Array
     spacing: float
-    redundancy: float
     tree: Tree
     body: Body = "surface"
-    labels: Index | None = None
     eyes: Array | None = None
+
+    @property
+    def surface(self) -> "LocalPlanes":
+        """Itself."""
+        return self
 
     @property
     def isolated(self) -> bool:
@@ -98,10 +133,6 @@ class LocalPlanes(Planes):
                 break
             found[others] = np.einsum("ni,ni->n", normals[others], eye - points[others]) > 0.0
         return found
-
-    def classes(self, chosen: Index | slice) -> Index | None:
-        """Classes of some of the points."""
-        return None if self.labels is None else self.labels[chosen]
 
     def of_one_class(self) -> "LocalPlanes":
         """The same surface, where any point may meet any other."""
@@ -264,26 +295,24 @@ class Skin:
         mean, normals, values = fit_planes(self._neighbourhoods.around(queries, near), normals)
         return Planes(points=mean, normals=normals, thickness=np.sqrt(values[:, 0]), flatness=flatness_of(values))
 
-    def local_planes(self, pick: Index, labels: Index | None = None, near: Index | None = None) -> LocalPlanes:
-        """The planes of some of the points as a surface of their own.
+    def patches(self, pick: Index, labels: Index | None = None, near: Index | None = None) -> Patches:
+        """The planes of some of the points.
 
         `labels` [N] are the classes of all points, those of the skin if None; `near` as of `denoised`.
         """
         planes, labels = self.denoised(pick, near), self.labels if labels is None else labels
-        classes = None if labels is None else labels[pick]
-        tree = Tree(planes.points)
-        distance, _ = tree.query(planes.points, min(AROUND, len(pick)))
-        return LocalPlanes(
+        return Patches(
             points=planes.points,
             normals=planes.normals,
             thickness=planes.thickness,
             flatness=planes.flatness,
-            reach=distance[:, -1],
-            spacing=_spacing(distance),
             redundancy=self.shared_by(len(pick)),
-            tree=tree if classes is None else Tree(_with_class(planes.points, classes)),
-            labels=classes,
+            labels=None if labels is None else labels[pick],
         )
+
+    def local_planes(self, pick: Index, labels: Index | None = None, near: Index | None = None) -> LocalPlanes:
+        """The same as a surface of their own."""
+        return self.patches(pick, labels, near).surface
 
 
 def _spacing(away: Array) -> float:
