@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from matplotlib.path import Path as MatplotlibPath
 from scipy.spatial import cKDTree
 
-from experiments.objects import damage
+from experiments.objects import damage, household
 from experiments.objects.built_symmetry import Truth, specimen
 from experiments.objects.constructions import polygon
 from experiments.objects.parts import extruded
@@ -385,6 +385,16 @@ def test_what_stands_at_a_sharp_rim_is_not_explained_away(half_height):
     points, _ = posed(sample(join([lens(half_height), block]), 20000, 0.0, np.random.default_rng(26)), 27)
     found = detect(points)
     assert (found.point_group, found.confidence > 0.9) == ("Cs", True)
+
+
+@pytest.mark.parametrize("make", [household.camera, bottle])
+def test_strays_that_are_left_near_a_surface_are_no_border(make):
+    """What is near a stray lies to one side of it, as at a border; but it is lonelier than an end of a surface is."""
+    whole = damage.outliers(make(), 0.2, np.random.default_rng(28)).points
+    made = surface_of(whole)
+    assert made.openings is None or not made.openings.evident
+    ends = whole @ [0.3, 0.5, 0.8]
+    assert surface_of(whole[ends < np.quantile(ends, 0.7)]).openings.evident
 
 
 PLATES = {

@@ -39,14 +39,14 @@ class Verdict:
         excess: what the map misses by over what the tolerance, or the noise of the moments, allows; where that is sure
             even so, as if no miss were noise.
         determinant_confidence: probability that the determinant is right.
-        hand_is_open: whether the other hand misses by about as much: right where the object is its own mirror image.
+        hand: probability that the determinant is right, or that the object is its own mirror image and has either.
         confidence: probability that the map is, where it was not told from the excess.
     """
 
     status: str
     excess: float
     determinant_confidence: float
-    hand_is_open: bool = False
+    hand: float = 1.0
     confidence: float | None = None
 
 
@@ -159,12 +159,8 @@ class Alignment(ReadOnly):
             return self._said.confidence
         if self.exact:
             return 1.0
-        agree = meant(Link(need=self._said.excess), 1.0)
-        # Where the other hand does about as well though the target has no mirror, either may be right: its details are
-        # lost in noise or strays.
-        if self._said.hand_is_open and len(set(np.sign(np.linalg.det(self.equivalents)))) == 1:
-            return min(agree, self.determinant_confidence)
-        return agree
+        # The details that tell one hand from the other may be lost in noise or strays.
+        return meant(Link(need=self._said.excess), 1.0) * self._said.hand
 
     @property
     def overlap(self) -> tuple[float, float]:

@@ -194,6 +194,16 @@ class Evidence:
         ways = [self.misses(motion), self.misses_back(motion)] if self.scale else [self.misses(motion)]
         return max(float(self.judge.needed(misses[None], [motion])[0]) for misses in ways) / self.tolerance
 
+    def own_excess(self, motion: Similarity) -> float:
+        """The same of the target as its own image, without the strays that may hide what denies it."""
+        clean = self.cleaned() or self
+        here, there = self.target.moments, clean.target.moments
+        at = motion.apply((there.center - here.center)[None] / here.scale)[0]
+        own = Similarity(matrix=motion.matrix, shift=(here.center + here.scale * at - there.center) / there.scale)
+        cloud, size = clean.judge.cloud, clean.judge.diagonal
+        misses = disc_distances(cloud, own.apply(cloud.points), cloud.labels, bound=size) / size
+        return float(clean.judge.needed(misses[None], [own])[0]) / self.tolerance
+
     def excess_without_noise(self, done: Polished, enough: float) -> float:
         """The excess after a polish on `met`, of one size, if none of it is noise; infinite if the polish did not end.
 

@@ -196,7 +196,7 @@ class Judge:
         voters = slice(None, None, -(-len(points) // VOTERS))
         votes = mirror_votes(points[voters], normals[voters], np.random.default_rng(0), told=MIRRORS)
         planes = [Isometry.about(v.foot, householder(v.direction)) for v in votes]
-        starts = [_after(Similarity(matrix=p.matrix, shift=p.shift), best.motion) for p in planes]
+        starts = [Similarity(matrix=p.matrix, shift=p.shift).after(best.motion) for p in planes]
         return [s for s in starts if self.meets(s).sum() >= ITS_OWN * meets.sum()]
 
     def polished(self, start: Similarity) -> Met:
@@ -310,7 +310,7 @@ class Judge:
         every, tried = list(found), [m.motion for m in found]
         while len(every) < MOST_MAPS:
             good = [m.motion for m in every if as_good(best.score, m.score)]
-            products = (_after(_after(a, best.motion.inverse), b) for a in good for b in good)
+            products = (a.after(best.motion.inverse).after(b) for a in good for b in good)
             fresh = next((p for p in products if not any(self.same(p, t) for t in tried)), None)
             if fresh is None:
                 break
@@ -318,11 +318,6 @@ class Judge:
             every = self.polished_all(every, [fresh])
             tried.append(every[-1].motion)
         return every
-
-
-def _after(last: Similarity, first: Similarity) -> Similarity:
-    """One map after another."""
-    return Similarity(matrix=last.matrix @ first.matrix, shift=last.matrix @ first.shift + last.shift)
 
 
 def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool, open_: bool) -> Meeting:

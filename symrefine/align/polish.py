@@ -42,6 +42,11 @@ class Similarity(Isometry):
         back = self.matrix.T
         return Similarity(matrix=back, shift=-(back @ self.shift) / self.scale, scale=1.0 / self.scale)
 
+    def after(self, first: "Similarity") -> "Similarity":
+        """Another map, and then this one."""
+        shift = self.scale * (self.matrix @ first.shift) + self.shift
+        return Similarity(matrix=self.matrix @ first.matrix, shift=shift, scale=self.scale * first.scale)
+
     def moved(self, x: Array) -> "Similarity":
         """This map, turned about the origin and shifted by x [6], its scale times exp(x[6]) if there is one."""
         stretch = float(np.exp(x[6])) if len(x) > 6 else 1.0

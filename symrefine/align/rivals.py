@@ -43,6 +43,7 @@ class Choice:
         misfit: cost per coefficient; about 1 or below if sampling noise explains the difference of the moments.
         excess: miss over its limit; 0 where the moments were enough to decide.
         lead: by how much more the other determinant misses, over the limit; infinite where the moments deny it.
+        other: the best map of that determinant, where points were asked.
     """
 
     evidence: Evidence
@@ -52,6 +53,7 @@ class Choice:
     misfit: float
     excess: float
     lead: float = math.inf
+    other: Similarity | None = None
 
     @property
     def determinant_confidence(self) -> float:
@@ -95,14 +97,18 @@ def _choose(evidence: Evidence, reflections: bool, *, brief: bool = False) -> Ch
         none = np.zeros((3, 3))
         return Choice(evidence=evidence, motion=best, covariance=none, exact=True, misfit=0.0, excess=0.0, lead=lead)
     rivals, unlike, spread = fitted[as_good(pair, fitted)], misfit(pair, fitted), covariance(pair, fitted)
-    motion, excess, lead = Similarity(matrix=rivals.matrices[0], shift=np.zeros(3)), 0.0, math.inf
-    if (len(rivals.costs) > 1 or unlike > MISFIT) and evidence.has_points:
-        sure = _sure(evidence, motion, spread) if len(set(rivals.signs)) == 1 else None
-        judged = (*sure, lead) if sure else _judged(evidence, rivals, spread, brief=brief and unlike > MISFIT)
-        motion, excess, lead = judged
-    return Choice(
-        evidence=evidence, motion=motion, covariance=spread, exact=False, misfit=unlike, excess=excess, lead=lead
-    )
+    first = Similarity(matrix=rivals.matrices[0], shift=np.zeros(3))
+    told = Choice(evidence=evidence, motion=first, covariance=spread, exact=False, misfit=unlike, excess=0.0)
+    if not (len(rivals.costs) > 1 or unlike > MISFIT) or not evidence.has_points:
+        return told
+    if len(set(rivals.signs)) == 1 and (sure := _sure(evidence, first, spread)):
+        return replace(told, motion=sure[0], excess=sure[1])
+    hands = _judged(evidence, rivals, spread, brief=brief and unlike > MISFIT)
+    chosen = min(hands, key=lambda det: hands[det][1] + GOOD * (det < 0))
+    found = replace(told, motion=hands[chosen][0], excess=hands[chosen][1])
+    if -chosen not in hands:
+        return found
+    return replace(found, lead=hands[-chosen][1] - found.excess, other=hands[-chosen][0])
 
 
 def candidates(evidence: Evidence, determinants: tuple[int, ...]) -> Fits:
@@ -127,19 +133,17 @@ def _sure(evidence: Evidence, start: Similarity, covariance: Array) -> tuple[Sim
     return (done.motion, excess) if excess <= GOOD else None
 
 
-def _judged(evidence: Evidence, rivals: Fits, covariance: Array, *, brief: bool) -> tuple[Similarity, float, float]:
-    """The rival that the points confirm best, and its excess; the proper one if its mirror image does no better.
+def _judged(evidence: Evidence, rivals: Fits, covariance: Array, *, brief: bool) -> dict[int, tuple[Similarity, float]]:
+    """The rival of each determinant that the points confirm best, and its excess.
 
-    Also by how much more the other determinant exceeds. With `brief` the first of each determinant has to do.
+    With `brief` the first of each has to do.
     """
     best: dict[int, tuple[Similarity, float]] = {}
     for det in dict.fromkeys(int(sign) for sign in rivals.signs):  # by cost
         of_det = rivals.matrices[rivals.signs == det]
         every = of_det[:1] if brief else chain(of_det[:RIVALS], _phases(evidence, of_det[0], rivals))
         best[det] = _first_good(evidence, every, covariance)
-    chosen = min(best, key=lambda det: best[det][1] + GOOD * (det < 0))
-    lead = best[-chosen][1] - best[chosen][1] if -chosen in best else math.inf
-    return *best[chosen], lead
+    return best
 
 
 def _first_good(evidence: Evidence, matrices: Iterable[Array], covariance: Array) -> tuple[Similarity, float]:

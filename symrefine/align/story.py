@@ -277,8 +277,15 @@ def _verdict(choice: Choice, motion: Similarity, scale: bool, reflections: bool,
             f"the objects differ by {excess:.1f} times what the tolerance allows: 99 % of the source comes within "
             f"{100 * farthest:.2g} % of the diagonal"
         )
-    hand_is_open = reflections and choice.hand_is_open
-    return Verdict(status=status, excess=excess, determinant_confidence=sure, hand_is_open=hand_is_open)
+    hand = sure + (1.0 - sure) * _has_both_hands(choice) if reflections and choice.hand_is_open else 1.0
+    return Verdict(status=status, excess=excess, determinant_confidence=sure, hand=hand)
+
+
+def _has_both_hands(choice: Choice) -> float:
+    """Probability that the target is its own mirror image, where what leads from one hand to the other says so."""
+    if choice.other is None:
+        return 1.0
+    return meant(Link(need=choice.evidence.own_excess(choice.other.after(choice.motion.inverse))), 1.0)
 
 
 def _nearness(choice: Choice, motion: Similarity, scale: bool) -> Nearness:

@@ -20,7 +20,7 @@ from symrefine.geometry import Array, Mask, check_tolerance
 from symrefine.groups import PointGroup
 from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import CLUMP, COUNTERPART, Clump, clump_among
-from symrefine.surface.misses import TOLERANCE, disc_distances
+from symrefine.surface.misses import SHARES, TOLERANCE, disc_distances
 from symrefine.surface.surface import Surface
 from symrefine.surface.tree import Tree
 
@@ -51,6 +51,14 @@ class Examined:
     outlier_share: float
     sample: Sample | None
     carried: Mapping[str, OnVertices | None]
+
+    @property
+    def strewn(self) -> bool:
+        """Whether so many strays are left beside the surface that what they deny is no evidence.
+
+        More than the share that details may have is lonely.
+        """
+        return len(self.measured.strays) > 0 and float(self.surface.cloud.lonely.mean()) > SHARES[-1]
 
     def vertices_of(self, found: Hypothesis) -> OnVertices | None:
         """Where the vertices of a mesh put a group of the chain, if it maps them onto one another."""

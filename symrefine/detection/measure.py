@@ -283,7 +283,8 @@ def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLE
     if measured.solid and normals is None and fills_volume(local, Tree(local), np.random.default_rng(0)):
         return evidence, _volume(local, labels, tolerance, rng)
     exact = shape.faces is not None
-    return evidence, _surface(local, normals, weights, labels, exact, tolerance, measured.views, hiding, rng)
+    strays = len(measured.strays) > 0
+    return evidence, _surface(local, normals, weights, labels, exact, tolerance, measured.views, hiding, strays, rng)
 
 
 def _surface(
@@ -295,6 +296,7 @@ def _surface(
     tolerance: float,
     views: tuple[Camera, ...],
     hiding: tuple[Clump, ...],
+    strays: bool,
     rng: np.random.Generator,
 ) -> Surface:
     """Local planes with what noise alone shows."""
@@ -326,7 +328,7 @@ def _surface(
     surface = Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, skin=skin, tolerance=tolerance)
     # Where noise alone needs all that is allowed, nobody sees what is open.
     if tree is not None and (surface.floor < tolerance or views):
-        surface = replace(surface, openings=openings(cloud, local, tree, views, near, clumps=hiding))
+        surface = replace(surface, openings=openings(cloud, local, tree, views, near, clumps=hiding, strays=strays))
     # Where density differs, as between what cameras saw from far and near or where a clump adds to it, a window and its
     # image hold more of chance than one window and itself.
     if whole.noisy and uneven is None and not (views or hiding):

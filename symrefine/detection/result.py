@@ -144,7 +144,9 @@ class Detection(ReadOnly):
         candidates: what was proposed and given up before a full fit, the nearest misses first.
         outliers: indices, ascending, of the points that were taken as no part of the object; of a stream among those of
             its sample.
-        at_least: whether the surface has open borders beyond which nobody looked: the object may have more symmetry.
+        at_least: whether the surface has open borders beyond which nobody looked, or is `strewn`: the object may have
+            more symmetry.
+        strewn: whether so many strays are left beside the surface that they may hide some.
         clumps: how many groups of them stand apart from the body, the others being single strays.
         outlier_share: of all points.
         exact: that and how exactly the group maps vertices of a mesh onto vertices, if it does; None of anything else.
@@ -186,6 +188,7 @@ class Detection(ReadOnly):
     sample: Sample | None
     even_sample: int | None
     at_least: bool
+    strewn: bool
     origin: Array
     scale: float
     verified: Verified | None = None

@@ -47,7 +47,12 @@ def detection_record(
         "classes": _classes(shape),
         **_answer(d),
         "at_least": bool(d.at_least),
-        "outliers": {"count": len(d.outliers), "clumps": int(d.clumps), "share": number(d.outlier_share)},
+        "outliers": {
+            "count": len(d.outliers),
+            "clumps": int(d.clumps),
+            "share": number(d.outlier_share),
+            "strewn": bool(d.strewn),
+        },
         "exact": None
         if d.exact is None
         else {"miss": number(d.exact.miss), "faces": d.exact.faces, "point_group": d.exact.point_group},

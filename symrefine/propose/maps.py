@@ -18,7 +18,10 @@ AROUND, WITHIN, PLANES, MATCHES = 0.1, 0.04, 1500, 500
 
 def maps_between(source: LocalPlanes, target: LocalPlanes, diagonal: float) -> list[Proposal]:
     """Maps of either determinant from one surface onto another, best first; `diagonal` is that of the smaller one."""
-    source_looks, target_looks = (signatures(cloud, AROUND * diagonal) for cloud in (source, target))
+    # Of a side with more local planes as many as elsewhere tell what surroundings look like.
+    every = [max(1, round(len(cloud.points) / PLANES)) for cloud in (source, target)]
+    sides = zip((source, target), every, strict=True)
+    source_looks, target_looks = (signatures(cloud, AROUND * diagonal, k) for cloud, k in sides)
     classes = None if source.labels is None or target.labels is None else (source.labels, target.labels)
     return _agreed(source, target, mutual_matches(source_looks, target_looks, classes), diagonal)
 

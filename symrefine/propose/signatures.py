@@ -16,24 +16,32 @@ from symrefine.surface.tree import pairs_within
 SHELLS, BINS = 3, 6
 
 
-def signatures(cloud: Planes, radius: float) -> Array:
-    """Histograms [M, SHELLS * 3 * BINS] of the neighbours within a radius of each local plane."""
+def signatures(cloud: Planes, radius: float, every: int = 1) -> Array:
+    """Histograms [M, SHELLS * 3 * BINS] of the neighbours within a radius of each local plane.
+
+    One in `every` so many of the local planes counts as a neighbour.
+    """
     count, points, normals = len(cloud.points), cloud.points.T.copy(), cloud.normals.T.copy()
     one, other = pairs_within(cloud.points, radius).T.copy()
+    counts = np.arange(count) % every == 0
+    if every > 1:
+        either = np.flatnonzero(counts[one] | counts[other])
+        one, other = one[either], other[either]
     toward = points.take(other, axis=1) - points.take(one, axis=1)
     near, far = normals.take(one, axis=1), normals.take(other, axis=1)
     squares = _dot(toward, toward)
     # Of either end: how high the other stands over its plane.
     ends = np.concatenate([_dot(toward, near), -_dot(toward, far)])
-    owner = np.concatenate([one, other])
-    bent = np.where(np.bincount(owner, ends, count) < 0.0, -1.0, 1.0)
     slopes = ends / np.tile(np.maximum(np.sqrt(squares), 1e-300), 2)
+    shell = np.tile(np.minimum(squares * (SHELLS / radius**2), SHELLS - 1).astype(np.int64), 2)
+    owner, leaning, turned = np.concatenate([one, other]), np.roll(slopes, len(one)), np.tile(_dot(near, far), 2)
+    if every > 1:
+        tells = np.flatnonzero(counts[np.concatenate([other, one])])
+        owner, ends, slopes, leaning, turned, shell = (v[tells] for v in (owner, ends, slopes, leaning, turned, shell))
+    bent = np.where(np.bincount(owner, ends, count) < 0.0, -1.0, 1.0)
     height = 0.5 + 0.5 * bent.take(owner) * slopes
-    turned = np.tile(np.abs(_dot(near, far)), 2)
-    leaning = np.abs(np.roll(slopes, len(one)))
-    shell = np.minimum(squares * (SHELLS / radius**2), SHELLS - 1).astype(np.int64)
-    shell = owner * SHELLS + np.tile(shell, 2)
-    found = np.stack([_histograms(shell, v, count * SHELLS) for v in (height, turned, leaning)], axis=1)
+    shell += owner * SHELLS
+    found = np.stack([_histograms(shell, v, count * SHELLS) for v in (height, np.abs(turned), np.abs(leaning))], axis=1)
     found /= np.maximum(np.bincount(shell, minlength=count * SHELLS), 1)[:, None, None]
     return np.asarray(found.reshape(count, -1))
 

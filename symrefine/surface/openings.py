@@ -181,6 +181,7 @@ def openings(
     near: Index | None = None,
     *,
     clumps: tuple[Clump, ...] = (),
+    strays: bool = False,
     least: float = OPEN,
 ) -> Openings | None:
     """What is open of a surface, or hidden; None if it is closed, or known too coarsely to tell.
@@ -192,13 +193,15 @@ def openings(
         cameras: what saw it, where that is known.
         near: [M, NEIGHBOURS] of the points near each local plane, if they are known already.
         clumps: what hides parts of it.
+        strays: whether there were any: then what is lonely may be one more, which has all that is near to one side,
+            and no end of the surface.
         least: share of the local planes that have to lie far aside, for each RMS radius that neighbourhoods are wide.
     """
     none = np.zeros(len(cloud.points), dtype=bool)
     if cameras:
         return Openings(line=none, border=none, evident=True, cameras=cameras, clumps=clumps)
     aside, width = _aside(cloud, points, tree, near)
-    far = _lines(cloud, aside > FAR_ASIDE)
+    far = _lines(cloud, (aside > FAR_ASIDE) & ~(cloud.lonely & strays))
     far[far] = ~_folded(cloud.points[far], points, tree, None if near is None else near[far])
     if width > WIDEST or far.mean() < least * width or not far.any():
         return Openings(line=none, border=none, evident=False, clumps=clumps) if clumps else None

@@ -24,6 +24,8 @@ from symrefine.surface.tree import Tree
 FEW = 250
 # Points whose distances tell the spacing and the reach of discs, the first of them the point itself.
 AROUND = 6
+# Reach, in usual ones, where a quarter of a disc holds as many as a disc does elsewhere.
+LONELY = 2.0
 # Classes stand so far apart along a fourth coordinate (RMS radii) that no query finds a point of another class first.
 APART = 1e3
 
@@ -113,6 +115,14 @@ class LocalPlanes(Patches):
     def surface(self) -> "LocalPlanes":
         """Itself."""
         return self
+
+    @cached_property
+    def lonely(self) -> Mask:
+        """[M] which have others more than twice as far away as is usual, as no part of a surface has.
+
+        Where it ends half of a disc is left, at the corner of a sheet a quarter, so that the reach is twice the usual.
+        """
+        return np.asarray(self.reach > LONELY * np.median(self.reach))
 
     @property
     def isolated(self) -> bool:
