@@ -72,7 +72,7 @@ KIND_OF = {
         "align.moment_fit": "LONGEST",
         "align.pair": "SOURCE_PLANES TARGET_PLANES THIN ASKED REACH",
         "align.partial": "LOOK POLISHED WORTH APART MOST_MAPS VOTERS MIRRORS",
-        "align.polish": "COARSE ENOUGH",
+        "align.polish": "COARSE ENOUGH SOON",
         "align.rivals": "RIVALS",
         "align.scaled": "WIDEST STEP POLISHED",
         "align.shown": "COARSER MOST_PLANES MOVED",

@@ -47,12 +47,8 @@ def detection_record(
         "classes": _classes(shape),
         **_answer(d),
         "at_least": bool(d.at_least),
-        "outliers": {
-            "count": len(d.outliers),
-            "clumps": int(d.clumps),
-            "share": number(d.outlier_share),
-            "strewn": bool(d.strewn),
-        },
+        "strewn": bool(d.strewn),
+        "outliers": {"count": len(d.outliers), "clumps": int(d.clumps), "share": number(d.outlier_share)},
         "exact": None
         if d.exact is None
         else {"miss": number(d.exact.miss), "faces": d.exact.faces, "point_group": d.exact.point_group},

@@ -1,9 +1,9 @@
 """Local planes of a cloud, and which of them a mirrored point meets."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,6 @@ from symrefine.surface.tree import Tree
 FEW = 250
 # Points whose distances tell the spacing and the reach of discs, the first of them the point itself.
 AROUND = 6
-# Reach, in usual ones, where a quarter of a disc holds as many as a disc does elsewhere.
-LONELY = 2.0
 # Classes stand so far apart along a fourth coordinate (RMS radii) that no query finds a point of another class first.
 APART = 1e3
 
@@ -81,15 +79,10 @@ class Patches(Planes):
         tree = Tree(self.points)
         distance, _ = tree.query(self.points, min(AROUND, len(self.points)))
         return LocalPlanes(
-            points=self.points,
-            normals=self.normals,
-            thickness=self.thickness,
-            flatness=self.flatness,
+            **_all_of(self),
             reach=distance[:, -1],
             spacing=_spacing(distance),
-            redundancy=self.redundancy,
             tree=tree if self.labels is None else Tree(_with_class(self.points, self.labels)),
-            labels=self.labels,
         )
 
 
@@ -118,11 +111,8 @@ class LocalPlanes(Patches):
 
     @cached_property
     def lonely(self) -> Mask:
-        """[M] which have others more than twice as far away as is usual, as no part of a surface has.
-
-        Where it ends half of a disc is left, at the corner of a sheet a quarter, so that the reach is twice the usual.
-        """
-        return np.asarray(self.reach > LONELY * np.median(self.reach))
+        """[M] which reach more than twice as far as usual: as far as at the corner of a sheet, with a quarter disc."""
+        return np.asarray(self.reach > 2.0 * np.median(self.reach))
 
     @property
     def isolated(self) -> bool:
@@ -311,18 +301,17 @@ class Skin:
         `labels` [N] are the classes of all points, those of the skin if None; `near` as of `denoised`.
         """
         planes, labels = self.denoised(pick, near), self.labels if labels is None else labels
-        return Patches(
-            points=planes.points,
-            normals=planes.normals,
-            thickness=planes.thickness,
-            flatness=planes.flatness,
-            redundancy=self.shared_by(len(pick)),
-            labels=None if labels is None else labels[pick],
-        )
+        classes = None if labels is None else labels[pick]
+        return Patches(**_all_of(planes), redundancy=self.shared_by(len(pick)), labels=classes)
 
     def local_planes(self, pick: Index, labels: Index | None = None, near: Index | None = None) -> LocalPlanes:
         """The same as a surface of their own."""
         return self.patches(pick, labels, near).surface
+
+
+def _all_of(planes: Planes) -> dict[str, Any]:
+    """What is known of planes, to say more of them."""
+    return {field.name: getattr(planes, field.name) for field in fields(planes)}
 
 
 def _spacing(away: Array) -> float:
