@@ -70,7 +70,7 @@ KIND_OF = {
     "looks": {
         "align.landscape": "GRID GRID_DEGREE",
         "align.moment_fit": "LONGEST",
-        "align.pair": "SOURCE_PLANES TARGET_PLANES THIN ASKED REACH",
+        "align.pair": "MOVED SOURCE_PLANES TARGET_PLANES THIN ASKED REACH",
         "align.partial": "LOOK POLISHED WORTH APART MOST_MAPS VOTERS MIRRORS",
         "align.polish": "COARSE ENOUGH SOON",
         "align.rivals": "RIVALS",

@@ -23,8 +23,9 @@ from symrefine.surface.sampling import Sampling, sampling
 from symrefine.surface.skin import FEW, LocalPlanes, Patches, Skin, isolated_points, make_skin
 from symrefine.surface.surface import Surface
 
-# Local planes of the source and of the target.
-SOURCE_PLANES, TARGET_PLANES = 800, 2000
+# Local planes of the source that the polish moves: with so many the median error of 120 pairs is .010 degrees, with 800
+# .009, with 1,200 .008. Those that are judged, and those of the target that judge them.
+MOVED, SOURCE_PLANES, TARGET_PLANES = 600, 800, 2000
 # Flatness of thin sheets and edges without noise (0.13 at most at the lower quartile); noise of 0.2 % makes it 0.17.
 THIN = 0.15
 
@@ -150,8 +151,13 @@ class Evidence:
 
     @cached_property
     def moving(self) -> Patches:
-        """Local planes of the source, or its points where they stand for themselves."""
-        return self._planes(0, SOURCE_PLANES)
+        """Local planes of the source that are polished, or its points where they stand for themselves."""
+        return self._planes(0, MOVED)
+
+    @cached_property
+    def _judged(self) -> LocalPlanes:
+        """Local planes of the source that are judged, or its points where they stand for themselves."""
+        return self._planes(0, SOURCE_PLANES).surface
 
     @cached_property
     def met(self) -> Skin | LocalPlanes:
@@ -167,8 +173,8 @@ class Evidence:
         """
         target = self._planes(1, TARGET_PLANES).surface
         diagonal = tight_diagonal(target.points)
-        own = [disc_distances(s, s.points, s.labels, skip_self=True) for s in (self.moving.surface, target)]
-        blurred = abs(float(self.moving.thickness.mean() - target.thickness.mean()))
+        own = [disc_distances(s, s.points, s.labels, skip_self=True) for s in (self._judged, target)]
+        blurred = abs(float(self._judged.thickness.mean() - target.thickness.mean()))
         return Surface(cloud=target, diagonal=diagonal, noise=(np.concatenate(own) + blurred) / diagonal)
 
     def misses(self, motion: Isometry) -> Array:
@@ -176,14 +182,14 @@ class Evidence:
 
         They end at the diagonal.
         """
-        moved, size = motion.apply(self.moving.points), self.judge.diagonal
-        return disc_distances(self.judge.cloud, moved, self.moving.labels, bound=size) / size
+        moved, size = motion.apply(self._judged.points), self.judge.diagonal
+        return disc_distances(self.judge.cloud, moved, self._judged.labels, bound=size) / size
 
     def misses_back(self, motion: Similarity) -> Array:
         """Distances from the target to the moved source, fractions of the diagonal."""
         cloud, size = self.judge.cloud, self.judge.diagonal
-        own, moved, bound = self.moving.surface, motion.inverse.apply(cloud.points), size / motion.scale
-        back = disc_distances(own, moved, cloud.labels, bound=bound)
+        moved, bound = motion.inverse.apply(cloud.points), size / motion.scale
+        back = disc_distances(self._judged, moved, cloud.labels, bound=bound)
         return motion.scale * back / size
 
     def excess(self, motion: Similarity) -> float:

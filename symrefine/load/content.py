@@ -143,8 +143,9 @@ def as_float64(values: NDArray[Any]) -> Array:
 
 def check_finite(content: Content) -> None:
     """Refuse coordinates that are NaN, infinite or so large that areas overflow, naming the first such point."""
-    bad = np.flatnonzero(~(np.abs(content.points) <= LARGEST).all(axis=1))
-    if bad.size:
+    large = ~(np.abs(content.points) <= LARGEST)
+    if large.any():
+        bad = np.flatnonzero(large.any(axis=1))
         raise InputError(
             f"{content.name('point', int(bad[0]))} is {content.points[bad[0]].tolist()} "
             f"({bad.size} such of {len(content.points)}); coordinates must be finite and at most {LARGEST:g}: "

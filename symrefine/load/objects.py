@@ -17,7 +17,7 @@ from symrefine.load.frames import Frames
 from symrefine.load.mesh import mesh_arrays
 from symrefine.load.scene import flattened
 from symrefine.load.stream import STREAMED, stream_if_large
-from symrefine.shape import Shape
+from symrefine.shape import LARGEST, Shape
 from symrefine.stream import Stream
 
 _EXPECTED = (
@@ -112,7 +112,7 @@ def _check_size(points: Any) -> None:
         array = np.asarray(points, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         return
-    if array.ndim == 2 and array.size and np.isfinite(array).all():
+    if array.ndim == 2 and (np.abs(array) > LARGEST).any() and np.isfinite(array).all():
         check_finite(Content(points=array))
 
 
