@@ -397,6 +397,16 @@ def test_strays_that_are_left_near_a_surface_are_no_border(make):
     assert surface_of(whole[ends < np.quantile(ends, 0.7)]).openings.evident
 
 
+def test_strays_that_may_hide_more_leave_an_answer_that_says_so():
+    """What is left of four in ten points beside a spool denies that it is round, of one in twenty it does not."""
+    spool, _ = specimen("shape", "spool")
+    many, few = (detect(damage.outliers(spool, s, np.random.default_rng(29)).points) for s in (0.4, 0.05))
+    assert (many.at_least, many.strewn, many.is_partial) == (True, True, False)
+    assert "Strays that are left near the surface may hide more." in scanned(many)
+    assert (few.point_group, few.at_least, few.strewn) == ("Dinfh", False, False)
+    assert "may hide" not in scanned(few)
+
+
 PLATES = {
     "trapezium": [(0, 0), (1, 0), (0.7, 0.6), (0.1, 0.6)],
     "corner cut": [(0, 0), (1, 0), (1, 0.4), (0.7, 0.7), (0, 0.7)],

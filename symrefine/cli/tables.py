@@ -80,9 +80,9 @@ def _verified(said: Record) -> str:
 
 def partial(record: Record) -> str:
     """What was not seen, and what of the surface speaks for what was found."""
-    seen = [e["coverage"] for e in (*record["planes"], *record["axes"])]
-    if record["strewn"] and not any(c["unseen"] for c in seen):
+    if record["strewn"]:
         return "strays that are left near the surface may hide more"
+    seen = [e["coverage"] for e in (*record["planes"], *record["axes"])]
     if not seen:
         return "parts of the surface were not seen: there may be more"
     most = max(seen, key=lambda c: c["unseen"])

@@ -146,7 +146,7 @@ class Detection(ReadOnly):
             its sample.
         at_least: whether the surface has open borders beyond which nobody looked, or is `strewn`: the object may have
             more symmetry.
-        strewn: whether so many strays are left beside the surface that they may hide some.
+        strewn: whether it is for strays alone, so many of which are left beside the surface that they may hide some.
         clumps: how many groups of them stand apart from the body, the others being single strays.
         outlier_share: of all points.
         exact: that and how exactly the group maps vertices of a mesh onto vertices, if it does; None of anything else.
@@ -195,6 +195,11 @@ class Detection(ReadOnly):
     timings: dict[str, float] = field(default_factory=dict)
     examined: Examined = field(repr=False)
     textured: "Detection | None" = None
+
+    @property
+    def is_partial(self) -> bool:
+        """Whether there may be more for parts of the surface that were not seen."""
+        return self.at_least and not self.strewn
 
     def choices(self, tolerance: float | None = None) -> tuple[Alternative, ...]:
         """Every group that a person may choose instead, C1 first, each inside the next, as likely as at a tolerance.

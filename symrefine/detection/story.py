@@ -226,7 +226,7 @@ def _report(
         outliers=found.outliers,
         outlier_share=found.outlier_share,
         at_least=(found.pool.at_least or found.strewn) and not reason,
-        strewn=found.strewn,
+        strewn=found.strewn and not found.pool.at_least and not reason,
         clumps=len(measured.clumps),
         exact=None if on is None else Exact(miss=on.miss, faces=on.faces, point_group=on.finite.name),
         sample=found.sample,

@@ -187,7 +187,7 @@ def make_scene(detection: Detection, shape: Shape) -> Scene:
         axes=_lines(detection, stage),
         missed_planes=missed_planes,
         missed_axes=missed_axes,
-        scan=_scan(detection, shape) if detection.at_least else None,
+        scan=_scan(detection, shape) if detection.is_partial else None,
         balls=solid,
         outliers=detection.outliers,
     )

@@ -159,13 +159,14 @@ def scanned(detection: Detection) -> str:
     of = None if d.sample is None else (d.sample.points, d.sample.of)
     exact = "" if d.exact is None else exactly(d.exact.miss, d.exact.faces, d.exact.point_group)
     told = exact, taken_out(len(d.outliers), d.outlier_share, d.clumps), sampled(of), evened(d.even_sample)
-    unseen = "Parts of the surface were not seen: there may be more." if d.at_least else ""
+    unseen = "Parts of the surface were not seen: there may be more." if d.is_partial else ""
+    unseen = "Strays that are left near the surface may hide more." if d.strewn else unseen
     return " ".join(said for said in (*(f"{t[:1].upper()}{t[1:]}." for t in told if t), unseen) if said)
 
 
 def verdicts_told(detection: Detection) -> str:
     """What the colours of a scan mean that shows a part of an object; empty of any other."""
-    if not detection.at_least or detection.point_group == "C1":
+    if not detection.is_partial or detection.point_group == "C1":
         return ""
     return "Green: inferred, where nobody looked. Red: seen, with an image where the scan says there is nothing."
 

@@ -168,7 +168,7 @@ def _along(line: Line) -> Array:
 
 
 def _covered(d: Detection, coverage: Any) -> str:
-    if not d.at_least:
+    if not d.is_partial:
         return ""
     return (
         f"{100 * coverage.supported:.0f} % of the surface support it, {100 * coverage.contradicted:.2g} % contradict "

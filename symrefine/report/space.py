@@ -88,7 +88,7 @@ def _hint(d: Detection, elements: Sequence[Element], left_out: str) -> str:
         "Choose a plane or an axis, here or in the list, to see where it takes the object, coloured by how far that "
         f"image misses it: from grey, not at all, to red, {deepest} of the diagonal and more."
     )
-    strays = "Dark pink: outliers, no part of it." if len(d.outliers) and not d.at_least else ""
+    strays = "Dark pink: outliers, no part of it." if len(d.outliers) and not d.is_partial else ""
     return " ".join(said for said in (told if elements else "", verdicts_told(d), strays, left_out) if said)
 
 
