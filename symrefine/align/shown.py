@@ -47,8 +47,11 @@ class Shown:
     rng: np.random.Generator
 
     @classmethod
-    def of(cls, side: Side, unit: float, seed: int) -> "Shown | None":
-        """What a mesh or cloud shows; None if its points fill a volume, or many share each place and none is near."""
+    def of(cls, side: Side, unit: float, seed: int, planes: int = PLANES) -> "Shown | None":
+        """What so many local planes of a mesh or cloud show.
+
+        None if its points fill a volume, or many share each place and none is near.
+        """
         rng = np.random.default_rng(seed)
         shape, weights, solid = side.shape, None, False
         if side.is_mesh:
@@ -60,7 +63,7 @@ class Shown:
         skin = make_skin(local, rng, normals=normals, labels=shape.labels, thin=THIN)
         if solid and normals is None and fills_volume(local, skin.tree, np.random.default_rng(0)):
             return None
-        cloud, near = _planes(skin, drawn(len(local), PLANES, rng, weights))
+        cloud, near = _planes(skin, drawn(len(local), planes, rng, weights))
         if cloud.spacing == 0.0:
             return None
         views = None if views is None else (views - side.moments.center) / unit
@@ -71,7 +74,7 @@ class Shown:
         finer = (self.cloud.spacing / spacing) ** 2
         if finer < COARSER:
             return self
-        count = min(round(finer * PLANES), MOST_PLANES)
+        count = min(round(finer * len(self.cloud.points)), MOST_PLANES)
         pick = drawn(len(self.skin.points), count, self.rng, self.weights)
         cloud, near = _planes(self.skin, pick)
         return replace(self, cloud=cloud, near=near)

@@ -12,7 +12,7 @@ import numpy as np
 
 from symrefine.align.kinds import nearest_both_ways, with_one_set_of_classes
 from symrefine.align.pair import Side, few
-from symrefine.align.shown import Shown
+from symrefine.align.shown import MOST_PLANES, Shown
 from symrefine.geometry import Array, Isometry, tight_diagonal
 from symrefine.moments.moments import shape_moments
 from symrefine.shape import Index, Shape
@@ -48,7 +48,7 @@ def witnesses(source: Shape, target: Shape, *, scale: float = 1.0, tolerance: fl
     if source.dim == 3 and not few(source, target) and {source.measure, target.measure} != {"solid", "points"}:
         sides = [_side(shape) for shape in (source, target)]
         unit = sides[1].moments.scale
-        one, other = (Shown.of(s, u, seed) for s, u in zip(sides, (unit / scale, unit), strict=True))
+        one, other = (Shown.of(s, u, seed, MOST_PLANES) for s, u in zip(sides, (unit / scale, unit), strict=True))
         if one is not None and other is not None:
             finest = min(one.cloud.spacing, other.cloud.spacing)
             shown = one.as_fine_as(finest), other.as_fine_as(finest)
