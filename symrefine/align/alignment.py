@@ -160,7 +160,7 @@ class Alignment(ReadOnly):
         if self.exact:
             return 1.0
         # The details that tell one hand from the other may be lost in noise or strays.
-        return meant(Link(need=self._said.excess), 1.0) * self._said.hand
+        return min(meant(Link(need=self._said.excess), 1.0), self._said.hand)
 
     @property
     def overlap(self) -> tuple[float, float]:

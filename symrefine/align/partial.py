@@ -130,7 +130,10 @@ def partial_meeting(evidence: Evidence, *, reflections: bool, factor: float = 1.
     found = judge.polished_all([], starts)
     if not any(m.is_promising for m in found):
         found = judge.polished_all([], starts, patient=True)
-    admitted = [m for m in found if reflections or m.determinant > 0]
+    if not (admitted := [m for m in found if reflections or m.determinant > 0]):
+        proper = [s for s in starts if np.linalg.det(s.matrix) > 0.0]
+        admitted = [] if reflections else judge.polished_all([], proper, patient=True)
+        found += admitted
     if not admitted:
         return None
     best = max(admitted, key=lambda m: m.score)

@@ -277,7 +277,8 @@ def _verdict(choice: Choice, motion: Similarity, scale: bool, reflections: bool,
             f"the objects differ by {excess:.1f} times what the tolerance allows: 99 % of the source comes within "
             f"{100 * farthest:.2g} % of the diagonal"
         )
-    hand = sure + (1.0 - sure) * _has_both_hands(choice) if reflections and choice.hand_is_open else 1.0
+    asked = status == OK and reflections and choice.hand_is_open
+    hand = sure + (1.0 - sure) * _has_both_hands(choice) if asked else 1.0
     return Verdict(status=status, excess=excess, determinant_confidence=sure, hand=hand)
 
 

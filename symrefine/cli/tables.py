@@ -86,12 +86,14 @@ def partial(record: Record) -> str:
     if not seen:
         return "parts of the surface were not seen: there may be more"
     most = max(seen, key=lambda c: c["unseen"])
-    return (
+    told = (
         "parts of the surface were not seen: there may be more; of what was seen "
         f"{100 * min(c['supported'] for c in seen):.0f} % and more support each element, "
-        f"{100 * max(c['contradicted'] for c in seen):.2g} % and less contradict it, "
-        f"{100 * most['unseen']:.0f} % and less have an image where nobody looked"
+        f"{100 * max(c['contradicted'] for c in seen):.2g} % and less contradict it"
     )
+    if not most["unseen"]:
+        return told
+    return f"{told}, {100 * most['unseen']:.0f} % and less have an image where nobody looked"
 
 
 def _place(record: Record) -> str:

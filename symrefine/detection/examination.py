@@ -53,12 +53,13 @@ class Examined:
     carried: Mapping[str, OnVertices | None]
 
     @property
-    def strewn(self) -> bool:
+    def has_strays_left(self) -> bool:
         """Whether so many strays are left beside the surface that what they deny is no evidence.
 
-        More than the share that details may have is lonely.
+        More than the share that details may have is lonely, and as many were set apart: thin parts are lonely, too.
         """
-        return len(self.measured.strays) > 0 and float(self.surface.cloud.lonely.mean()) > SHARES[-1]
+        found = len(self.measured.strays) / self.measured.count
+        return min(found, float(self.surface.cloud.lonely.mean())) > SHARES[-1]
 
     def vertices_of(self, found: Hypothesis) -> OnVertices | None:
         """Where the vertices of a mesh put a group of the chain, if it maps them onto one another."""

@@ -146,7 +146,7 @@ class Detection(ReadOnly):
             its sample.
         at_least: whether the surface has open borders beyond which nobody looked, or is `strewn`: the object may have
             more symmetry.
-        strewn: whether it is for strays alone, so many of which are left beside the surface that they may hide some.
+        strewn: whether so many strays are left beside the surface that they may hide some, and all of it was seen.
         clumps: how many groups of them stand apart from the body, the others being single strays.
         outlier_share: of all points.
         exact: that and how exactly the group maps vertices of a mesh onto vertices, if it does; None of anything else.

@@ -170,6 +170,8 @@ def _report(
     turns = [e for e in chosen.elements if e.operations.kind in ("axis", "improper")]
     turned_down = [] if reason else _turned_down(found, chosen, COARSE * tolerance)
     inversion = next((e for e in chosen.elements if e.operations.kind == "inversion"), None)
+    more = not reason and chosen.group.name != "Kh"  # of which there is none
+    strewn = found.has_strays_left and not any(e.coverage.unseen for e in chosen.elements)
     return Detection(
         point_group="undetermined" if reason else chosen.group.name,
         confidence=0.0 if reason else decision.probabilities[index],
@@ -225,8 +227,8 @@ def _report(
         ),
         outliers=found.outliers,
         outlier_share=found.outlier_share,
-        at_least=(found.pool.at_least or found.strewn) and not reason,
-        strewn=found.strewn and not found.pool.at_least and not reason,
+        at_least=(found.pool.at_least or strewn) and more,
+        strewn=strewn and more,
         clumps=len(measured.clumps),
         exact=None if on is None else Exact(miss=on.miss, faces=on.faces, point_group=on.finite.name),
         sample=found.sample,

@@ -72,6 +72,7 @@ def _card(out: Path, row: Row, decision: Decision | None, label: Label | None) -
 def _remarks(row: Row) -> Iterator[str]:
     """What one should know before one decides."""
     if row["at_least"]:
-        yield "Not all of it was seen: there may be more."
+        strewn = row.get("strewn", False)
+        yield "Strays that are left near it may hide more." if strewn else "Not all of it was seen: there may be more."
     if row["textured"] not in (None, row["answer"]):
         yield f"With its texture it is {symbol(str(row['textured']))}."

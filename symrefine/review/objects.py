@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 from symrefine.detection.result import Detection
 from symrefine.detection.story import chosen
@@ -42,6 +42,7 @@ class Row(TypedDict):
         object: its number.
         answer: the group that was found, None where nothing was decided for the reason in `doubt`.
         at_least: whether there may be more than was seen.
+        strewn: whether that is for strays that are left.
         textured: the group of the shape with its texture, where one was read beside the shape.
         tolerances: at which the groups are told how likely they are.
         choices: groups each inside the next, C1 first.
@@ -58,6 +59,7 @@ class Row(TypedDict):
     confidence: float
     doubt: str
     at_least: bool
+    strewn: NotRequired[bool]
     textured: str | None
     tolerance: float
     tolerances: list[float]
@@ -90,6 +92,7 @@ def examined(found: Detection, shape: Shape, *, scale: float) -> Examined:
         "confidence": number(found.confidence),
         "doubt": found.undetermined,
         "at_least": bool(found.at_least),
+        "strewn": bool(found.strewn),
         "textured": None if found.textured is None else found.textured.point_group,
         "tolerance": number(found.tolerance),
         "tolerances": [number(t) for t in steps],
