@@ -22,7 +22,6 @@ from symrefine.fit.refine import MAX_OUTER
 from symrefine.geometry import Array, Isometry, Mask, householder, tight_diagonal
 from symrefine.groups.orthogonal import chord_angles
 from symrefine.ntuples.rank import SIGNIFICANT
-from symrefine.propose.consensus import Proposal
 from symrefine.propose.maps import WITHIN, maps_between
 from symrefine.propose.votes import mirror_votes
 from symrefine.shape import Index
@@ -125,8 +124,7 @@ def partial_meeting(evidence: Evidence, *, reflections: bool, factor: float = 1.
         diagonal=min(tight_diagonal(s.cloud.points) for s in (source, target)),
         tolerance=evidence.tolerance,
     )
-    promising = judge.promising(maps_between(source.cloud, target.cloud, judge.diagonal))
-    starts = [Similarity(matrix=p.matrix, shift=p.shift) for p in promising]
+    starts = judge.promising()
     found = judge.polished_all([], starts)
     if not any(m.is_promising for m in found):
         found = judge.polished_all([], starts, patient=True)
@@ -166,9 +164,11 @@ class Judge:
         """Miss from which on nothing is met, diagonals."""
         return LIMITS[1] * self.tolerance
 
-    def promising(self, every: Sequence[Proposal]) -> list[Proposal]:
-        """The proposals of each determinant under which most local planes meet others, as they stand."""
-        count = [int(self.meets(Similarity(matrix=p.matrix, shift=p.shift)).sum()) for p in every]
+    def promising(self) -> list[Similarity]:
+        """The maps of each determinant that are proposed under which most local planes meet others, as they stand."""
+        proposed = maps_between(self.source.cloud, self.target.cloud, self.diagonal)
+        every = [Similarity(matrix=p.matrix, shift=p.shift) for p in proposed]
+        count = [int(self.meets(m).sum()) for m in every]
         order = [i for i in np.argsort(-np.array(count), kind="stable") if count[i] >= max(WORTH * max(count), 1.0)]
         signs = [float(np.sign(np.linalg.det(every[i].matrix))) for i in order]
         return [every[i] for k, i in enumerate(order) if signs[:k].count(signs[k]) < POLISHED]
@@ -314,7 +314,7 @@ class Judge:
         while len(every) < MOST_MAPS:
             good = [m.motion for m in every if as_good(best.score, m.score)]
             products = (a.after(best.motion.inverse).after(b) for a in good for b in good)
-            fresh = next((p for p in products if not any(self.same(p, t) for t in tried)), None)
+            fresh = next((p for p in products if not self._among(p, tried)), None)
             if fresh is None:
                 break
             tried.append(fresh)

@@ -6,7 +6,7 @@ the scale. Everything is in units of the target: RMS radius 1 about its centre.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -74,7 +74,7 @@ class Polished:
     steps: int
     converged: bool
     contact: Contact
-    given_up: bool = False
+    given_up: bool
 
 
 def polish(
@@ -127,13 +127,15 @@ def polish(
         if settled and few == 1 and moved < SCALE_FLOOR * target.spacing:
             return _ended(start.moved(x), covariance, contact, index, converged=True)
         if index == SOON and worthwhile is not None and not worthwhile(start.moved(x)):
-            return replace(_ended(start.moved(x), covariance, contact, index, converged=False), given_up=True)
+            return _ended(start.moved(x), covariance, contact, index, converged=False, given_up=True)
         if settled and moved < target.spacing:
             few = 1
     return _ended(start.moved(x), covariance, contact, MAX_OUTER, converged=False)
 
 
-def _ended(motion: Similarity, covariance: Array, contact: Contact, steps: int, *, converged: bool) -> Polished:
+def _ended(
+    motion: Similarity, covariance: Array, contact: Contact, steps: int, *, converged: bool, given_up: bool = False
+) -> Polished:
     """What is told of a map, given the covariance [6 or 7, ...] of all that was unknown."""
     return Polished(
         motion=motion,
@@ -142,6 +144,7 @@ def _ended(motion: Similarity, covariance: Array, contact: Contact, steps: int, 
         steps=steps,
         converged=converged,
         contact=contact,
+        given_up=given_up,
     )
 
 

@@ -15,7 +15,7 @@ from symrefine.align.polish import Similarity, polish
 from symrefine.align.shown import Shown
 from symrefine.decide.maps import said_by_both
 from symrefine.geometry import tight_diagonal
-from symrefine.propose.maps import WITHIN, maps_between
+from symrefine.propose.maps import WITHIN
 
 # Sizes of the source that are tried, over that at which both spread alike: what is missing of a half changes its spread
 # by less than 2. From one to the next no point of a part that both share moves by more than matches may be apart.
@@ -52,9 +52,7 @@ def size_of_parts(evidence: Evidence) -> Size | None:
     tried: list[tuple[float, Judge, Similarity]] = []
     for factor in STEP ** np.arange(-steps, steps + 1.0):
         here = judge(float(factor))
-        for p in here.promising(maps_between(here.source.cloud, target.cloud, here.diagonal)):
-            start = Similarity(matrix=p.matrix, shift=p.shift)
-            tried.append((here.shared(start), here, start))
+        tried += [(here.shared(start), here, start) for start in here.promising()]
     best, size = -np.inf, None
     for _, here, start in sorted(tried, key=lambda t: -t[0])[:POLISHED]:
         error, known = WITHIN * here.diagonal, np.zeros((6, 6))

@@ -23,9 +23,9 @@ def signatures(cloud: Planes, radius: float, every: int = 1) -> Array:
     """
     count, points, normals = len(cloud.points), cloud.points.T.copy(), cloud.normals.T.copy()
     one, other = pairs_within(cloud.points, radius).T.copy()
-    counts = np.arange(count) % every == 0
+    told = np.arange(count) % every == 0
     if every > 1:
-        either = np.flatnonzero(counts[one] | counts[other])
+        either = np.flatnonzero(told[one] | told[other])
         one, other = one[either], other[either]
     toward = points.take(other, axis=1) - points.take(one, axis=1)
     near, far = normals.take(one, axis=1), normals.take(other, axis=1)
@@ -36,8 +36,8 @@ def signatures(cloud: Planes, radius: float, every: int = 1) -> Array:
     shell = np.tile(np.minimum(squares * (SHELLS / radius**2), SHELLS - 1).astype(np.int64), 2)
     owner, leaning, turned = np.concatenate([one, other]), np.roll(slopes, len(one)), np.tile(_dot(near, far), 2)
     if every > 1:
-        tells = np.flatnonzero(counts[np.concatenate([other, one])])
-        owner, ends, slopes, leaning, turned, shell = (v[tells] for v in (owner, ends, slopes, leaning, turned, shell))
+        some = np.flatnonzero(told[np.concatenate([other, one])])
+        owner, ends, slopes, leaning, turned, shell = (v[some] for v in (owner, ends, slopes, leaning, turned, shell))
     bent = np.where(np.bincount(owner, ends, count) < 0.0, -1.0, 1.0)
     height = 0.5 + 0.5 * bent.take(owner) * slopes
     shell += owner * SHELLS
