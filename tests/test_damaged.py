@@ -397,6 +397,12 @@ def test_strays_that_are_left_near_a_surface_are_no_border(make):
     assert surface_of(whole[ends < np.quantile(ends, 0.7)]).openings.evident
 
 
+def test_strays_among_few_points_are_no_border_that_is_evident():
+    points = damage.outliers(household.camera(), 0.3, np.random.default_rng(28)).points[::2]
+    made = surface_of(points)
+    assert not made.openings.evident
+
+
 def test_strays_that_may_hide_more_leave_an_answer_that_says_so():
     """What is left of four in ten points beside a spool denies that it is round, of one in twenty it does not."""
     spool, _ = specimen("shape", "spool")
