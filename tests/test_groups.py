@@ -203,6 +203,23 @@ def test_elements_are_operations_and_their_order_is_the_highest(name):
 
 
 @pytest.mark.parametrize("name", FINITE)
+def test_the_mirrors_that_stand_alone_are_those_that_commute_with_every_operation(name):
+    group = point_group(name, random_orthogonal(rng_of(name, 2)))
+    lone = group.lone_mirrors()
+    for normal in group.mirrors():
+        mirror, every = householder(normal), group.operations()
+        commutes = np.abs(every @ mirror - mirror @ every).max() < 1e-12
+        assert commutes == bool((np.abs(lone @ normal) > 1.0 - 1e-12).any())
+
+
+@pytest.mark.parametrize(("name", "count"), [("Cinfv", 0), ("Cinfh", 1), ("Dinfh", 1), ("Kh", 0), ("K", 0)])
+def test_of_what_is_round_only_a_mirror_across_stands_alone(name, count):
+    group = point_group(name, random_orthogonal(rng_of(name, 3)))
+    assert len(group.lone_mirrors()) == count
+    np.testing.assert_allclose(np.abs(group.lone_mirrors() @ group.frame[2]), np.ones(count), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", FINITE)
 def test_elements_account_for_every_operation(name):
     group = point_group(name)
     turns = 1 + sum(k - 1 for _, k in group.rotation_axes())

@@ -9,18 +9,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from symrefine.decide.posterior import LEAST, Link, certain, decide, known_links, meant
+from symrefine.groups import PointGroup
 
 NEED = st.floats(0.0, 0.5)
 TOLERANCE = st.floats(1e-3, 0.2)
-LINK = st.builds(Link, need=NEED, lone_mirror=st.booleans())
 
 
-def chain_of(needs, lone):
+def chain_of(members, lone):
     """Each group lies in the next, so it needs no more; a lone mirror can only be the first."""
-    return [Link(need=n, lone_mirror=lone and i == 0) for i, n in enumerate(sorted(needs))]
+    ordered = sorted(members)
+    return [Link(need=n, lone_mirror=lone and i == 0, alone=alone) for i, (n, alone) in enumerate(ordered)]
 
 
-CHAIN = st.builds(chain_of, st.lists(NEED, max_size=6), st.booleans())
+CHAIN = st.builds(chain_of, st.lists(st.tuples(NEED, st.integers(0, 3)), max_size=6), st.booleans())
 
 
 @given(CHAIN, TOLERANCE)
@@ -53,6 +54,16 @@ def test_the_less_was_seen_the_less_sure_is_every_group(links, tolerance, unclos
     assert decide(links, tolerance) == decide(links, tolerance, unclosed=0.0)
 
 
+@given(TOLERANCE, st.floats(0.1, 1.0))
+def test_what_nobody_saw_breaks_two_mirrors_rather_than_one_and_one_rather_than_what_is_repeated(tolerance, unclosed):
+    groups = [PointGroup(name=name) for name in ("C2v", "Cs", "C4v")]
+    two, one, many = (decide(known_links([g], [0.0]), tolerance, unclosed=unclosed).inside[1] for g in groups)
+    assert two < one < many < 1.0
+    # A mirror of a larger group is as sure as that.
+    both = decide(known_links([groups[0], groups[2]], [0.0, 0.0]), tolerance, unclosed=unclosed)
+    assert both.inside == (1.0, many, many)
+
+
 @given(TOLERANCE)
 def test_without_links_there_is_no_symmetry_for_certain(tolerance):
     found = decide([], tolerance)
@@ -82,17 +93,18 @@ def test_a_lone_mirror_is_forgiven_no_less(need, tolerance):
 
 @given(st.lists(NEED, max_size=6).map(sorted), st.sampled_from(["Cs", "C2"]))
 def test_a_mirror_is_lone_where_it_comes_first_and_nothing_like_it_follows(needs, first):
-    names = [first, "C2v", "C4v", "D4h", "Oh", "Kh"][: len(needs)]
-    links = known_links(names, needs)
+    groups = [PointGroup(name=n) for n in (first, "C2v", "C4v", "D4h", "Oh", "Kh")][: len(needs)]
+    links = known_links(groups, needs)
     assert [link.need for link in links] == needs
     assert not any(link.lone_mirror for link in links[1:])
     assert all(link.lone_mirror <= (first == "Cs") for link in links[:1])
-    assert [link.lone_mirror for link in known_links(names[:1], needs[:1])] == [first == "Cs"] * len(needs[:1])
+    assert [link.lone_mirror for link in known_links(groups[:1], needs[:1])] == [first == "Cs"] * len(needs[:1])
 
 
 @given(st.floats(1e-3, 0.1), TOLERANCE)
 def test_one_of_several_mirrors_is_forgiven_no_more_than_the_rest(need, tolerance):
-    lone, other = (decide(known_links(["Cs", "C4v"], [need, k * need]), tolerance) for k in (10.0, 1.5))
+    groups = [PointGroup(name="Cs"), PointGroup(name="C4v")]
+    lone, other = (decide(known_links(groups, [need, k * need]), tolerance) for k in (10.0, 1.5))
     assert other.inside[1] <= lone.inside[1]
     assert other.inside[1] == meant(Link(need=need), tolerance)
 
@@ -140,7 +152,7 @@ def test_more_noise_makes_no_group_that_holds_surer(links, noise, tolerance):
     assert decide(links, tolerance) == decide(links, tolerance, 0.0)
 
 
-@given(st.lists(LINK, max_size=6), TOLERANCE)
+@given(st.lists(st.builds(Link, need=NEED, lone_mirror=st.booleans()), max_size=6), TOLERANCE)
 def test_what_is_inside_a_group_is_at_least_as_sure_in_whatever_order_needs_come(links, tolerance):
     """A fit of the larger group may have come out better than that of the smaller."""
     found = decide(links, tolerance)

@@ -24,7 +24,7 @@ from experiments.objects.built_symmetry import Truth, specimen
 from experiments.objects.catalogue import catalogue
 from experiments.objects.poses import Pose
 from experiments.objects.shapes import sample
-from experiments.studies.damaged import OWN, REAL
+from experiments.studies.damaged import OWN, REAL, SURE
 from experiments.studies.jobs import add_jobs, in_order
 from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
@@ -160,6 +160,12 @@ def recalled(rows: Sequence[Row]) -> tuple[float, float, float]:
     return len(found) / max(sum(r.asked for r in rows), 1), least, float(right[-1]) / len(told) if told else math.nan
 
 
+def called_sure(rows: Sequence[Row]) -> str:
+    """How many elements were told as surely as answers are called sure, and how many of them are right."""
+    sure = [t for r in rows for t in r.told if t.confidence >= SURE]
+    return f"{len(sure)} told with {SURE:g} and more, {sum(t.is_true >= 0 for t in sure)} of them right"
+
+
 def line(rows: Sequence[Row]) -> str:
     """The figures of some rows."""
     recall, least, precision = recalled(rows)
@@ -197,7 +203,7 @@ def main() -> None:
         some = [r for r in rows if low < r.occlusion <= high]
         if some:
             print(f"occlusion {low:.1f} to {high:.1f}  {line(some)}")
-    print(f"all                   {line(rows)}")
+    print(f"all                   {line(rows)}; {called_sure(rows)}")
 
 
 if __name__ == "__main__":

@@ -78,7 +78,7 @@ class Examined:
         beyond, surface = self.links[1:], self.surface
         # At the tolerance that was asked for, so that a larger one takes no group away that a smaller one tells.
         placed = [1.0 - meant(Link(need=h.elsewhere), surface.tolerance, surface.floor) for h in beyond]
-        return known_links([h.group.name for h in beyond], [h.need for h in beyond], placed)
+        return known_links([h.group for h in beyond], [h.need for h in beyond], placed)
 
     def choices(self, tolerance: float) -> tuple[Alternative, ...]:
         """Every group of the chain, C1 first, as likely as at a tolerance."""

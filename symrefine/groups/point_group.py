@@ -104,6 +104,12 @@ class PointGroup:
         """Unit normals [m, 3] of the mirror planes; a continuous family is represented by one member."""
         return np.asarray(self._elements().mirrors @ self.frame)
 
+    def lone_mirrors(self) -> Array:
+        """Unit normals [m, 3] of the mirror planes that no operation carries onto another one."""
+        normals, finite = self.mirrors(), self if self.is_finite else self.sampled(3)
+        cosines = np.abs(np.einsum("mi,kij,mj->km", normals, finite.operations(), normals))
+        return normals[(cosines > 1.0 - EXACT).all(axis=0)]
+
     def rotation_axes(self) -> list[OrderedAxis]:
         """(direction, highest order) of every rotation axis, by falling order; `math.inf` for a continuous axis.
 
