@@ -217,7 +217,7 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
         elif not pool.has(moved, needs) and not pool.met(moved):
             pool = _joined_at_once(surface, pool, moved) if needs <= pool.limit and pool.largest.elements else pool
             if not pool.has(moved, needs):
-                found = fitted(surface, moved, error_rad=look.error_rad, close=ALIKE * pool.limit, was_slid=True)
+                found = fitted(surface, moved, error_rad=look.error_rad, close=ALIKE * pool.limit)
                 if surface.openings is None or surface.viewed or found.supported >= SUPPORTED:
                     pool = _grown(surface, pool, found)
     return pool

@@ -104,7 +104,6 @@ def fitted(
     before: int = 0,
     most: float = math.inf,
     close: float = math.inf,
-    was_slid: bool = False,
 ) -> Hypothesis:
     """The group fitted as a whole from where it stands, which may be off by `error_rad`, and judged.
 
@@ -129,7 +128,7 @@ def fitted(
     else:
         found = _placed(surface, best, steps, before)
         if exact < found.need <= COARSE * most:
-            found = _moved(surface, found, every, was_slid=was_slid or best is not first)
+            found = _moved(surface, found, every, was_slid=best is not first)
     if not surface.viewed or not found.elements:
         return found
     told = is_told(found.placed, [(e.operations, e.coverage.supported) for e in found.elements])
