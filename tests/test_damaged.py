@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from matplotlib.path import Path as MatplotlibPath
 from scipy.spatial import cKDTree
 
-from experiments.objects import damage, household
+from experiments.objects import damage, household, tangles
 from experiments.objects.built_symmetry import Truth, specimen
 from experiments.objects.constructions import polygon
 from experiments.objects.parts import extruded
@@ -29,7 +29,7 @@ from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.fit.placed import FREE_TURNS, Placed
 from symrefine.geometry import Isometry, frame_with_z, householder, line_angle_rad, random_orthogonal, rotation
-from symrefine.groups import PointGroup
+from symrefine.groups import PointGroup, is_subgroup, point_group
 from symrefine.load import load
 from symrefine.picture.words import scanned
 from symrefine.propose.candidates import repeated
@@ -99,6 +99,35 @@ def test_a_surface_has_no_strays_however_uneven(make, ratio):
 def test_a_volume_has_no_strays():
     cloud = np.random.default_rng(4).normal(size=(8000, 3))
     assert len(sampling(cloud, np.random.default_rng(0), outliers=True).strays) == 0
+
+
+@pytest.mark.parametrize(("name", "kind", "strength"), [("D6h-41", "outliers", 0.1), ("D3d-41", "uneven", 10.0)])
+def test_what_is_solid_to_a_few_of_the_points_is_asked_of_all(name, kind, strength):
+    """To 5,000 points many small parts are solid; strays and density are told all the same."""
+    made, truth = damaged.damaged(damaged.Case(family="tangle", name=name, kind=kind, strength=strength))
+    found = detect(made.points)
+    assert (found.point_group, found.confidence > 0.5) == (truth.group.name, True)
+    if kind == "outliers":
+        flagged = np.zeros(len(made.points), dtype=bool)
+        flagged[found.outliers] = True
+        assert flagged[made.strays == 1].mean() > 0.5 > 0.02 > flagged[made.strays == 0].mean()
+
+
+@pytest.mark.parametrize("name", tangles.names(7))
+def test_a_tangle_has_the_group_it_was_made_of_or_more(name):
+    group, _ = name.split("-")
+    assert is_subgroup(point_group(group), specimen("tangle", name)[1].group, 1e-6)
+
+
+def test_strays_beside_a_volume_stand_off_and_its_fuzzy_ends_do_not():
+    rng = np.random.default_rng(31)
+    cube = rng.uniform(-0.5, 0.5, (9000, 3))
+    far = rng.uniform(-1.5, 1.5, (1000, 3))
+    strays = sampling(np.concatenate([cube, far]), np.random.default_rng(0), outliers=True).strays
+    assert (strays >= len(cube)).mean() > 0.99
+    assert len(strays) > 0.9 * (np.abs(far).max(axis=1) > 0.6).sum()
+    for cloud in (cube, rng.normal(size=(9000, 3)), rng.exponential(size=(9000, 3))):
+        assert len(sampling(cloud, np.random.default_rng(0), outliers=True).strays) == 0
 
 
 @pytest.mark.parametrize("ratio", [10.0, 100.0])

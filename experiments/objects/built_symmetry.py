@@ -1,7 +1,7 @@
 """What symmetry an object was built with, and whether an element stated of it belongs to that.
 
-The objects are the shapes of all point groups, their siblings with one detail out of place, the household objects and,
-where they are, the catalogued meshes.
+The objects are the shapes of all point groups, their siblings with one detail out of place, the household objects,
+tangles of random parts and, where they are, the catalogued meshes.
 """
 
 import math
@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.objects import group_shapes, household
+from experiments.objects import group_shapes, household, tangles
 from experiments.objects.catalogue import catalogue, catalogued
-from experiments.objects.parts import placed_group
+from experiments.objects.parts import assembled, placed_group
 from experiments.objects.poses import Pose
 from symrefine.fit.placed import FREE_TURNS
 from symrefine.geometry import Array, frame_with_z, householder, rotation, rotoreflection
@@ -96,6 +96,10 @@ def specimen(family: str, name: str) -> tuple[Shape, Truth]:
         return entry.build(), Truth(group=_upright(entry), center=np.zeros(3))
     if family == "catalogue":
         return catalogued(name), _entered(catalogue()[name])
+    if family == "tangle":
+        made = tangles.parts(name)
+        group, center = placed_group(made)
+        return assembled(made), Truth(group=group, center=center)
     sibling = family == "sibling"
     group, center = placed_group(group_shapes.DESIGNS[name].parts(sibling))
     return group_shapes.shape(name, sibling), Truth(group=group, center=center)

@@ -1,7 +1,7 @@
 """Clouds as sensors give them: strays, uneven density, missing parts, views from a camera.
 
-    python -m experiments.studies.damaged [--only KIND ...] [--shapes NAME ...] [--every N] [--seed N] [--jobs N]
-                                          [--figure PATH]
+    python -m experiments.studies.damaged [--only KIND ...] [--shapes NAME ... | --tangles N] [--every N] [--seed N]
+                                          [--jobs N] [--figure PATH]
 
 Shapes of many groups, 20,000 points with 0.3 % noise in random poses and units, damaged by kind and strength (see
 `experiments.objects.damage`). A plane is asked for where at least 15 % of the points that are left move under it and
@@ -19,6 +19,7 @@ from time import perf_counter
 
 import numpy as np
 
+from experiments.objects import tangles
 from experiments.objects.built_symmetry import Truth, holds, specimen
 from experiments.objects.catalogue import catalogue
 from experiments.objects.damage import KINDS, Damaged, can_show
@@ -94,9 +95,11 @@ class Row:
     seconds: float
 
 
-def cases(kinds: Sequence[str], shapes: Sequence[str], seed: int) -> Iterator[Case]:
-    """Every shape with every damage."""
+def cases(kinds: Sequence[str], shapes: Sequence[str], seed: int, tangled: int | None = None) -> Iterator[Case]:
+    """Every shape with every damage, or every tangle of a seed."""
     named = [("shape", n) for n in OWN] + [("catalogue", n) for n in REAL if n in catalogue()]
+    if tangled is not None:
+        named = [("tangle", n) for n in tangles.names(tangled)]
     for kind, (_, strengths) in KINDS.items():
         for strength in strengths:
             for family, name in named:
@@ -107,7 +110,8 @@ def cases(kinds: Sequence[str], shapes: Sequence[str], seed: int) -> Iterator[Ca
 def damaged(case: Case) -> tuple[Damaged, Truth]:
     """The object as it is shown, and its symmetry there."""
     names = [*OWN, *REAL]
-    key = [case.seed, names.index(case.name), list(KINDS).index(case.kind), round(1000 * case.strength)]
+    name = [names.index(case.name)] if case.name in names else case.name.encode()
+    key = [case.seed, *name, list(KINDS).index(case.kind), round(1000 * case.strength)]
     rng = np.random.default_rng(key)
     mesh, truth = specimen(case.family, case.name)
     made = KINDS[case.kind][0](mesh, case.strength, rng)
@@ -233,13 +237,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", nargs="*", default=[], choices=list(KINDS), metavar="KIND")
     parser.add_argument("--shapes", nargs="*", default=[], metavar="NAME")
+    parser.add_argument("--tangles", type=int, metavar="N", help="tangles of this seed (`experiments.objects.tangles`)")
     parser.add_argument("--every", type=int, default=1, help="each so many-th case (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of damage, noise and poses (default: %(default)s)")
     parser.add_argument("--figure", type=Path, help="where a heat map of shapes by damage goes")
     add_jobs(parser)
     options = parser.parse_args()
     rows = []
-    for row in in_order(run, list(cases(options.only, options.shapes, options.seed))[:: options.every], options.jobs):
+    every = list(cases(options.only, options.shapes, options.seed, options.tangles))[:: options.every]
+    for row in in_order(run, every, options.jobs):
         rows.append(row)
         if not row.right or row.false or row.found < row.shown:
             print(

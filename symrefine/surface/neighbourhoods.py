@@ -234,17 +234,17 @@ def _blob_flatness(k: int) -> float:
     return max(float(np.median(flatness_of(values))), 1e-12)
 
 
-def fills_volume(points: Array, tree: Tree, rng: np.random.Generator) -> bool:
-    """Whether points [N, 3] (RMS radius 1) fill a volume: at no width do neighbourhoods look flatter than a blob."""
-    order = rng.permutation(len(points))
-    first, widest = _flattest(points, tree, order[:PROBES], NEIGHBOURS[0])
+def fills_volume(points: Array, tree: Tree, rng: np.random.Generator, radius: float = 1.0) -> bool:
+    """Whether points [N, 3] of an RMS radius fill a volume: at no width do neighbourhoods look flatter than a blob."""
+    order, most = rng.permutation(len(points)), WIDEST_BLOB * radius
+    first, widest = _flattest(points, tree, order[:PROBES], NEIGHBOURS[0], most)
     if abs(first - VOLUME) > UNCERTAIN:
         return first > VOLUME
-    return _flattest(points, tree, order[: 5 * PROBES], widest)[0] > VOLUME
+    return _flattest(points, tree, order[: 5 * PROBES], widest, most)[0] > VOLUME
 
 
-def _flattest(points: Array, tree: Tree, pick: Index, likely: int) -> tuple[float, int]:
-    """Smallest median flatness of neighbourhoods of some points, over that of a blob, at any size and width.
+def _flattest(points: Array, tree: Tree, pick: Index, likely: int, most: float) -> tuple[float, int]:
+    """Smallest median flatness of neighbourhoods of some points, over that of a blob, at any size, up to `most` wide.
 
     Told with the largest size that was asked; sizes up to the one that is `likely` to be it are asked at once.
     """
@@ -253,7 +253,7 @@ def _flattest(points: Array, tree: Tree, pick: Index, likely: int) -> tuple[floa
     while size <= max(len(points) // 8, NEIGHBOURS[0]):
         if size > near.shape[1]:
             distance, near = tree.query(points[pick], size)
-        if float(np.median(distance[:, size - 1])) > WIDEST_BLOB:
+        if float(np.median(distance[:, size - 1])) > most:
             break
         values = planes_of(points, near[:, :size])[2]
         flattest = min(flattest, float(np.median(flatness_of(values))) / _blob_flatness(size))

@@ -4,6 +4,7 @@ A few thousand of the points tell whether there is anything to be done at all; o
 decided here depends on the surroundings of a point alone, so that it breaks no symmetry.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -77,7 +78,7 @@ def sampling(
 
     With `apart` clumps apart from the body are as well, and those groups that are known to be `foreign`, indices of
     each; if none are, it is told what may be. Without `groups` nobody looks for any. `asked` of the points tell whether
-    there is anything to be done. Of points that fill a volume none is set apart, and all are kept.
+    there is anything to be done. Of points that fill a volume only strays are set apart.
     """
     size = len(points)
     kept: Index = np.arange(size)
@@ -89,11 +90,11 @@ def sampling(
     spread = points[some].std()
     points = (points - points[some].mean(axis=0)) / spread
     around = Surroundings.of(points[some])
-    if fills_volume(around.points, around.tree, np.random.default_rng(0)):
-        return Sampling(kept=kept, even=kept, strays=kept[:0], solid=True)
-    if outliers and _alone(around).any():
+    solid, alone = _is_solid(around, points), _alone(around)
+    if outliers and alone.any() and (not solid or _stand_off(around)):
         kept = _without_strays(points)
         around = around_some(points[kept], rng, asked)
+    groups = groups and not solid  # nothing tells one volume from another
     if outliers and groups and apart and (found := clumps(points[kept], around)):
         taken += [kept[c] for c in found]
         kept = _without(kept, taken, size)
@@ -114,7 +115,15 @@ def sampling(
         strays=strays,
         clumps=tuple(taken),
         blobs=tuple(lone),
+        solid=solid,
     )
+
+
+def _is_solid(around: Surroundings, points: Array) -> bool:
+    """Whether points [N, 3] fill a volume, as some of them say: to few points small parts are solid, too."""
+    some, radius = len(around.points) < len(points), math.sqrt(3.0)  # coordinates have a standard deviation of 1
+    first = fills_volume(around.points, around.tree, np.random.default_rng(0), radius)
+    return first and not (some and not fills_volume(points, Tree(points), np.random.default_rng(0), radius))
 
 
 def _without(indices: Index, parts: Sequence[Index], size: int) -> Index:
@@ -154,6 +163,12 @@ def _alone(around: Surroundings) -> Mask:
             loose &= reach[sparse] > FAR * reach[around.near[sparse]].min(axis=1)
         found[sparse] = loose
     return found
+
+
+def _stand_off(around: Surroundings) -> bool:
+    """Whether fewer of some points lie half way to where strays begin than beyond: what is fuzzy thins out there."""
+    far = around.reach / np.median(around.reach)
+    return bool((far > FAR).sum() > ((far > FAR**0.5) & (far <= FAR)).sum())
 
 
 def strays_beside(points: Array, around: Surroundings) -> Mask:
