@@ -101,16 +101,28 @@ def test_a_volume_has_no_strays():
     assert len(sampling(cloud, np.random.default_rng(0), outliers=True).strays) == 0
 
 
-@pytest.mark.parametrize(("name", "kind", "strength"), [("D6h-41", "outliers", 0.1), ("D3d-41", "uneven", 10.0)])
+SOLID = [("D6h-41", "outliers", 0.1), ("D3d-41", "uneven", 10.0), ("D5h-41", "clump", 0.05)]
+
+
+@pytest.mark.parametrize(("name", "kind", "strength"), SOLID)
 def test_what_is_solid_to_a_few_of_the_points_is_asked_of_all(name, kind, strength):
-    """To 5,000 points many small parts are solid; strays and density are told all the same."""
+    """To 5,000 points many small parts are solid; strays, density and clumps are told all the same."""
     made, truth = damaged.damaged(damaged.Case(family="tangle", name=name, kind=kind, strength=strength))
     found = detect(made.points)
     assert (found.point_group, found.confidence > 0.5) == (truth.group.name, True)
-    if kind == "outliers":
+    if (made.strays == 1).any():
         flagged = np.zeros(len(made.points), dtype=bool)
         flagged[found.outliers] = True
         assert flagged[made.strays == 1].mean() > 0.5 > 0.02 > flagged[made.strays == 0].mean()
+
+
+@pytest.mark.parametrize("name", ["D5h-41", "D3d-41", "Th-41"])
+def test_a_clump_beside_parts_that_are_solid_to_a_few_of_the_points_is_set_apart(name):
+    made, _ = damaged.damaged(damaged.Case(family="tangle", name=name, kind="clump", strength=0.05))
+    seen = sampling(made.points, np.random.default_rng(0), outliers=True)
+    assert (seen.solid, len(seen.clumps)) == (False, 1)
+    assert (made.strays[seen.clumps[0]] == 1).all()
+    assert len(seen.clumps[0]) > 0.9 * (made.strays == 1).sum()
 
 
 @pytest.mark.parametrize("name", tangles.names(7))

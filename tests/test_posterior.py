@@ -18,10 +18,10 @@ TOLERANCE = st.floats(1e-3, 0.2)
 def chain_of(members, lone):
     """Each group lies in the next, so it needs no more; a lone mirror can only be the first."""
     ordered = sorted(members)
-    return [Link(need=n, lone_mirror=lone and i == 0, alone=alone) for i, (n, alone) in enumerate(ordered)]
+    return [Link(need=n, lone_mirror=lone and i == 0, broken=broken) for i, (n, broken) in enumerate(ordered)]
 
 
-CHAIN = st.builds(chain_of, st.lists(st.tuples(NEED, st.integers(0, 3)), max_size=6), st.booleans())
+CHAIN = st.builds(chain_of, st.lists(st.tuples(NEED, st.floats(0.0, 1.0)), max_size=6), st.booleans())
 
 
 @given(CHAIN, TOLERANCE)

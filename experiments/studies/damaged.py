@@ -97,9 +97,10 @@ class Row:
 
 def cases(kinds: Sequence[str], shapes: Sequence[str], seed: int, tangled: int | None = None) -> Iterator[Case]:
     """Every shape with every damage, or every tangle of a seed."""
-    named = [("shape", n) for n in OWN] + [("catalogue", n) for n in REAL if n in catalogue()]
     if tangled is not None:
         named = [("tangle", n) for n in tangles.names(tangled)]
+    else:
+        named = [("shape", n) for n in OWN] + [("catalogue", n) for n in REAL if n in catalogue()]
     for kind, (_, strengths) in KINDS.items():
         for strength in strengths:
             for family, name in named:

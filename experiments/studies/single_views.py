@@ -24,7 +24,8 @@ from experiments.objects.built_symmetry import Truth, specimen
 from experiments.objects.catalogue import catalogue
 from experiments.objects.poses import Pose
 from experiments.objects.shapes import sample
-from experiments.studies.damaged import OWN, REAL, SURE
+from experiments.studies.answers import SURE
+from experiments.studies.damaged import OWN, REAL
 from experiments.studies.jobs import add_jobs, in_order
 from symrefine.detection.result import Detection
 from symrefine.detection.story import detect

@@ -63,13 +63,14 @@ PICTURE = Curve(even=EVEN_PICTURE, even_mirror=EVEN_PICTURE_MIRROR, steepness=ST
 class Link:
     """A group of the chain as the decision sees it: the smallest tolerance at which it holds, and if it is a mirror.
 
-    `placed` is the probability that it does not hold elsewhere as well, `alone` how many of its mirrors it has once.
+    `placed` is the probability that it does not hold elsewhere as well, `broken` that what no camera saw breaks it,
+    where as much as was seen is missing.
     """
 
     need: float
     lone_mirror: bool = False
     placed: float = 1.0
-    alone: int = 0
+    broken: float = 0.0
 
 
 def known_links(groups: Sequence[PointGroup], needs: Sequence[float], placed: Sequence[float] = ()) -> list[Link]:
@@ -80,10 +81,15 @@ def known_links(groups: Sequence[PointGroup], needs: Sequence[float], placed: Se
             need=need,
             lone_mirror=group.name == "Cs" and larger >= ALONE * need,
             placed=sure,
-            alone=max(len(group.lone_mirrors()), not group.is_finite),
+            broken=_broken(group),
         )
         for group, need, larger, sure in zip(groups, needs, beyond, placed or [1.0] * len(needs), strict=True)
     ]
+
+
+def _broken(group: PointGroup) -> float:
+    alone = len(group.lone_mirrors()) if group.is_finite else 1
+    return BROKEN[min(alone, len(BROKEN) - 1)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,14 +119,10 @@ def decide(
         curve: what was calibrated on objects of this kind.
         unclosed: how much surface no camera saw at least, by what was seen.
     """
-    own = [_unbroken(link, unclosed) * meant(link, tolerance, noise, curve) for link in links]
+    own = [(1.0 - link.broken * unclosed) * meant(link, tolerance, noise, curve) for link in links]
     # Where a group stands is known as well as where any larger one does.
     inside = np.maximum.accumulate(own[::-1])[::-1]
     return Decision.of([1.0, *inside.tolist()])
-
-
-def _unbroken(link: Link, unclosed: float) -> float:
-    return 1.0 - BROKEN[min(link.alone, len(BROKEN) - 1)] * unclosed
 
 
 def meant(link: Link, tolerance: float, noise: float = 0.0, curve: Curve = SPACE) -> float:

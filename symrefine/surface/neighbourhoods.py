@@ -235,7 +235,7 @@ def _blob_flatness(k: int) -> float:
 
 
 def fills_volume(points: Array, tree: Tree, rng: np.random.Generator, radius: float = 1.0) -> bool:
-    """Whether points [N, 3] of an RMS radius fill a volume: at no width do neighbourhoods look flatter than a blob."""
+    """Whether points [N, 3] of this RMS radius fill a volume: at no width do neighbourhoods look flatter than blobs."""
     order, most = rng.permutation(len(points)), WIDEST_BLOB * radius
     first, widest = _flattest(points, tree, order[:PROBES], NEIGHBOURS[0], most)
     if abs(first - VOLUME) > UNCERTAIN:

@@ -90,8 +90,8 @@ def sampling(
     spread = points[some].std()
     points = (points - points[some].mean(axis=0)) / spread
     around = Surroundings.of(points[some])
-    solid, alone = _is_solid(around, points), _alone(around)
-    if outliers and alone.any() and (not solid or _stand_off(around)):
+    solid = _is_solid(around, points)
+    if outliers and _alone(around).any() and (not solid or _stand_off(around)):
         kept = _without_strays(points)
         around = around_some(points[kept], rng, asked)
     groups = groups and not solid  # nothing tells one volume from another
@@ -121,9 +121,10 @@ def sampling(
 
 def _is_solid(around: Surroundings, points: Array) -> bool:
     """Whether points [N, 3] fill a volume, as some of them say: to few points small parts are solid, too."""
-    some, radius = len(around.points) < len(points), math.sqrt(3.0)  # coordinates have a standard deviation of 1
-    first = fills_volume(around.points, around.tree, np.random.default_rng(0), radius)
-    return first and not (some and not fills_volume(points, Tree(points), np.random.default_rng(0), radius))
+    radius = math.sqrt(3.0)  # coordinates have a standard deviation of 1
+    if not fills_volume(around.points, around.tree, np.random.default_rng(0), radius):
+        return False
+    return len(around.points) == len(points) or fills_volume(points, Tree(points), np.random.default_rng(0), radius)
 
 
 def _without(indices: Index, parts: Sequence[Index], size: int) -> Index:
@@ -167,8 +168,8 @@ def _alone(around: Surroundings) -> Mask:
 
 def _stand_off(around: Surroundings) -> bool:
     """Whether fewer of some points lie half way to where strays begin than beyond: what is fuzzy thins out there."""
-    far = around.reach / np.median(around.reach)
-    return bool((far > FAR).sum() > ((far > FAR**0.5) & (far <= FAR)).sum())
+    usual = np.median(around.reach)
+    return bool(2 * (around.reach > FAR * usual).sum() > (around.reach > FAR**0.5 * usual).sum())
 
 
 def strays_beside(points: Array, around: Surroundings) -> Mask:
