@@ -13,7 +13,7 @@ from experiments.objects.boundary import instance
 from experiments.objects.shapes import box, join, sample
 from experiments.studies import groups
 from experiments.studies.boundary import Case, look
-from symrefine.decide.chain import _told_apart, chain, explore
+from symrefine.decide.chain import _holding, _told_apart, chain, explore
 from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted
 from symrefine.decide.looks import START_ERROR
 from symrefine.decide.pool import Pool
@@ -382,3 +382,24 @@ def test_what_parts_generate_turns_by_no_less_than_tells_directions_apart(parts,
 
 def test_what_generates_nothing_is_nothing():
     assert _told_apart(None, []) is None
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_of_a_group_that_does_not_hold_the_elements_that_do_are_known(seed):
+    """Of the twelve mirrors of a crown of teeth the one that five pins within have too."""
+    teeth = [box((np.cos(a), np.sin(a), 0.0), (0.3, 0.2, 0.3), a) for a in np.linspace(0.0, 2.0 * np.pi, 13)[:-1]]
+    pins = [
+        box((0.5 * np.cos(a), 0.5 * np.sin(a), 0.4), (0.2, 0.2, 0.5), a) for a in np.radians([0, 50, -50, 130, -130])
+    ]
+    rng = np.random.default_rng(seed)
+    points = sample(join([*teeth, *pins, box((0, 0, -0.2), (1.7, 1.7, 0.1))]), 10000, 0.0, rng)
+    measured = measure(Shape(points=points))
+    surface = gather(measured, np.random.default_rng(0))[1]
+    group = point_group("C12v")
+    placed = Placed(group=group, center=-measured.moments.center * [1, 1, 0] / measured.moments.scale)
+    holding = _holding(surface, placed, TOLERANCE)
+    off = [np.degrees(line_angle_rad(h.group.frame[2], [0, 1, 0])) for h in holding if h.group.name == "Cs"]
+    # Those of the plate below may seem to hold at a glance.
+    assert min(off) < 0.1
+    assert len(holding) <= 4
+    assert detect(points).point_group == "Cs"

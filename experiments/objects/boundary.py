@@ -4,7 +4,8 @@
 
 prints them. Families: rotors without mirrors and gears, surfaces of revolution with something to them, meshes of uneven
 area, scans with defects and their siblings, prisms for sparse clouds, objects without symmetry, clouds with something
-extreme, and molecules for a ladder of tolerances. Names are keys; a seed varies all dimensions.
+extreme, molecules for a ladder of tolerances, and thin-walled open vessels. Names are keys; a seed varies all
+dimensions.
 """
 
 import zlib
@@ -20,6 +21,7 @@ from experiments.objects.prisms import SPARSE
 from experiments.objects.scans import SCANS
 from experiments.objects.turning import GEARS, ROTORS
 from experiments.objects.uneven import UNEVEN
+from experiments.objects.vessels import VESSELS
 
 FAMILIES: dict[str, dict[str, Build]] = {
     "rotors": ROTORS,
@@ -31,6 +33,7 @@ FAMILIES: dict[str, dict[str, Build]] = {
     "blobs": BLOBS,
     "far": FAR,
     "tolerances": LADDERS,
+    "vessels": VESSELS,
 }
 
 

@@ -80,6 +80,14 @@ VIEWS: dict[str, tuple[View, ...]] = {
     "blobs": (MESH, *(View(form="cloud", points=n) for n in (600, 2000, 20000)), NOISIER),
     "far": (GIVEN,),
     "tolerances": (GIVEN,),
+    "vessels": (
+        MESH,
+        View(form="cloud", points=3000),
+        View(form="cloud", points=3000, noise_rel=0.003),
+        View(form="cloud", points=10000, noise_rel=0.003),
+        View(form="cloud", points=20000, noise_rel=0.003),
+        View(form="cloud", points=20000, noise_rel=0.01),
+    ),
 }
 
 

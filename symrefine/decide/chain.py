@@ -10,15 +10,22 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
-from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted, has_all, roughly_judged, single
+from symrefine.decide.ends import PLACES, ends_there, ends_too, often_kept, places
+from symrefine.decide.hypotheses import (
+    NOTHING,
+    SAME_RAD,
+    Hypothesis,
+    belief_in_as_much,
+    fitted,
+    has_all,
+    roughly_judged,
+    single,
+)
 from symrefine.decide.looks import COARSE, START_ERROR, exact_need, glances, looked_at
 from symrefine.decide.place import SUPPORTED
 from symrefine.decide.pool import ALIKE, Pool, is_at, is_same
 from symrefine.decide.posterior import ALONE, EVEN, LEAST, Link, certain, meant
-from symrefine.fit.placed import Placed, joined
-from symrefine.geometry import Array, Isometry
+from symrefine.fit.placed import Placed, elements, joined
 from symrefine.groups import PointGroup
 from symrefine.propose.candidates import (
     Evidence,
@@ -37,13 +44,6 @@ from symrefine.surface.surface import Surface
 # What a start that is off by START_ERROR may miss by: half a diagonal is the longest lever. Votes know no more than to
 # AGREE_RAD.
 HOPELESS, HOPELESS_VOTES = 0.5 * START_ERROR / LIMITS[0], 0.5 * AGREE_RAD / LIMITS[0]
-# Share of its open borders that a group carries onto open borders where the object ends there: flat plates 1, mugs 0.75
-# and more, chance up to 0.6.
-KEPT = 2.0 / 3.0
-# Mirrors or axes of a group from which on a hole often lies on one of them by chance, and its border is kept by that.
-PLACES = 3
-# Places where a hole is tried, and local planes that tell its rim: a share of one in three is told to a fifteenth.
-HOLES, RIMS = 50, 1000
 # Share of a surface that a border encloses at most which is too short to be evident: of a ball that is 3 %, by the
 # isoperimetric inequality, and four times that where half of the border was seen.
 ENCLOSED = 0.12
@@ -70,7 +70,7 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     whole = _of_whole(replace(surface, openings=closed), evidence, limit, nothing)
     if surface.openings is None or surface.openings is closed:
         return whole
-    ends, evident = _ends_there(surface, whole.largest), surface.openings.evident
+    ends, evident = ends_there(surface, whole.largest), surface.openings.evident
     if not whole.largest.group.is_polar and (ends or not evident):
         return replace(whole, at_least=evident)  # no single hole leaves such a group, and there is hardly one
     part = _of_part(surface, whole)
@@ -79,9 +79,10 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     # may enclose.
     hidden = max((e.coverage.unseen for e in part.largest.elements), default=0.0)
     # A group that a single hole leaves may keep its border because it keeps the border of almost any.
-    ends = ends and not (more and _often_kept(surface, whole.largest, hidden))
+    ends = ends and not (more and often_kept(surface, whole.largest, hidden))
+    denied = more and ends_too(surface, part.largest, ALIKE * limit)
     missing = (evident or (more and hidden <= ENCLOSED)) and not ends
-    if missing or _places(whole.largest, part.largest) >= PLACES:
+    if not denied and (missing or places(whole.largest, part.largest) >= PLACES):
         return replace(part, at_least=True)
     # What a border hides may be why a larger group is in doubt.
     doubted = (h for h in (part.largest, *part.small) if _size(h.placed) > _size(whole.largest.placed))
@@ -90,60 +91,14 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     if not more:
         return whole
     # To believe that what ends so evenly is missing a part takes as much as to believe in as much as was seen.
-    rival = replace(part.largest, need=math.hypot(part.largest.need, surface.tolerance))
+    asked = belief_in_as_much(surface, part.largest.placed)
+    rival = replace(part.largest, need=math.hypot(part.largest.need, asked))
     return replace(whole, small=(*whole.small, rival))
 
 
 def _hidden(surface: Surface) -> float:
     """The need up to which noise tells no two groups apart, and none is doubted for it."""
     return min(exact_need(surface.floor), certain(surface.tolerance, surface.floor / surface.tolerance))
-
-
-def _ends_there(surface: Surface, found: Hypothesis) -> bool:
-    """Whether a group carries the open borders onto themselves, as what a sensor leaves out has no symmetry."""
-    if surface.openings is None or surface.viewed:
-        return False
-    line, cloud = surface.openings.line, surface.cloud
-    near = [cloud.nearest(m.apply(cloud.points[line]), cloud.classes(np.flatnonzero(line)))[1] for m in _motions(found)]
-    return bool(near) and float(np.median([surface.openings.border[n].mean() for n in near])) > KEPT
-
-
-def _motions(found: Hypothesis) -> list[Isometry]:
-    return [m for e in found.elements for m in e.operations.motions(e.center)]
-
-
-def _often_kept(surface: Surface, found: Hypothesis, share: float) -> bool:
-    """Whether a group keeps the border of a hole of such a share of the surface in one place of so many or more.
-
-    So does the mirror that lies in a plate, wherever the hole is: what it says of one border is chance.
-    """
-    every = surface.cloud.points
-    some = every[:: -(-len(every) // RIMS)]
-    places, width = some[:: -(-len(some) // HOLES)], 2.0 * float(np.median(surface.cloud.reach))
-
-    def away(points: Array) -> Array:
-        """Distances [P, N] of points [N, 3] from the places."""
-        return np.asarray(np.linalg.norm(points - places[:, None], axis=2))
-
-    radii = np.quantile(away(some), share, axis=1, keepdims=True)
-    border = np.abs(away(some) - radii) < width
-    count = np.maximum(border.sum(axis=1), 1)
-    kept = [(border & (np.abs(away(m.apply(some)) - radii) < width)).sum(axis=1) / count for m in _motions(found)]
-    return bool(kept) and PLACES * float((np.median(kept, axis=0) > KEPT).mean()) > 1.0
-
-
-def _places(seen: Hypothesis, found: Hypothesis) -> float:
-    """Mirrors or axes of a group through which a hole leaves the symmetry that is seen: a hole is round.
-
-    So what is left keeps its middle: one mirror, or the turns and mirrors about an axis; of what is round, any mirror.
-    """
-    if seen.group.name == "Cs":
-        return len(found.group.mirrors()) if found.group.is_finite else math.inf
-    if not seen.group.is_finite:
-        return math.inf if (seen.group.name, found.group.name) == ("Cinfv", "Kh") else 1.0
-    if not seen.group.is_polar or not found.group.is_finite:
-        return 1.0
-    return sum(order % seen.group.symbol.fold == 0 for _, order in found.group.rotation_axes())
 
 
 def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float) -> Pool:
@@ -203,6 +158,7 @@ def _size(placed: Placed) -> float:
 
 def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
     """The pool with candidates fitted, but for those that the group so far has anyway."""
+    parts: list[Placed] = []
     for start, glance in _glanced(surface, pool, starts):
         if pool.has(start) or pool.shows(start, glance):
             continue
@@ -214,13 +170,21 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
         pool = replace(pool, looks=(*pool.looks, (glance, moved)))
         if needs > ALIKE * pool.limit:
             pool = replace(pool, looked=(*pool.looked, (moved, needs)))
+            parts += _holding(surface, moved, ALIKE * pool.limit)
         elif not pool.has(moved, needs) and not pool.met(moved):
             pool = _joined_at_once(surface, pool, moved) if needs <= pool.limit and pool.largest.elements else pool
             if not pool.has(moved, needs):
                 found = fitted(surface, moved, error_rad=look.error_rad, close=ALIKE * pool.limit)
                 if surface.openings is None or surface.viewed or found.supported >= SUPPORTED:
                     pool = _grown(surface, pool, found)
-    return pool
+    return _tried(surface, pool, parts) if parts else pool
+
+
+def _holding(surface: Surface, placed: Placed, most: float) -> list[Placed]:
+    """The elements of a group that does not hold which seem to hold alone: of a gear's mirrors those of its holes."""
+    every = elements(placed.group)
+    alone = [e.alone(placed.center) for e in every] if len(every) > 1 else []
+    return [p for p, needs in zip(alone, glances(surface, alone, most), strict=True) if needs < most] if alone else []
 
 
 def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
@@ -343,7 +307,7 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     hidden = max(_hidden(surface), pool.nothing / ALIKE)
     worst = partial(_worst, hidden=hidden)
     rest = sorted([*pool.small, *elements, pool.largest, *near], key=worst)
-    known = [pool.largest, *pool.failed]
+    known = [pool.largest, *pool.failed, *pool.small]
     links = [NOTHING]
     while rest := [h for h in rest if not links[-1].holds(h.placed)]:
         here = links[-1]

@@ -46,10 +46,11 @@ class Element:
 class Hypothesis:
     """A group where it fits best: its elements judged, and what the worst of them needs.
 
-    `history` holds the iterates of the fit; `before` counts those of the parts that it was put together from. `share`
-    tells how many it is of those of its name that noise does not tell from it, and that do not hold together. Where
-    cameras are known, `told` says whether what they saw of its elements makes up the group, and `elsewhere` what it
-    needs at least where it does not stand.
+    `history` holds the iterates of the fit; `before` counts those of the parts that it was put together from. `seen` is
+    what it needs by what was seen alone, without belief in the rest, which denies nothing either. `share` tells how
+    many it is of those of its name that noise does not tell from it, and that do not hold together. Where cameras are
+    known, `told` says whether what they saw of its elements makes up the group, and `elsewhere` what it needs at least
+    where it does not stand.
     """
 
     placed: Placed
@@ -57,6 +58,7 @@ class Hypothesis:
     need: float
     history: tuple[Iterate, ...] = ()
     before: int = 0
+    seen: float = 0.0
     share: float = 1.0
     told: bool = True
     elsewhere: float = math.inf
@@ -127,7 +129,8 @@ def fitted(
         found = _placed(surface, best, steps, before, GLANCE)
     else:
         found = _placed(surface, best, steps, before)
-        if exact < found.need <= COARSE * most:
+        # What needs nothing by what was seen needs no less elsewhere.
+        if exact < found.seen and found.need <= COARSE * most:
             found = _moved(surface, found, every, was_slid=best is not first)
     if not surface.viewed or not found.elements:
         return found
@@ -148,15 +151,22 @@ def _moved(
         return min(found, _placed(surface, placed, history, found.before), key=lambda h: h.need)
 
     for needs, placed, history in others:
-        if placed is not found.placed and needs < found.need:
+        if placed is not found.placed and needs < found.seen:
             found = better(placed, history)
-    aside = found.placed if was_slid else slid(surface, found.placed, found.need)[0]
+    aside = found.placed if was_slid else slid(surface, found.placed, found.seen)[0]
     return found if aside is found.placed else better(aside, found.history)
 
 
 def judged(surface: Surface, placed: Placed) -> Hypothesis:
     """A group judged where it stands."""
     return _placed(surface, placed, (), 0)
+
+
+def seen_to_end(surface: Surface, found: Hypothesis) -> float:
+    """What an open surface needs to have a group by what was seen, and by where it ends if it has the group."""
+    parts = _Parts.of(found.placed, MOVED_EACH, 0)
+    misses = surface.misses(parts.motions, sources=parts.sources)
+    return _seen_judged(surface, parts, misses, found.placed.motions())[2]
 
 
 def roughly_judged(surface: Surface, look: Look, *, before: int = 0) -> Hypothesis:
@@ -172,15 +182,16 @@ def _placed(
     parts = _Parts.of(placed, least, FITTED if surface.viewed else 0)
     misses = surface.misses(parts.motions, sources=parts.sources)
     found, need = _judged(surface, parts, misses)
+    seen = need
     if surface.openings is not None and (surface.viewed or need > exact_need(surface.floor)):
         # What holds without it asks for no belief in anything unseen, but cameras tell what nobody saw of it.
-        partly, partial = _seen_judged(surface, parts, misses)
+        partly, partial, seen = _seen_judged(surface, parts, misses)
         unseen = max(e.coverage.unseen for e in partly)
         if surface.viewed or (partial < need and _counts_unseen(surface, unseen)):
             found, need = partly, partial
     if least == MOVED_EACH:
         found, need = _closely_judged(surface, found, need)
-    return Hypothesis(placed=placed, elements=found, need=need, history=history, before=before)
+    return Hypothesis(placed=placed, elements=found, need=need, history=history, before=before, seen=seen)
 
 
 def _counts_unseen(surface: Surface, most: float) -> bool:
@@ -265,14 +276,15 @@ class _Parts:
         )
 
 
-def _seen_judged(surface: Surface, parts: _Parts, misses: Array) -> tuple[tuple[Element, ...], float]:
-    """The elements of a group by what was seen of them, and what all of them need with the belief in the rest."""
-    seen = surface.seen(misses, parts.motions, sources=parts.sources, together=True)
+def _seen_judged(
+    surface: Surface, parts: _Parts, misses: Array, group: Sequence[Isometry] = ()
+) -> tuple[tuple[Element, ...], float, float]:
+    """The elements of a group by what was seen of them, and what all need: with the belief in the rest, and without."""
+    seen = surface.seen(misses, parts.motions, sources=parts.sources, together=True, group=group)
     found, need = _judged(surface, parts, seen)
     if surface.openings is None or surface.viewed:  # cameras say what they could not see
-        return found, need
-    # A lone mirror is forgiven more for being made inexactly, not for what nobody saw of it.
-    whole = surface.tolerance * (EVEN_MIRROR / EVEN if parts.placed.group.name == "Cs" else 1.0)
+        return found, need, need
+    whole = belief_in_as_much(surface, parts.placed)
     beliefs = [whole * e.coverage.belief for e in found]
     # More than half of the operations of a group generate it (Lagrange), so that the others follow; of a continuous one
     # that takes turns about its axes, as nearly all are.
@@ -280,7 +292,16 @@ def _seen_judged(surface: Surface, parts: _Parts, misses: Array) -> tuple[tuple[
     return (
         tuple(replace(e, need=math.hypot(e.need, b)) for e, b in zip(found, beliefs, strict=True)),
         math.hypot(need, max(turns, default=sorted(beliefs)[len(beliefs) // 2])),
+        need,
     )
+
+
+def belief_in_as_much(surface: Surface, placed: Placed) -> float:
+    """What it needs to believe that as much as was seen of a group is there where nobody looked.
+
+    A lone mirror is forgiven more for being made inexactly, not for what nobody saw of it.
+    """
+    return surface.tolerance * (EVEN_MIRROR / EVEN if placed.group.name == "Cs" else 1.0)
 
 
 def _moved_each(operations: int, least: int) -> int:

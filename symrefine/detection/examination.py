@@ -14,7 +14,7 @@ from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, known_links, meant
 from symrefine.detection.measure import Measured, Outliers, doubt, gather, measure
 from symrefine.detection.sketch import Sample, Sketch, is_large, set_apart, sketched
-from symrefine.fit.placed import Placed
+from symrefine.fit.placed import SAMPLED, Placed
 from symrefine.fit.vertices import ROUNDED, OnVertices, on_vertices
 from symrefine.geometry import Array, Mask, check_tolerance
 from symrefine.groups import PointGroup
@@ -112,7 +112,7 @@ class Examined:
 
 
 def _size(group: PointGroup) -> tuple[float, float]:
-    return group.order, group.sampled(7).order
+    return group.order, group.sampled(SAMPLED).order
 
 
 def examined(

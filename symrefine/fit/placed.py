@@ -16,6 +16,8 @@ from symrefine.groups.standard import GOLDEN
 T = TypeVar("T")
 # Turns that no finite fold below 36 shares; a surface of revolution survives them all.
 FREE_TURNS = 2.0 * np.pi * np.array([0.0823, 0.1381966, 0.2360680, 0.4270510])
+# Fold of what stands for all turns about an axis, evenly; a prime, so that few finite groups have any of its turns.
+SAMPLED = 7
 # Operations of one kind that are fitted together: more add points, but no knowledge. Of the mirrors through an axis all
 # are, each with its own angle, up to so many.
 FITTED, BUNDLE = 8, 60
@@ -46,6 +48,11 @@ class Placed(ReadOnly):
     def moved(self, state: Framed) -> "Placed":
         """The same group where a refinement put it."""
         return Placed(group=PointGroup(name=self.group.name, frame=state.frame), center=state.center)
+
+    def motions(self) -> tuple[Isometry, ...]:
+        """Its operations but the identity; of a continuous group those of a finite one in it."""
+        group = self.group if self.group.is_finite else self.group.sampled(SAMPLED)
+        return tuple(Isometry.about(self.center, m) for m in group.operations()[1:])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -96,6 +96,7 @@ def unclosed(normals: Array, areas: Array) -> float:
 
 
 def _camera(eye: Array, points: Array) -> Camera:
+    points = np.unique(points, axis=0)  # rays that are told twice would seem to lie side by side without a gap
     ranges = np.linalg.norm(points - eye, axis=1)
     seen = ranges > 0.0
     directions = Tree(unit(points[seen] - eye))

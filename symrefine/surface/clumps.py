@@ -64,10 +64,10 @@ def clumps(points: Array, around: Surroundings) -> list[Index]:
     """Indices, ascending, of each group of points [N, 3] apart from the body that is small and has no counterpart.
 
     Points hang together if each is among the nearest of the other, whatever the density: a few between two dense parts
-    join nothing. `around` tells of some of the points.
+    join nothing. `around` tells of some of the points. A piece of surface is no clump: what a hole cut off the body.
     """
     apart = [m for m in _lone(_parts(around), CLUMP) if _gap(around, m)] if np.median(around.reach) > 0.0 else []
-    return _members(points, around, apart)
+    return [c for c in _members(points, around, apart) if _is_filled(points[c])]
 
 
 def clump_among(points: Array, unmet: Mask) -> Index:
@@ -83,9 +83,14 @@ def clump_among(points: Array, unmet: Mask) -> Index:
     own = found[part == np.bincount(part).argmax()]
     if len(own) < max(least, 0.5 * len(found)):
         return found[:0]
-    tree, queries = Tree(points[own]), points[own][:: max(1, len(own) // PROBES)]
-    thick = (np.median(_blobness(points[own], tree, queries, len(own) // k)) for k in FRACTIONS)
-    return own if min(thick) > VOLUME else found[:0]
+    return own if _is_filled(points[own]) else found[:0]
+
+
+def _is_filled(points: Array) -> bool:
+    """Whether points [N, 3] fill a volume, as neighbourhoods say that are large parts of it."""
+    tree, queries = Tree(points), points[:: max(1, len(points) // PROBES)]
+    thick = (np.median(_blobness(points, tree, queries, max(len(points) // k, NEIGHBOURS[0]))) for k in FRACTIONS)
+    return bool(min(thick) > VOLUME)
 
 
 def count_parts(points: Array, rng: np.random.Generator) -> int:

@@ -6,14 +6,16 @@ cameras are known, they say it better: a patch in space that they saw to be free
 clump of strays hides what it covers, and its own rim is not told from the surface.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from symrefine.geometry import Array, Mask, rows, unit
+from symrefine.geometry import Array, Isometry, Mask, rows, unit
 from symrefine.shape import Index
 from symrefine.surface.cameras import Camera
 from symrefine.surface.clumps import Clump
+from symrefine.surface.misses import SHARES
 from symrefine.surface.neighbourhoods import (
     WIDEST,
     Neighbourhoods,
@@ -50,6 +52,9 @@ PARTED = 0.3
 LINKS = 6
 # A patch is unseen if one in so many of the places where it begins is at a border: of true ones more than half are.
 MOST = 3
+# Operations, but for the identity, from which on most take a place where the object ends to others where it does: if it
+# lies on a mirror two take it to what adjoins such a place. No more of them keep a place at a hole that lies on one.
+TELLING = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -104,6 +109,7 @@ class Openings:
         met: "tuple[LocalPlanes, Openings] | None" = None,
         most: int = MOST,
         turned: Array | None = None,
+        group: Sequence[Isometry] = (),
     ) -> Mask:
         """Which [K, N] of every `stride`-th local planes, moved by K operations, lie where nobody looked.
 
@@ -117,6 +123,8 @@ class Openings:
             most: a patch is unseen if one in so many of the places where it begins is at a border.
             turned: [K, N, 3] their normals there, out of the body: what turns its back to all cameras they could not
                 see, though it meets the other side of a wall.
+            group: operations of the group that all K belong to, if they do: an object that has it ends where most of
+                these carry a border onto a border.
         """
         there_cloud, there_openings = (cloud, self) if met is None else met
         covered = np.zeros_like(away)
@@ -154,11 +162,32 @@ class Openings:
         # A border that is carried onto a border says nothing: there the object may end on both sides.
         both = np.bincount(own, there & here, whole)
         every = np.bincount(own, minlength=whole)
-        free = (most * np.bincount(own, at_border, whole) >= every - both) & (every > 0)
+        begins = np.bincount(own, at_border, whole)
+        free = (most * begins >= every - both) & (every > 0)
+        if len(group) >= TELLING and there.any():
+            # What says nothing is asked where nothing else of a patch is at a border.
+            asked = at_border | (there & (begins[own] == 0))
+            kept = np.bincount(own[asked], self._kept(cloud, target[back[asked]], group), whole)
+            ends = (kept > 0.0) & (kept >= 0.5 * np.bincount(own[asked], minlength=whole))
+            # A sliver counts for nothing in either way.
+            free &= ~(ends & (np.bincount(patch[away.ravel()], minlength=whole) >= SHARES[-1] * count))
         found = away & free[patch].reshape(away.shape)
         # What lies next to such a patch already reaches beyond the border.
         found.reshape(-1)[rim_of[free[own] & at_border]] = True
         return found | covered
+
+    def _kept(self, cloud: LocalPlanes, at: Index, group: Sequence[Isometry]) -> Array:
+        """Share of the operations of a group that carry the border next to local planes [N] onto a border.
+
+        Where a surface goes on unseen few do, as they take its border where nothing is missing; where the object ends
+        most do, all but those that take it to where something adjoins.
+        """
+        line = np.flatnonzero(self.line)
+        which, back = np.unique(line[Tree(cloud.points[line]).nearest(cloud.points[at])[1]], return_inverse=True)
+        images = np.concatenate([m.apply(cloud.points[which]) for m in group])
+        classes = cloud.classes(which)
+        near = cloud.nearest(images, None if classes is None else np.tile(classes, len(group)))[1]
+        return np.asarray(self.border[near].reshape(len(group), -1).mean(axis=0)[back])
 
 
 def agreed(places: Array, unseen: Mask) -> Mask:

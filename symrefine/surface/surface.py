@@ -140,12 +140,18 @@ class Surface:
         return miss_distances(self.cloud, motions, stride=stride, bound=bound, discs=discs) / self.diagonal
 
     def seen(
-        self, misses: Array, motions: Sequence[Isometry], *, sources: int = 10**9, together: bool = False
+        self,
+        misses: Array,
+        motions: Sequence[Isometry],
+        *,
+        sources: int = 10**9,
+        together: bool = False,
+        group: Sequence[Isometry] = (),
     ) -> Array:
         """The misses [K, N] of K operations, NaN for what they carry to where nobody looked.
 
         `sources` as before. Of operations that are judged `together` most say whether somebody looked at a place,
-        unless cameras do.
+        unless cameras do. Operations of their `group` tell where an object ends that has it, see `Openings.unseen`.
         """
         if self.openings is None:
             return misses
@@ -153,7 +159,9 @@ class Surface:
         points, normals = self.cloud.points[::stride], self.cloud.normals[::stride]
         moved = np.stack([motion.apply(points) for motion in motions])
         turned = np.stack([motion.turn(normals) for motion in motions]) if self.viewed else None
-        unseen = self.openings.unseen(self.cloud, moved, away, stride, self.far * self.diagonal, turned=turned)
+        unseen = self.openings.unseen(
+            self.cloud, moved, away, stride, self.far * self.diagonal, turned=turned, group=group
+        )
         if together and not self.viewed:
             unseen[away] = agreed(moved[away], unseen[away])
         return np.where(unseen, np.nan, misses)

@@ -1,0 +1,75 @@
+"""Where an object ends: an open border that a group carries onto itself is its own, and no hole in it."""
+
+import math
+
+import numpy as np
+
+from symrefine.decide.hypotheses import Hypothesis, seen_to_end
+from symrefine.geometry import Array, Isometry
+from symrefine.surface.openings import TELLING
+from symrefine.surface.surface import Surface
+
+# Share of its open borders that a group carries onto open borders where the object ends there: flat plates 1, mugs 0.75
+# and more, chance up to 0.6.
+KEPT = 2.0 / 3.0
+# Mirrors or axes of a group from which on a hole often lies on one of them by chance, and its border is kept by that.
+PLACES = 3
+# Places where a hole is tried, and local planes that tell its rim: a share of one in three is told to a fifteenth.
+HOLES, RIMS = 50, 1000
+
+
+def ends_there(surface: Surface, found: Hypothesis) -> bool:
+    """Whether a group carries the open borders onto themselves, as what a sensor leaves out has no symmetry."""
+    if surface.openings is None or surface.viewed:
+        return False
+    line, cloud = surface.openings.line, surface.cloud
+    near = [cloud.nearest(m.apply(cloud.points[line]), cloud.classes(np.flatnonzero(line)))[1] for m in _motions(found)]
+    return bool(near) and float(np.median([surface.openings.border[n].mean() for n in near])) > KEPT
+
+
+def ends_too(surface: Surface, found: Hypothesis, limit: float) -> bool:
+    """Whether an object ends at its open borders if it has a group that what lies beyond them was to hide.
+
+    A handle at a rim breaks what the rest keeps: it comes to lie where the rim ends, which all other operations carry
+    onto the rim. Few operations do not tell by themselves where it ends, but by how much of the border they keep.
+    """
+    few = len(found.placed.motions()) < TELLING
+    return ends_there(surface, found) if few else seen_to_end(surface, found) > limit
+
+
+def _motions(found: Hypothesis) -> list[Isometry]:
+    return [m for e in found.elements for m in e.operations.motions(e.center)]
+
+
+def often_kept(surface: Surface, found: Hypothesis, share: float) -> bool:
+    """Whether a group keeps the border of a hole of such a share of the surface in one place of so many or more.
+
+    So does the mirror that lies in a plate, wherever the hole is: what it says of one border is chance.
+    """
+    every = surface.cloud.points
+    some = every[:: -(-len(every) // RIMS)]
+    places, width = some[:: -(-len(some) // HOLES)], 2.0 * float(np.median(surface.cloud.reach))
+
+    def away(points: Array) -> Array:
+        """Distances [P, N] of points [N, 3] from the places."""
+        return np.asarray(np.linalg.norm(points - places[:, None], axis=2))
+
+    radii = np.quantile(away(some), share, axis=1, keepdims=True)
+    border = np.abs(away(some) - radii) < width
+    count = np.maximum(border.sum(axis=1), 1)
+    kept = [(border & (np.abs(away(m.apply(some)) - radii) < width)).sum(axis=1) / count for m in _motions(found)]
+    return bool(kept) and PLACES * float((np.median(kept, axis=0) > KEPT).mean()) > 1.0
+
+
+def places(seen: Hypothesis, found: Hypothesis) -> float:
+    """Mirrors or axes of a group through which a hole leaves the symmetry that is seen: a hole is round.
+
+    So what is left keeps its middle: one mirror, or the turns and mirrors about an axis; of what is round, any mirror.
+    """
+    if seen.group.name == "Cs":
+        return len(found.group.mirrors()) if found.group.is_finite else math.inf
+    if not seen.group.is_finite:
+        return math.inf if (seen.group.name, found.group.name) == ("Cinfv", "Kh") else 1.0
+    if not seen.group.is_polar or not found.group.is_finite:
+        return 1.0
+    return sum(order % seen.group.symbol.fold == 0 for _, order in found.group.rotation_axes())
