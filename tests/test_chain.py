@@ -13,7 +13,7 @@ from experiments.objects.boundary import instance
 from experiments.objects.shapes import box, join, sample
 from experiments.studies import groups
 from experiments.studies.boundary import Case, look
-from symrefine.decide.chain import _holding, _told_apart, chain, explore
+from symrefine.decide.chain import _holding, _told_apart, _with, chain, explore
 from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted
 from symrefine.decide.looks import START_ERROR
 from symrefine.decide.pool import Pool
@@ -402,4 +402,6 @@ def test_of_a_group_that_does_not_hold_the_elements_that_do_are_known(seed):
     # Those of the plate below may seem to hold at a glance.
     assert min(off) < 0.1
     assert len(holding) <= 4
+    pool = _with(surface, Pool(nothing=1e-6, limit=TOLERANCE), [placed])
+    assert pool.largest.group.name == "Cs"
     assert detect(points).point_group == "Cs"
