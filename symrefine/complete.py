@@ -9,7 +9,8 @@ from symrefine.detection.measure import Outliers, is_few
 from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
-from symrefine.geometry import Array, Isometry
+from symrefine.fit.placed import Placed
+from symrefine.geometry import Array
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.tree import Tree
@@ -98,10 +99,9 @@ def check_scan(shape: Shape) -> None:
 
 def verdicts(found: Detection, points: Array) -> Verdicts:
     """What points [N, 3] of the scan in which a group was found say of their images under it."""
-    surface, group = found.surface, found.group
+    surface = found.surface
     center, local = ((x - found.origin) / found.scale for x in (found.center, points))
-    every = (group if group.is_finite else group.sampled(ROUND)).operations()
-    motions = [Isometry.about(center, m) for m in every if not np.allclose(m, np.eye(3))]
+    motions = Placed(group=found.group, center=center).motions(ROUND)
     misses = surface.misses(motions)
     unseen = np.isnan(surface.seen(misses, motions))
     owner = surface.cloud.of_one_class().nearest(local, None)[1]

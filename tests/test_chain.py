@@ -405,3 +405,11 @@ def test_of_a_group_that_does_not_hold_the_elements_that_do_are_known(seed):
     pool = _with(surface, Pool(nothing=1e-6, limit=TOLERANCE), [placed])
     assert pool.largest.group.name == "Cs"
     assert detect(points).point_group == "Cs"
+
+
+@pytest.mark.parametrize("name", ["S4", "S6", "Ci", "C5", "Cs"])
+def test_what_generates_all_of_a_group_that_does_not_hold_is_not_asked_again(name):
+    cube = sample(join([box((0, 0, 0), (1, 1, 1))]), 3000, 0.0, np.random.default_rng(0))
+    surface = gather(measure(Shape(points=cube)), np.random.default_rng(0))[1]
+    placed = Placed(group=point_group(name), center=np.zeros(3))
+    assert name not in {h.group.name for h in _holding(surface, placed, 1.0)}

@@ -9,11 +9,10 @@ from functools import partial
 import numpy as np
 
 from experiments.objects.instances import Build, Instance, of_parts
+from experiments.objects.lathe import Profile, Rng
 from experiments.objects.parts import Part, block, spun
 from symrefine.geometry import rotation
 
-Rng = np.random.Generator
-Profile = list[tuple[float, float]]
 SEGMENTS = 120
 
 
@@ -59,7 +58,7 @@ def _grip(profile: Profile, size: tuple[float, float, float], azimuth_deg: float
     return grip.turned(rotation([0, 0, 1], np.radians(azimuth_deg)))
 
 
-# By what is at the rim: azimuths of grips and how long each is, over the first; and the group.
+# By what is at the rim: the azimuth of each grip with its length over that of a handle, and the group.
 RIMS: dict[str, tuple[tuple[tuple[float, float], ...], str]] = {
     "plain": ((), "Cinfv"),
     "handle": (((0, 1),), "Cs"),

@@ -80,9 +80,9 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     hidden = max((e.coverage.unseen for e in part.largest.elements), default=0.0)
     # A group that a single hole leaves may keep its border because it keeps the border of almost any.
     ends = ends and not (more and often_kept(surface, whole.largest, hidden))
-    denied = more and ends_too(surface, part.largest, ALIKE * limit)
     missing = (evident or (more and hidden <= ENCLOSED)) and not ends
-    if not denied and (missing or places(whole.largest, part.largest) >= PLACES):
+    missing = missing or places(whole.largest, part.largest) >= PLACES
+    if missing and not (more and ends_too(surface, part.largest, ALIKE * limit)):
         return replace(part, at_least=True)
     # What a border hides may be why a larger group is in doubt.
     doubted = (h for h in (part.largest, *part.small) if _size(h.placed) > _size(whole.largest.placed))
@@ -182,9 +182,9 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
 
 def _holding(surface: Surface, placed: Placed, most: float) -> list[Placed]:
     """The elements of a group that does not hold which seem to hold alone: of a gear's mirrors those of its holes."""
-    every = elements(placed.group)
-    alone = [e.alone(placed.center) for e in every] if len(every) > 1 else []
-    return [p for p, needs in zip(alone, glances(surface, alone, most), strict=True) if needs < most] if alone else []
+    every = [e.alone(placed.center) for e in elements(placed.group)]
+    alone = [p for p in every if p.group.name != placed.group.name]  # of S4 one generates all of it
+    return [p for p, needs in zip(alone, glances(surface, alone, most), strict=True) if needs < most]
 
 
 def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:

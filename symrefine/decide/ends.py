@@ -33,6 +33,8 @@ def ends_too(surface: Surface, found: Hypothesis, limit: float) -> bool:
     A handle at a rim breaks what the rest keeps: it comes to lie where the rim ends, which all other operations carry
     onto the rim. Few operations do not tell by themselves where it ends, but by how much of the border they keep.
     """
+    if surface.viewed:
+        return False  # what cameras see to be free says it
     few = len(found.placed.motions()) < TELLING
     return ends_there(surface, found) if few else seen_to_end(surface, found) > limit
 

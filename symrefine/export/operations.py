@@ -23,7 +23,7 @@ def motions(group: PointGroup, center: Array, *, improper: bool = False, steps: 
     if not 1 <= steps <= MAX_FOLD:
         raise InputError(f"steps is {steps}; expected 1 to {MAX_FOLD} turns for a continuous axis")
     kept = group if improper else group.proper_subgroup()
-    return homogeneous((kept if kept.is_finite else kept.sampled(steps)).operations(), center)
+    return homogeneous(kept.sampled(steps).operations(), center)
 
 
 def motions_limits(group: PointGroup, *, improper: bool, steps: int) -> list[str]:

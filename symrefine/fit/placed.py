@@ -49,10 +49,9 @@ class Placed(ReadOnly):
         """The same group where a refinement put it."""
         return Placed(group=PointGroup(name=self.group.name, frame=state.frame), center=state.center)
 
-    def motions(self) -> tuple[Isometry, ...]:
-        """Its operations but the identity; of a continuous group those of a finite one in it."""
-        group = self.group if self.group.is_finite else self.group.sampled(SAMPLED)
-        return tuple(Isometry.about(self.center, m) for m in group.operations()[1:])
+    def motions(self, fold: int = SAMPLED) -> tuple[Isometry, ...]:
+        """Its operations but the identity; of a continuous group those of its member of so many folds."""
+        return tuple(Isometry.about(self.center, m) for m in self.group.sampled(fold).operations()[1:])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -106,8 +106,8 @@ class PointGroup:
 
     def lone_mirrors(self) -> Array:
         """Unit normals [m, 3] of the mirror planes that no operation carries onto another one."""
-        normals, finite = self.mirrors(), self if self.is_finite else self.sampled(3)
-        cosines = np.abs(np.einsum("mi,kij,mj->km", normals, finite.operations(), normals))
+        normals, operations = self.mirrors(), self.sampled(3).operations()
+        cosines = np.abs(np.einsum("mi,kij,mj->km", normals, operations, normals))
         return normals[(cosines > 1.0 - EXACT).all(axis=0)]
 
     def rotation_axes(self) -> list[OrderedAxis]:
@@ -146,7 +146,7 @@ class PointGroup:
         return PointGroup(name=name, frame=self.frame)
 
     def sampled(self, fold: int) -> "PointGroup":
-        """A finite subgroup: Cinf.. and Dinf.. with `fold` in place of inf, I and Ih for K and Kh."""
+        """A finite subgroup: Cinf.. and Dinf.. with `fold` in place of inf, I and Ih for K and Kh; itself if it is."""
         return PointGroup(name=_sampled(self.symbol, fold).name, frame=self.frame)
 
     def distance_rad(self, operations: ArrayLike) -> Array:

@@ -40,7 +40,7 @@ class Symmetry(ReadOnly):
     def about(cls, group: PointGroup, center: Array) -> "Symmetry":
         """That of a body with a group, proper or not, about a point [3] that it leaves in place."""
         proper = group.proper_subgroup()
-        operations = (group if group.is_finite else group.sampled(2)).operations()
+        operations = group.sampled(2).operations()
         mirrors = homogeneous(operations[determinants(operations) < 0.0][:1], center)
         return cls(group=proper, center=center - _left_in_place(proper) @ center, mirrors=mirrors)
 
