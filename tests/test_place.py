@@ -148,19 +148,35 @@ def test_a_group_is_told_by_what_elements_that_were_seen_generate(name, shares, 
     assert SUPPORTED <= 0.5
 
 
+@pytest.mark.parametrize("seed", [3, 4])
 @pytest.mark.parametrize("direction", [(0.3, 0.2, 0.93), (0.7, 0.3, 0.6)])
 @pytest.mark.parametrize("name", ["slab", "sheet"])
-def test_one_side_of_a_slab_tells_nothing_of_the_other(name, direction):
-    """Its own plane is no mirror that anybody saw, though it moves what was seen by no more than is forgiven."""
-    made = damage.view(MAKES[name](), np.array(direction), np.random.default_rng(3))
+def test_one_side_of_a_slab_tells_nothing_of_the_other(name, direction, seed):
+    """Its own plane is no mirror that anybody saw; of the groups that hold with it, its other mirrors are told."""
+    made = damage.view(MAKES[name](), np.array(direction), np.random.default_rng(seed))
     found = detect(made.points, viewpoint=made.viewpoint)
     assert found.point_group == "C2v"
     assert found.at_least
-    surface, center = view(name, direction)
+
+
+@pytest.mark.parametrize("name", ["slab", "sheet"])
+def test_the_plane_of_a_slab_moves_what_was_seen_by_no_more_than_is_forgiven(name):
+    surface, center = view(name, ABOVE)
     (element,) = judged(surface, Placed(group=PointGroup(name="Cs"), center=center)).elements
     assert element.need < 0.5 * surface.tolerance
     assert element.coverage.unseen > 0.5
     assert element.coverage.supported < SUPPORTED
+
+
+def test_what_no_camera_saw_may_break_one_of_two_mirrors_and_leave_the_other():
+    """Which of them is not known: each is as sure as the two together, and half of what one alone is."""
+    made = damage.view(MAKES["slab"](), np.array(ABOVE), np.random.default_rng(3))
+    found = detect(made.points, viewpoint=made.viewpoint)
+    others = {a.point_group: a.probability for a in found.alternatives}
+    assert set(others) == {"Cs", "C1"}
+    assert others["C1"] < others["Cs"] < found.confidence
+    assert [p.confidence for p in found.planes] == pytest.approx([found.confidence + 0.5 * others["Cs"]] * 2)
+    assert [a.confidence for a in found.axes] == pytest.approx([found.confidence])
 
 
 def test_a_wall_is_not_met_by_its_other_side():

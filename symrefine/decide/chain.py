@@ -22,7 +22,7 @@ from symrefine.decide.hypotheses import (
     single,
 )
 from symrefine.decide.looks import COARSE, START_ERROR, exact_need, glances, looked_at
-from symrefine.decide.place import SUPPORTED
+from symrefine.decide.place import SUPPORTED, least_elsewhere
 from symrefine.decide.pool import ALIKE, Pool, is_at, is_same
 from symrefine.decide.posterior import ALONE, EVEN, LEAST, Link, certain, meant
 from symrefine.fit.placed import Placed, elements, joined
@@ -115,14 +115,17 @@ def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float
 
 
 def _of_part(surface: Surface, whole: Pool) -> Pool:
-    pool = Pool(nothing=whole.nothing, limit=whole.limit)
+    pool, parts = Pool(nothing=whole.nothing, limit=whole.limit), list[Placed]()
     for known in (whole.largest, *whole.small):
         if known.elements:
             # What holds without them asks nothing of openings, unless cameras tell how little of it was seen.
             exact = known.need <= exact_need(surface.floor) and not surface.viewed
             again = known if exact else fitted(surface, known.placed)
             pool = _grown(surface, pool, again)
-    return _with(surface, pool, [*voted_mirrors(surface.cloud), *repeated(surface.cloud, surface.diagonal)])
+            # Of what was not seen enough to tell the whole group, enough may have been seen of its elements.
+            parts += _holding(surface, again.placed, ALIKE * pool.limit) if _is_loose(surface, again) else []
+    voted = [*voted_mirrors(surface.cloud), *repeated(surface.cloud, surface.diagonal)]
+    return _with(surface, pool, [*parts, *voted])
 
 
 def _with(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
@@ -282,7 +285,7 @@ def _best(tried: Sequence[Hypothesis], hidden: float) -> Hypothesis | None:
     """Of groups that do not hold together the one that needs least; of those that need as little as noise the largest.
 
     By chance fewer operations hold than many. Of those as large it is the one that misses least in the mean; how many
-    of them it is tells how sure its place is.
+    others there are tells how sure its place is.
     """
 
     def rank(found: Hypothesis) -> tuple[float, float, float]:
@@ -292,8 +295,10 @@ def _best(tried: Sequence[Hypothesis], hidden: float) -> Hypothesis | None:
     best = min((h for h in tried if h.elements), key=rank, default=None)
     if best is None or best.need > hidden:
         return best
-    rivals = [h for h in tried if h.elements and h.need <= hidden and h.group.name == best.group.name]
-    return replace(best, share=sum(is_same(h.placed, best.placed) for h in rivals) / len(rivals))
+    apart = [best.placed]
+    for other in (h.placed for h in tried if h.elements and h.need <= hidden and h.group.name == best.group.name):
+        apart += [] if any(is_same(other, p) for p in apart) else [other]
+    return replace(best, rivals=tuple(apart[1:]))
 
 
 def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
@@ -335,4 +340,17 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
         links.append(replace(found, need=max(need, here.need)))
         if need > limit:
             break
-    return tuple(links)
+    return (NOTHING, *_one_mirror(surface, links[1:]), *links[1:])
+
+
+def _one_mirror(surface: Surface, links: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Of the first group of a chain that has several unlike mirrors one alone, the one of which cameras saw most.
+
+    What they did not see may break any but one of them.
+    """
+    mirrors = [e for e in links[0].elements if e.operations.kind == "plane"] if surface.viewed and links else []
+    if len(mirrors) < 2 or len(links[0].group.lone_mirrors()) < len(mirrors):
+        return []
+    first, *others = sorted((single(e) for e in mirrors), key=lambda h: -h.supported)
+    elsewhere = least_elsewhere(surface, first.placed)
+    return [replace(first, rivals=tuple(h.placed for h in others), elsewhere=elsewhere)]

@@ -47,10 +47,9 @@ class Hypothesis:
     """A group where it fits best: its elements judged, and what the worst of them needs.
 
     `history` holds the iterates of the fit; `before` counts those of the parts that it was put together from. `seen` is
-    what it needs by what was seen alone, without belief in the rest, which denies nothing either. `share` tells how
-    many it is of those of its name that noise does not tell from it, and that do not hold together. Where cameras are
-    known, `told` says whether what they saw of its elements makes up the group, and `elsewhere` what it needs at least
-    where it does not stand.
+    what it needs by what was seen alone, without belief in the rest, which denies nothing either. `rivals` are those
+    of its name that may be meant as well as it, and instead of it. Where cameras are known, `told` says whether what
+    they saw of its elements makes up the group, and `elsewhere` what it needs at least where it does not stand.
     """
 
     placed: Placed
@@ -59,7 +58,7 @@ class Hypothesis:
     history: tuple[Iterate, ...] = ()
     before: int = 0
     seen: float = 0.0
-    share: float = 1.0
+    rivals: tuple[Placed, ...] = ()
     told: bool = True
     elsewhere: float = math.inf
 
@@ -71,6 +70,11 @@ class Hypothesis:
         """
         shares = (e.coverage.told if math.isinf(e.operations.order) else e.coverage.supported for e in self.elements)
         return min(shares, default=1.0)
+
+    @property
+    def share(self) -> float:
+        """How likely it is this one that is meant, and none of its rivals."""
+        return 1.0 / (1.0 + len(self.rivals))
 
     @property
     def group(self) -> PointGroup:
@@ -114,16 +118,20 @@ def fitted(
     it may stand seems to need more than `close` is judged by few points, one that needs far more than `most` in one
     place only; where no start leads to as little, no elements are told.
     """
+    hopeless, asked = max(most, mended(surface)), seems(surface, start) if surface.is_open else 0.0
+    if asked > hopeless:
+        return Hypothesis(placed=start, elements=(), need=asked, before=before)
     state = start.framed()
     stride = surface.stride(_moved_each(len(state.standard), GLANCE))
     history = tuple(refine(surface.cloud, state, start_error_rad=error_rad, stride=stride))
     end, exact = start.moved(history[-1].state), exact_need(surface.floor)
     if not surface.is_open and history[-1].converged:
         return _placed(surface, end, history, before)
-    every = [(seems(surface, p), p, steps) for p, steps in ((end, history), (start, history[:1]))]
+    asked = asked if surface.is_open else seems(surface, start)
+    every = [(seems(surface, end), end, history), (asked, start, history[:1])]
     needs, first, steps = min(every, key=lambda k: k[0])
     best, least = slid(surface, first, needs, close) if needs > close else (first, needs)
-    if least > max(most, mended(surface)):
+    if least > hopeless:
         found = Hypothesis(placed=best, elements=(), need=least, history=steps, before=before)
     elif least > close:
         found = _placed(surface, best, steps, before, GLANCE)
@@ -165,8 +173,7 @@ def judged(surface: Surface, placed: Placed) -> Hypothesis:
 def seen_to_end(surface: Surface, found: Hypothesis) -> float:
     """What an open surface needs to have a group by what was seen, and by where it ends if it has the group."""
     parts = _Parts.of(found.placed, MOVED_EACH, 0)
-    misses = surface.misses(parts.motions, sources=parts.sources)
-    return _seen_judged(surface, parts, misses, found.placed.motions())[2]
+    return _seen_judged(surface, parts, *_met(surface, parts), found.placed.motions())[2]
 
 
 def roughly_judged(surface: Surface, look: Look, *, before: int = 0) -> Hypothesis:
@@ -180,14 +187,16 @@ def _placed(
     """A group judged where a fit put it, by so many points of each element at least."""
     # What holds of a turn need not hold of its powers where the rest was not seen.
     parts = _Parts.of(placed, least, FITTED if surface.viewed else 0)
-    misses = surface.misses(parts.motions, sources=parts.sources)
-    found, need = _judged(surface, parts, misses)
-    seen = need
-    if surface.openings is not None and (surface.viewed or need > exact_need(surface.floor)):
-        # What holds without it asks for no belief in anything unseen, but cameras tell what nobody saw of it.
-        partly, partial, seen = _seen_judged(surface, parts, misses)
-        unseen = max(e.coverage.unseen for e in partly)
-        if surface.viewed or (partial < need and _counts_unseen(surface, unseen)):
+    misses, drifts = _met(surface, parts)
+    if surface.viewed:  # cameras tell what nobody saw of it
+        found, need, seen = _seen_judged(surface, parts, misses, drifts)
+    else:
+        found, need = _judged(surface, parts, misses, drifts)
+        seen = need
+    # What holds without it asks for no belief in anything unseen.
+    if surface.openings is not None and not surface.viewed and need > exact_need(surface.floor):
+        partly, partial, seen = _seen_judged(surface, parts, misses, drifts)
+        if partial < need and _counts_unseen(surface, max(e.coverage.unseen for e in partly)):
             found, need = partly, partial
     if least == MOVED_EACH:
         found, need = _closely_judged(surface, found, need)
@@ -200,7 +209,7 @@ def _counts_unseen(surface: Surface, most: float) -> bool:
     What is no more than a detail is rather missing: a flag, on one side.
     """
     openings = surface.openings
-    return openings is not None and (surface.viewed or bool(openings.clumps) or most > SHARES[1])
+    return openings is not None and (bool(openings.clumps) or most > SHARES[1])
 
 
 def _closely_judged(surface: Surface, found: tuple[Element, ...], need: float) -> tuple[tuple[Element, ...], float]:
@@ -276,12 +285,18 @@ class _Parts:
         )
 
 
+def _met(surface: Surface, parts: _Parts) -> tuple[Array, Array]:
+    """How far operations miss the surface [K, N], and how far windows drift under them [K, S]."""
+    return surface.misses(parts.motions, sources=parts.sources), surface.drifts(parts.motions)
+
+
 def _seen_judged(
-    surface: Surface, parts: _Parts, misses: Array, group: Sequence[Isometry] = ()
+    surface: Surface, parts: _Parts, misses: Array, drifts: Array, group: Sequence[Isometry] = ()
 ) -> tuple[tuple[Element, ...], float, float]:
     """The elements of a group by what was seen of them, and what all need: with the belief in the rest, and without."""
     seen = surface.seen(misses, parts.motions, sources=parts.sources, together=True, group=group)
-    found, need = _judged(surface, parts, seen)
+    told = surface.drifts_seen(drifts, seen, parts.motions, sources=parts.sources)
+    found, need = _judged(surface, parts, seen, told)
     if surface.openings is None or surface.viewed:  # cameras say what they could not see
         return found, need, need
     whole = belief_in_as_much(surface, parts.placed)
@@ -308,10 +323,10 @@ def _moved_each(operations: int, least: int) -> int:
     return min(max(least, MOVED // operations), MOVED // 4)
 
 
-def _judged(surface: Surface, parts: _Parts, misses: Array) -> tuple[tuple[Element, ...], float]:
-    """The elements of a group from the misses [K, N] of its operations, and what all of them need."""
+def _judged(surface: Surface, parts: _Parts, misses: Array, drifts: Array) -> tuple[tuple[Element, ...], float]:
+    """The elements of a group from the misses [K, N] and drifts [K, S] of its operations, and what all of them need."""
     tests = len(parts.operations)
-    drifted, all_drifted = surface.drifted(misses, parts.motions, tests, sources=parts.sources)
+    drifted, all_drifted = surface.drifted(drifts, tests)
     needs = np.maximum(surface.needed(misses, parts.motions, tests), drifted)
     found = tuple(
         Element(

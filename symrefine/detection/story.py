@@ -259,12 +259,19 @@ def _polished(chosen: Hypothesis, on: OnVertices, measured: Measured) -> Hypothe
 def _confidence(element: Element, links: Sequence[Hypothesis], decision: Decision) -> float:
     """Probability that an element is meant: that the true group holds the first group of the chain which has it.
 
-    And that it stands there, where noise does not tell it from others that would stand elsewhere.
+    And that it is this one that is meant, if that is the true group, and none of its rivals; one of theirs that a
+    larger group has may be the one that is.
     """
     matrix = element.operations.matrices[0][None]
-    for link, inside in zip(links, decision.inside, strict=True):
-        if link.elements and link.group.distance_rad(matrix)[0] < math.radians(5.0):
-            return inside * link.share
+
+    def has(placed: Placed) -> bool:
+        return bool(placed.group.distance_rad(matrix)[0] < math.radians(5.0))
+
+    sure = 0.0
+    for link, own, beyond in zip(links, decision.probabilities, [*decision.inside[1:], 0.0], strict=True):
+        if link.elements and has(link.placed):
+            return sure + own * link.share + beyond
+        sure += own * link.share if any(map(has, link.rivals)) else 0.0
     return decision.inside[decision.index]
 
 

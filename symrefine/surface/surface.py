@@ -216,30 +216,29 @@ class Surface:
         # One of n pieces is n - 1 times as far off as the whole, in squares, and the image is off as much once more.
         return own, float(2.0 * np.mean([spread_distance(own, part) ** 2 for part in parts]) / (PIECES - 1))
 
-    def drifted(
-        self, misses: Array, motions: Sequence[Isometry], tests: int = 1, *, sources: int = 10**9
-    ) -> tuple[Array, float]:
-        """The smallest tolerances [K] at which operations hold by where windows lie, and that of all of them together.
+    def drifts(self, motions: Sequence[Isometry]) -> Array:
+        """How far windows of each of K images lie from those of the cloud [K, S], fractions of the diagonal."""
+        if self.drift is None:
+            return np.empty((len(motions), 0))
+        return self.drift.misses(motions, max(WINDOWS_EACH, WINDOWS // len(motions))) / self.diagonal
 
-        Args:
-            misses: of the local planes [K, N], NaN for what operations carry to where nobody looked.
-            motions: the operations.
-            tests: as of `needs`.
-            sources: local planes that were moved.
+    def drifts_seen(self, drifts: Array, misses: Array, motions: Sequence[Isometry], *, sources: int = 10**9) -> Array:
+        """The same, NaN where a window reaches what operations carry to where nobody looked, where they miss by NaN.
+
+        `sources` as of `misses`.
+        """
+        if self.drift is None or not drifts.any():
+            return drifts
+        unseen = self._unseen(misses, motions, sources)
+        return np.where(self.drift.reach(motions, drifts.shape[1], unseen), np.nan, drifts)
+
+    def drifted(self, drifts: Array, tests: int = 1) -> tuple[Array, float]:
+        """The smallest tolerances [K] at which operations hold whose windows drift so [K, S], and that of all together.
+
+        `tests` as of `needs`.
         """
         if self.drift is None:
-            return np.zeros(len(motions)), 0.0
-        count = max(WINDOWS_EACH, WINDOWS // len(motions))
-        found = self.drift.misses(motions, count) / self.diagonal
-        told = self._told(found, tests)
-        if self.openings is None or max(told[0].max(), told[1]) == 0.0:
-            return told
-        found[self.drift.reach(motions, count, self._unseen(misses, motions, sources))] = np.nan
-        return self._told(found, tests)
-
-    def _told(self, drifts: Array, tests: int) -> tuple[Array, float]:
-        """What operations need, each [K] and together, whose windows lie elsewhere by so much [K, S]."""
-        assert self.drift is not None
+            return np.zeros(len(drifts)), 0.0
         noise, redundancy = self.drift.noise / self.diagonal, self.drift.redundancy(drifts.shape[1])
         together = needs(drifts.ravel(), noise, redundancy=redundancy)
         return needs(drifts, noise, tests, redundancy), float(together)
