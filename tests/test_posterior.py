@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from symrefine.decide.posterior import LEAST, Link, certain, decide, known_links, meant
+from symrefine.decide.posterior import LEAST, Link, certain, decide, meant
 from symrefine.groups import PointGroup
 
 NEED = st.floats(0.0, 0.5)
@@ -22,6 +22,12 @@ def chain_of(members, lone):
 
 
 CHAIN = st.builds(chain_of, st.lists(st.tuples(NEED, st.floats(0.0, 1.0)), max_size=6), st.booleans())
+
+
+def known_links(groups, needs):
+    """The links of groups in space, each inside the next, all of which was seen."""
+    every = zip(groups, needs, [*needs, math.inf][1:], strict=True)
+    return [Link.of(group, need, beyond, believed=0.0, placed=1.0) for group, need, beyond in every]
 
 
 @given(CHAIN, TOLERANCE)
@@ -84,6 +90,13 @@ def test_more_need_is_less_meant_and_more_tolerance_more(a, b, lone, s, t):
     assert meant(few, strict) >= meant(much, strict)
     assert meant(much, loose) >= meant(much, strict)
     assert 0.0 <= meant(much, strict) <= 1.0
+
+
+@given(NEED, st.floats(0.0, 1.0), TOLERANCE, st.floats(0.0, 1.0), st.booleans())
+def test_noise_blurs_what_was_measured_and_not_what_is_believed(need, share, tolerance, noise, lone):
+    partly, measured = (Link(need=need, believed=b * need, lone_mirror=lone) for b in (share, 0.0))
+    assert meant(partly, tolerance) == pytest.approx(meant(measured, tolerance))
+    assert meant(partly, tolerance, noise * tolerance) >= meant(measured, tolerance, noise * tolerance) - 1e-12
 
 
 @given(NEED, TOLERANCE)

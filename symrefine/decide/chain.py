@@ -91,8 +91,8 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     if not more:
         return whole
     # To believe that what ends so evenly is missing a part takes as much as to believe in as much as was seen.
-    asked = belief_in_as_much(surface, part.largest.placed)
-    rival = replace(part.largest, need=math.hypot(part.largest.need, asked))
+    asked, known = belief_in_as_much(surface, part.largest.placed), part.largest
+    rival = replace(known, need=math.hypot(known.need, asked), believed=math.hypot(known.believed, asked))
     return replace(whole, small=(*whole.small, rival))
 
 
@@ -276,6 +276,10 @@ def _told_apart(placed: Placed | None, parts: Sequence[Placed]) -> Placed | None
     return replace(placed, group=PointGroup(name=name, frame=group.frame))
 
 
+def _needed(found: Hypothesis) -> float:
+    return found.need
+
+
 def _worst(found: Hypothesis, hidden: float) -> tuple[float, float]:
     """What a group needs; of those that need no more than is hidden, the mean miss of its worst element."""
     return max(found.need, hidden), max((e.deviation.mean for e in found.elements), default=0.0)
@@ -336,9 +340,10 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
             rest = [h for h in rest if h not in batch]
             continue
         # What holds together holds in every part of it, though a part alone may not tell what was not seen.
-        need = min([found.need, *(h.need for h in known if h.elements and h.holds(found.placed))])
-        links.append(replace(found, need=max(need, here.need)))
-        if need > limit:
+        inside = (h for h in known if h.elements and h.holds(found.placed))
+        asks = max(min([found, *inside], key=_needed), here, key=_needed)
+        links.append(replace(found, need=asks.need, believed=asks.believed))
+        if asks.need > limit:
             break
     return (NOTHING, *_one_mirror(surface, links[1:]), *links[1:])
 

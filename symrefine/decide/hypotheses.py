@@ -47,9 +47,10 @@ class Hypothesis:
     """A group where it fits best: its elements judged, and what the worst of them needs.
 
     `history` holds the iterates of the fit; `before` counts those of the parts that it was put together from. `seen` is
-    what it needs by what was seen alone, without belief in the rest, which denies nothing either. `rivals` are those
-    of its name that may be meant as well as it, and instead of it. Where cameras are known, `told` says whether what
-    they saw of its elements makes up the group, and `elsewhere` what it needs at least where it does not stand.
+    what it needs by what was seen alone, without belief in the rest, which denies nothing either; `believed` is the
+    part, in squares, of what it needs that is belief. `rivals` are those of its name that may be meant as well as it,
+    and instead of it. Where cameras are known, `told` says whether what they saw of its elements makes up the group,
+    and `elsewhere` what it needs at least where it does not stand.
     """
 
     placed: Placed
@@ -58,6 +59,7 @@ class Hypothesis:
     history: tuple[Iterate, ...] = ()
     before: int = 0
     seen: float = 0.0
+    believed: float = 0.0
     rivals: tuple[Placed, ...] = ()
     told: bool = True
     elsewhere: float = math.inf
@@ -188,6 +190,7 @@ def _placed(
     # What holds of a turn need not hold of its powers where the rest was not seen.
     parts = _Parts.of(placed, least, FITTED if surface.viewed else 0)
     misses, drifts = _met(surface, parts)
+    believed = 0.0
     if surface.viewed:  # cameras tell what nobody saw of it
         found, need, seen = _seen_judged(surface, parts, misses, drifts)
     else:
@@ -197,10 +200,12 @@ def _placed(
     if surface.openings is not None and not surface.viewed and need > exact_need(surface.floor):
         partly, partial, seen = _seen_judged(surface, parts, misses, drifts)
         if partial < need and _counts_unseen(surface, max(e.coverage.unseen for e in partly)):
-            found, need = partly, partial
+            found, need, believed = partly, partial, math.sqrt(max(partial**2 - seen**2, 0.0))
     if least == MOVED_EACH:
         found, need = _closely_judged(surface, found, need)
-    return Hypothesis(placed=placed, elements=found, need=need, history=history, before=before, seen=seen)
+    return Hypothesis(
+        placed=placed, elements=found, need=need, history=history, before=before, seen=seen, believed=believed
+    )
 
 
 def _counts_unseen(surface: Surface, most: float) -> bool:

@@ -63,28 +63,26 @@ PICTURE = Curve(even=EVEN_PICTURE, even_mirror=EVEN_PICTURE_MIRROR, steepness=ST
 class Link:
     """A group of the chain as the decision sees it: the smallest tolerance at which it holds, and if it is a mirror.
 
-    `placed` is the probability that it does not hold elsewhere as well, `broken` that what no camera saw breaks it,
-    where as much as was seen is missing.
+    `believed` is what of that, in squares, it takes to believe in what nobody saw; `placed` is the probability that it
+    does not hold elsewhere as well, `broken` that what no camera saw breaks it, where as much as was seen is missing.
     """
 
     need: float
     lone_mirror: bool = False
+    believed: float = 0.0
     placed: float = 1.0
     broken: float = 0.0
 
-
-def known_links(groups: Sequence[PointGroup], needs: Sequence[float], placed: Sequence[float] = ()) -> list[Link]:
-    """The groups of a chain in space beyond C1, from these and their needs, and how sure their places are."""
-    beyond = [*needs, math.inf][1:]
-    return [
-        Link(
+    @classmethod
+    def of(cls, group: PointGroup, need: float, beyond: float, *, believed: float, placed: float) -> "Link":
+        """That of a group in space, where the next one of the chain needs so much."""
+        return cls(
             need=need,
-            lone_mirror=group.name == "Cs" and larger >= ALONE * need,
-            placed=sure,
+            lone_mirror=group.name == "Cs" and beyond >= ALONE * need,
+            believed=believed,
+            placed=placed,
             broken=_broken(group),
         )
-        for group, need, larger, sure in zip(groups, needs, beyond, placed or [1.0] * len(needs), strict=True)
-    ]
 
 
 def _broken(group: PointGroup) -> float:
@@ -129,10 +127,12 @@ def meant(link: Link, tolerance: float, noise: float = 0.0, curve: Curve = SPACE
     """Probability that a group is meant, and stands where it was put, from what it needs.
 
     Noise and need add up in squares. Noise also blurs what was measured: local planes grow with it, so that details of
-    one size show less and less of what they miss by, and the curve gets less steep.
+    one size show less and less of what they miss by, and the curve gets less steep. What is believed of what nobody saw
+    was not measured.
     """
     even = curve.even_mirror if link.lone_mirror else curve.even
-    strained = strain(link.need / tolerance, noise / tolerance, even)
+    seen = math.sqrt(max(link.need**2 - link.believed**2, 0.0))
+    strained = strain(seen / tolerance, noise / tolerance, even) + (link.believed / tolerance / even) ** 2
     return link.placed * float(1.0 / (1.0 + strained ** (sharpness(noise / tolerance, curve.steepness) / 2.0)))
 
 

@@ -1,5 +1,6 @@
 """What a decision is made from: a shape measured, its candidates fitted and judged, and joined to a chain of groups."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -11,7 +12,7 @@ from symrefine.decide.chain import chain, explore
 from symrefine.decide.hypotheses import MOVED, Hypothesis
 from symrefine.decide.looks import LOOK, few_motions
 from symrefine.decide.pool import Pool
-from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, known_links, meant
+from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, meant
 from symrefine.detection.measure import Measured, Outliers, doubt, gather, measure
 from symrefine.detection.sketch import Sample, Sketch, is_large, set_apart, sketched
 from symrefine.fit.placed import SAMPLED, Placed
@@ -75,10 +76,11 @@ class Examined:
     @property
     def known(self) -> list[Link]:
         """The groups beyond C1 as the decision sees them."""
-        beyond, surface = self.links[1:], self.surface
+        surface, needs = self.surface, [*(h.need for h in self.links), math.inf]
         # At the tolerance that was asked for, so that a larger one takes no group away that a smaller one tells.
-        placed = [1.0 - meant(Link(need=h.elsewhere), surface.tolerance, surface.floor) for h in beyond]
-        return known_links([h.group for h in beyond], [h.need for h in beyond], placed)
+        placed = (1.0 - meant(Link(need=h.elsewhere), surface.tolerance, surface.floor) for h in self.links)
+        every = zip(self.links, needs[1:], placed, strict=True)
+        return [Link.of(h.group, h.need, beyond, believed=h.believed, placed=sure) for h, beyond, sure in every][1:]
 
     def choices(self, tolerance: float) -> tuple[Alternative, ...]:
         """Every group of the chain, C1 first, as likely as at a tolerance."""
