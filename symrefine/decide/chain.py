@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
+from operator import attrgetter
 
 from symrefine.decide.ends import PLACES, ends_there, ends_too, often_kept, places
 from symrefine.decide.hypotheses import (
@@ -53,6 +54,8 @@ LOOKED = 24
 TOLD = 2
 # Elements that are joined one by one, where all of a level together make no group.
 SINGLY = 4
+
+_need = attrgetter("need")
 
 
 def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 0.0) -> Pool:
@@ -276,10 +279,6 @@ def _told_apart(placed: Placed | None, parts: Sequence[Placed]) -> Placed | None
     return replace(placed, group=PointGroup(name=name, frame=group.frame))
 
 
-def _needed(found: Hypothesis) -> float:
-    return found.need
-
-
 def _worst(found: Hypothesis, hidden: float) -> tuple[float, float]:
     """What a group needs; of those that need no more than is hidden, the mean miss of its worst element."""
     return max(found.need, hidden), max((e.deviation.mean for e in found.elements), default=0.0)
@@ -341,7 +340,7 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
             continue
         # What holds together holds in every part of it, though a part alone may not tell what was not seen.
         inside = (h for h in known if h.elements and h.holds(found.placed))
-        asks = max(min([found, *inside], key=_needed), here, key=_needed)
+        asks = max(min([found, *inside], key=_need), here, key=_need)
         links.append(replace(found, need=asks.need, believed=asks.believed))
         if asks.need > limit:
             break

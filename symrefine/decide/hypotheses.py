@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from symrefine.decide.looks import COARSE, GLANCE, START_ERROR, Look, exact_need, mended, seems, slid
+from symrefine.decide.looks import COARSE, GLANCE, SHORT, START_ERROR, Look, exact_need, mended, seems, slid
 from symrefine.decide.place import is_told, least_elsewhere
 from symrefine.decide.posterior import EVEN, EVEN_MIRROR
 from symrefine.fit.placed import FITTED, Operations, Placed, elements
@@ -118,27 +118,29 @@ def fitted(
     It may stay where it stands if the fit does not settle, or if the surface is open: what lies behind its borders is
     matched with what does not. There it is moved sideways, too, to where edges say that it belongs. One that wherever
     it may stand seems to need more than `close` is judged by few points, one that needs far more than `most` in one
-    place only; where no start leads to as little, no elements are told.
+    place only; where no start leads to as little, no elements are told, and the fit ends after `SHORT` steps.
     """
-    hopeless, asked = max(most, mended(surface)), seems(surface, start) if surface.is_open else 0.0
-    if asked > hopeless:
-        return Hypothesis(placed=start, elements=(), need=asked, before=before)
-    state = start.framed()
+    state, hopeless, exact = start.framed(), max(most, mended(surface)), exact_need(surface.floor)
     stride = surface.stride(_moved_each(len(state.standard), GLANCE))
-    history = tuple(refine(surface.cloud, state, start_error_rad=error_rad, stride=stride))
-    end, exact = start.moved(history[-1].state), exact_need(surface.floor)
+    asked, steps = seems(surface, start) if surface.is_open else 0.0, list[Iterate]()
+    for iterate in refine(surface.cloud, state, start_error_rad=error_rad, stride=stride):
+        steps.append(iterate)
+        short = asked > hopeless and iterate.index == SHORT
+        if short and (needs := seems(surface, start.moved(iterate.state))) > hopeless:
+            return Hypothesis(placed=start, elements=(), need=min(asked, needs), before=before)
+    history, end = tuple(steps), start.moved(steps[-1].state)
     if not surface.is_open and history[-1].converged:
         return _placed(surface, end, history, before)
     asked = asked if surface.is_open else seems(surface, start)
     every = [(seems(surface, end), end, history), (asked, start, history[:1])]
-    needs, first, steps = min(every, key=lambda k: k[0])
+    needs, first, history = min(every, key=lambda k: k[0])
     best, least = slid(surface, first, needs, close) if needs > close else (first, needs)
     if least > hopeless:
-        found = Hypothesis(placed=best, elements=(), need=least, history=steps, before=before)
+        found = Hypothesis(placed=best, elements=(), need=least, history=history, before=before)
     elif least > close:
-        found = _placed(surface, best, steps, before, GLANCE)
+        found = _placed(surface, best, history, before, GLANCE)
     else:
-        found = _placed(surface, best, steps, before)
+        found = _placed(surface, best, history, before)
         # What needs nothing by what was seen needs no less elsewhere.
         if exact < found.seen and found.need <= COARSE * most:
             found = _moved(surface, found, every, was_slid=best is not first)
@@ -175,7 +177,7 @@ def judged(surface: Surface, placed: Placed) -> Hypothesis:
 def seen_to_end(surface: Surface, found: Hypothesis) -> float:
     """What an open surface needs to have a group by what was seen, and by where it ends if it has the group."""
     parts = _Parts.of(found.placed, MOVED_EACH, 0)
-    return _seen_judged(surface, parts, *_met(surface, parts), found.placed.motions())[2]
+    return _seen_judged(surface, parts, *_met(surface, parts), found.placed.motions())[1]
 
 
 def roughly_judged(surface: Surface, look: Look, *, before: int = 0) -> Hypothesis:
@@ -190,19 +192,20 @@ def _placed(
     # What holds of a turn need not hold of its powers where the rest was not seen.
     parts = _Parts.of(placed, least, FITTED if surface.viewed else 0)
     misses, drifts = _met(surface, parts)
-    believed = 0.0
     if surface.viewed:  # cameras tell what nobody saw of it
-        found, need, seen = _seen_judged(surface, parts, misses, drifts)
+        found, need, believed = _seen_judged(surface, parts, misses, drifts)
     else:
         found, need = _judged(surface, parts, misses, drifts)
-        seen = need
+        believed = 0.0
+    seen = need
     # What holds without it asks for no belief in anything unseen.
     if surface.openings is not None and not surface.viewed and need > exact_need(surface.floor):
-        partly, partial, seen = _seen_judged(surface, parts, misses, drifts)
-        if partial < need and _counts_unseen(surface, max(e.coverage.unseen for e in partly)):
-            found, need, believed = partly, partial, math.sqrt(max(partial**2 - seen**2, 0.0))
+        partly, seen, belief = _seen_judged(surface, parts, misses, drifts)
+        if math.hypot(seen, belief) < need and _counts_unseen(surface, max(e.coverage.unseen for e in partly)):
+            found, need, believed = partly, math.hypot(seen, belief), belief
     if least == MOVED_EACH:
-        found, need = _closely_judged(surface, found, need)
+        found, closely = _closely_judged(surface, found, need)
+        need, believed = closely, believed if closely == need else 0.0
     return Hypothesis(
         placed=placed, elements=found, need=need, history=history, before=before, seen=seen, believed=believed
     )
@@ -298,12 +301,12 @@ def _met(surface: Surface, parts: _Parts) -> tuple[Array, Array]:
 def _seen_judged(
     surface: Surface, parts: _Parts, misses: Array, drifts: Array, group: Sequence[Isometry] = ()
 ) -> tuple[tuple[Element, ...], float, float]:
-    """The elements of a group by what was seen of them, and what all need: with the belief in the rest, and without."""
+    """The elements of a group by what was seen of them, what all need by that, and to be believed in the rest."""
     seen = surface.seen(misses, parts.motions, sources=parts.sources, together=True, group=group)
     told = surface.drifts_seen(drifts, seen, parts.motions, sources=parts.sources)
     found, need = _judged(surface, parts, seen, told)
     if surface.openings is None or surface.viewed:  # cameras say what they could not see
-        return found, need, need
+        return found, need, 0.0
     whole = belief_in_as_much(surface, parts.placed)
     beliefs = [whole * e.coverage.belief for e in found]
     # More than half of the operations of a group generate it (Lagrange), so that the others follow; of a continuous one
@@ -311,8 +314,8 @@ def _seen_judged(
     turns = [b for e, b in zip(found, beliefs, strict=True) if math.isinf(e.operations.order)]
     return (
         tuple(replace(e, need=math.hypot(e.need, b)) for e, b in zip(found, beliefs, strict=True)),
-        math.hypot(need, max(turns, default=sorted(beliefs)[len(beliefs) // 2])),
         need,
+        max(turns, default=sorted(beliefs)[len(beliefs) // 2]),
     )
 
 
