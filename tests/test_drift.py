@@ -3,9 +3,13 @@
 import numpy as np
 import pytest
 
+from experiments.objects.shapes import sample
+from experiments.objects.vessels import VESSELS
 from experiments.studies import groups
+from symrefine.detection.measure import gather, measure
 from symrefine.detection.story import detect
-from symrefine.geometry import Array, Isometry, Plane
+from symrefine.geometry import Array, Isometry, Plane, rotation
+from symrefine.shape import Shape
 from symrefine.surface.drift import Drift
 from symrefine.surface.misses import needs
 from symrefine.surface.tree import Tree
@@ -81,6 +85,23 @@ def test_windows_that_reach_what_nobody_saw_are_those_that_what_is_missing_moves
     assert seen[height < 0.0].all()
     assert not seen[np.abs(height - 0.5) < 0.05].any()
     assert misses[seen].max() < 2.0 * whole.misses([MIRROR], 1500).max() < misses.max()
+
+
+@pytest.mark.parametrize("count", [1, 3, 4, 5])
+def test_however_many_windows_are_moved_those_that_reach_what_nobody_saw_are_told(count: int) -> None:
+    """Of 2,000 windows four operations move 667, which are not what one in three of 2,000 would be."""
+    rng = np.random.default_rng(1)
+    shape = Shape(points=sample(VESSELS["pan handle"](rng).shape, 2000, 0.01, rng))
+    surface = gather(measure(shape), np.random.default_rng(0))[1]
+    assert surface.drift is not None
+    assert surface.openings is not None
+    motions = [Isometry.about(np.zeros(3), rotation([0.0, 0.0, 1.0], angle)) for angle in np.arange(1.0, count + 1.0)]
+    drifts, misses = surface.drifts(motions), surface.misses(motions)
+    misses[:, ::7] = np.nan
+    seen = surface.drifts_seen(drifts, misses, motions)
+    assert np.isnan(seen).any()
+    told = np.isfinite(seen)
+    np.testing.assert_array_equal(seen[told], drifts[told])
 
 
 @pytest.mark.parametrize("seed", [41, 61])

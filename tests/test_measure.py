@@ -1,5 +1,6 @@
 """What is known before any symmetry is looked for: n-tuples as measured, and what supports no decision."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -16,6 +17,7 @@ from symrefine.ntuples.contract import ntuples
 from symrefine.ntuples.rank import fixed_subspace
 from symrefine.plane import detect_planar
 from symrefine.surface.misses import TOLERANCE
+from symrefine.surface.sampling import sampling
 
 RANKS = {"vanish": 0, "axis": 1, "plane": 2, "none": 3}
 TABLE = sample(table(), 3000, 0.0, np.random.default_rng(0))
@@ -225,3 +227,18 @@ def test_the_surface_is_what_the_points_are(form):
     assert (surface.floor == 0.0) == (form == "atoms")
     # Normalised units: RMS radius 1 about the centroid.
     assert (evidence.points**2).sum(axis=1).mean() == pytest.approx(1.0)
+
+
+def test_a_scan_of_which_few_points_are_an_even_sample_is_judged_by_all(monkeypatch):
+    """A sofa from near, 2,260 points: 249 were left as even, taken for atoms, and the camera was forgotten."""
+
+    def nearly_none(*args, **options):
+        found = sampling(*args, **options)
+        few = found.kept[:200]
+        return replace(found, even=few, shares=np.ones(len(few)))
+
+    monkeypatch.setattr("symrefine.detection.measure.sampling", nearly_none)
+    points = sample(mug(), 2000, 0.0, np.random.default_rng(0))
+    measured = measure(Shape(points=points, viewpoint=[0.0, -5.0, 1.0]))
+    assert len(measured.shape.points) == 2000
+    assert len(measured.views) == 1

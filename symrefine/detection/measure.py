@@ -137,7 +137,8 @@ def measure(
         clumps, blobs = (tuple((massive[g], shape.points[g]) for g in parts) for parts in (seen.clumps, seen.blobs))
         count, solid = len(seen.kept), seen.solid
         scan = shape.chosen(seen.kept) if shape.viewpoint is not None else None
-        if shape.weights is None and seen.shares is not None:
+        # So few points as would stand for themselves are no even sample of a surface.
+        if shape.weights is None and seen.shares is not None and len(seen.even) > FEW:
             shape = replace(shape.chosen(seen.even), weights=seen.shares)
         elif len(seen.kept) < len(massive):
             shape = shape.chosen(seen.kept)

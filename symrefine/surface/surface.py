@@ -220,7 +220,7 @@ class Surface:
         """How far windows of each of K images lie from those of the cloud [K, S], fractions of the diagonal."""
         if self.drift is None:
             return np.empty((len(motions), 0))
-        return self.drift.misses(motions, max(WINDOWS_EACH, WINDOWS // len(motions))) / self.diagonal
+        return self.drift.misses(motions, _windows_each(motions)) / self.diagonal
 
     def drifts_seen(self, drifts: Array, misses: Array, motions: Sequence[Isometry], *, sources: int = 10**9) -> Array:
         """The same, NaN where a window reaches what operations carry to where nobody looked, where they miss by NaN.
@@ -230,7 +230,7 @@ class Surface:
         if self.drift is None or not drifts.any():
             return drifts
         unseen = self._unseen(misses, motions, sources)
-        return np.where(self.drift.reach(motions, drifts.shape[1], unseen), np.nan, drifts)
+        return np.where(self.drift.reach(motions, _windows_each(motions), unseen), np.nan, drifts)
 
     def drifted(self, drifts: Array, tests: int = 1) -> tuple[Array, float]:
         """The smallest tolerances [K] at which operations hold whose windows drift so [K, S], and that of all together.
@@ -288,3 +288,8 @@ class Surface:
             return 0.0
         share = NEAREST_SPREAD if self.cloud.body == "volume" else 1.0
         return share * float(needs(self.noise, np.empty(0)))
+
+
+def _windows_each(motions: Sequence[Isometry]) -> int:
+    """Windows that each of some operations moves."""
+    return max(WINDOWS_EACH, WINDOWS // len(motions))
