@@ -758,3 +758,24 @@ def test_where_nothing_is_decided_a_person_may_decide():
     chosen = found.chosen(found.choices()[-1].point_group)
     assert not chosen.undetermined
     assert len(chosen.operations()) == chosen.group.order
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_small_holes_in_a_disc_are_turned_onto_one_another(seed):
+    """C5h. Their azimuths do not stand out of chance, so that no fold was told: only the exact plane was left."""
+    rng = np.random.default_rng(seed)
+    spots = [(0.7, 0.0, 0.14), (0.55, 0.5, 0.09), (0.33, 0.9, 0.06)]
+    turns = 2.0 * np.pi * np.arange(5) / 5.0
+    holes = np.array([(r * np.cos(a + t), r * np.sin(a + t), size) for r, a, size in spots for t in turns])
+    flat = rng.uniform(-1.0, 1.0, (3500, 2))
+    clear = (np.linalg.norm(flat[:, None] - holes[:, :2], axis=2) > holes[:, 2]).all(axis=1)
+    flat = flat[clear & (np.linalg.norm(flat, axis=1) < 1.0)]
+    faces = np.column_stack([flat, np.where(rng.random(len(flat)) < 0.5, -0.1, 0.1)])
+    around = [((0.0, 0.0, 1.0), 600), *((tuple(hole), round(600 * hole[2])) for hole in holes)]
+    walls = []
+    for (x, y, radius), count in around:
+        angle = rng.uniform(0.0, 2.0 * np.pi, count)
+        height = rng.uniform(-0.1, 0.1, count)
+        walls.append(np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle), height]))
+    points = np.concatenate([faces, *walls]) @ random_orthogonal(rng).T
+    assert detect(points).point_group == "C5h"

@@ -374,3 +374,19 @@ def test_confidence_of_nothing() -> None:
     assert isinstance(found, PlanarDetection)
     assert found.point_group == "C1"
     assert found.confidence > 0.9
+
+
+@pytest.mark.parametrize("tone", [0.26, 0.5, 0.74])
+def test_the_tone_of_an_area_may_be_any(tone):
+    """At the very tone of a flat area grain alone drew an outline, islands at random, and nothing was symmetric."""
+    rng = np.random.default_rng(round(100 * tone))
+    x, y = (np.mgrid[:160, :160] - 79.7) / 75.0
+    radius, wave = np.hypot(x, y), np.cos(6.0 * np.arctan2(y, x) + 0.4)
+    inside = [np.clip(75.0 * (r * (1.0 + 0.15 * wave) - radius) + 0.5, 0.0, 1.0) for r in (0.8, 0.35)]
+    values = tone * inside[0] + (1.0 - tone) * inside[1]
+    grain = np.where(inside[0] > 0.0, values + rng.normal(scale=0.012, size=values.shape), 0.0)
+    row, column = np.nonzero(grain > 0.0)
+    points = np.column_stack([column, -row]).astype(float)
+    found = detect_planar(Shape(points=points, weights=grain[row, column]))
+    assert found.point_group == "D6"
+    assert found.confidence > 0.95

@@ -15,8 +15,12 @@ from symrefine.surface.neighbourhoods import NEIGHBOURS
 from symrefine.surface.skin import FEW, LocalPlanes, isolated_points, local_planes
 from symrefine.surface.surface import Surface
 
-# Levels, as fractions of the weight that only one cell in twenty exceeds.
+# Levels, as fractions of the weight that only one cell in twenty exceeds. Halfway to the next one a level may move, to
+# where the outline is shortest, in so many steps to either side: at the very tone of an area grain alone draws one.
 LEVELS = (0.5, 0.25, 0.75)
+STEPS = 10
+# An outline is as short as another one up to this factor.
+LONGER = 1.2
 # Side of a picture in cells.
 OUTLINED = 1500
 # What noise may be, over what was measured: as it was, twice as large, or none. True operations of exact drawings miss
@@ -124,13 +128,24 @@ def _seen(line: Array, aside: Array, diagonal: float, least: float, rng: np.rand
 def _telling(raster: Raster) -> Array:
     """The levels whose outlines tell apart: one, if the weights between the levels are only the soft edge."""
     top = float(np.quantile(raster.values[raster.values > 0], 0.95))
-    levels = top * np.array(LEVELS)
+    levels = _beside_tones(raster.values / top) * top
     found = outlines(raster, levels)
     soft = np.count_nonzero((raster.values >= levels[1]) & (raster.values < levels[2]))
-    if soft <= 1.2 * len(found[0]):
+    if soft <= LONGER * len(found[0]):
         return levels[:1]
     kept = levels[[_tells(p) for p in found]]
     return kept if len(kept) else levels[:1]
+
+
+def _beside_tones(values: Array) -> Array:
+    """The levels, each where fewest neighbours lie to either side of it unless as few do where it was."""
+    pairs = [(values[1:], values[:-1]), (values[:, 1:], values[:, :-1])]
+    low, high = (np.sort(np.concatenate([by(a, b).ravel() for a, b in pairs])) for by in (np.minimum, np.maximum))
+    near = np.linspace(-1.0, 1.0, 2 * STEPS + 1) * 0.5 * (LEVELS[0] - LEVELS[1])
+    tried = np.array(LEVELS)[:, None] + near[np.argsort(np.abs(near), kind="stable")]
+    crossed = np.searchsorted(low, tried) - np.searchsorted(high, tried)
+    least = tried[np.arange(len(tried)), crossed.argmin(axis=1)]
+    return np.where(crossed[:, 0] <= LONGER * crossed.min(axis=1), LEVELS, least)
 
 
 def _tells(line: Array) -> bool:
