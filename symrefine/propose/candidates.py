@@ -105,13 +105,14 @@ def _likely(evidence: Evidence) -> list[Array]:
 def about(evidence: Evidence, direction: Array) -> list[Placed]:
     """What may stand about a direction: revolution; mirrors at the phases of a fold, or turns alone; turns of primes.
 
-    These whether azimuths tell them or not: small holes in a large disc do not stand out of what chance shows.
+    These whether azimuths tell them or not: small holes in a large disc do not stand out of what chance shows. Of atoms
+    their number tells which there may be.
     """
     beyond = max(evidence.harmonics) + 1  # a fold that no moment reaches: only those with m = 0 are invariant
     round_frame = polish_frame(evidence.harmonics, frame_with_z(direction), beyond)
     found = [placed("Cinfv", round_frame)]
     given = frame_with_z(direction)
-    anyway = {*PRIMES, *(_counted(evidence.points, direction) if evidence.atoms else ())}
+    anyway = {2, 3, *_counted(evidence.points, direction)} if evidence.atoms else set(PRIMES)
     turns = {(fold, False): given for fold in anyway}
     for axis in apart(np.stack([round_frame[2], direction]), 0.2 * APART_RAD):
         for candidate in fold_candidates(evidence.points, evidence.weights, axis)[:FOLDS]:
