@@ -15,11 +15,11 @@ from symrefine.surface.neighbourhoods import NEIGHBOURS
 from symrefine.surface.skin import FEW, LocalPlanes, isolated_points, local_planes
 from symrefine.surface.surface import Surface
 
-# Levels, as fractions of the weight that only one cell in twenty exceeds. Halfway to the next one a level may move, to
-# where the outline is shortest, in so many steps to either side: at the very tone of an area grain alone draws one.
+# Levels, as fractions of the weight that only one cell in twenty exceeds. Halfway to the next a level may move, by so
+# many steps, to where it matters least: at the very tone of an area grain alone draws the outline.
 LEVELS = (0.5, 0.25, 0.75)
 STEPS = 10
-# An outline is as short as another one up to this factor.
+# An outline is as long as another one up to this factor.
 LONGER = 1.2
 # Side of a picture in cells.
 OUTLINED = 1500
@@ -138,14 +138,17 @@ def _telling(raster: Raster) -> Array:
 
 
 def _beside_tones(values: Array) -> Array:
-    """The levels, each where fewest neighbours lie to either side of it unless as few do where it was."""
+    """The levels, each where the length of its outline hangs least on it unless it hardly does where it was."""
     pairs = [(values[1:], values[:-1]), (values[:, 1:], values[:, :-1])]
     low, high = (np.sort(np.concatenate([by(a, b).ravel() for a, b in pairs])) for by in (np.minimum, np.maximum))
-    near = np.linspace(-1.0, 1.0, 2 * STEPS + 1) * 0.5 * (LEVELS[0] - LEVELS[1])
-    tried = np.array(LEVELS)[:, None] + near[np.argsort(np.abs(near), kind="stable")]
-    crossed = np.searchsorted(low, tried) - np.searchsorted(high, tried)
-    least = tried[np.arange(len(tried)), crossed.argmin(axis=1)]
-    return np.where(crossed[:, 0] <= LONGER * crossed.min(axis=1), LEVELS, least)
+    steps = np.arange(-STEPS, STEPS + 1)
+    steps = steps[np.argsort(np.abs(steps), kind="stable")]
+    near = (steps[:, None] + np.arange(-STEPS // 2, STEPS // 2 + 1)) * 0.5 * (LEVELS[0] - LEVELS[1]) / STEPS
+    tried = np.array(LEVELS)[:, None, None] + near
+    lengths = np.maximum(np.searchsorted(low, tried) - np.searchsorted(high, tried), 1)
+    varies = lengths.max(axis=2) / lengths.min(axis=2)
+    moved = np.array(LEVELS) + near[varies.argmin(axis=1), STEPS // 2]
+    return np.where(varies[:, 0] <= LONGER, LEVELS, moved)
 
 
 def _tells(line: Array) -> bool:
