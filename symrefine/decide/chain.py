@@ -187,7 +187,10 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
 
 
 def _holding(surface: Surface, placed: Placed, most: float) -> list[Placed]:
-    """The elements of a group that does not hold which seem to hold alone: of a gear's mirrors those of its holes."""
+    """The elements that seem to hold alone of a group that does not, or of which too little was seen.
+
+    Of a gear's mirrors those that its holes share; of a slab from above all but its own plane.
+    """
     every = [e.alone(placed.center) for e in elements(placed.group)]
     alone = [p for p in every if p.group.name != placed.group.name]  # of S4 one generates all of it
     return [p for p, needs in zip(alone, glances(surface, alone, most), strict=True) if needs < most]
