@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from symrefine.detection.measure import Outliers, is_few
+from symrefine.detection.measure import Outliers, floor_under, heavy, is_few
 from symrefine.detection.sketch import MANY, is_large, sampled, sketched
 from symrefine.errors import InputError, about
 from symrefine.geometry import LARGEST_TOLERANCE, Array, check_tolerance, tight_diagonal
@@ -21,7 +21,7 @@ def relative_tolerance(
     Args:
         asked: a fraction, which stays what it is, or a length with its unit, such as "0.5mm" or "2u".
         units: what a length of 1 in the shape is, one of `units.METRES`; what the format of its source says if None.
-        outliers: whether points that belong to no surface count for the diagonal, as in `detect`.
+        outliers: whether points that belong to no surface, or to a floor, count for the diagonal, as in `detect`.
 
     Raises:
         InputError: a unit that is not known, of the tolerance or of the shape; units for a tolerance that has none; a
@@ -72,23 +72,23 @@ def object_diagonal(shape: Shape, *, outliers: Outliers = "auto") -> float:
             f"{shape.source}: has {shape.dim} coordinates; give the tolerance as a fraction of the diameter"
         )
     if shape.dim == 2:
-        return smallest_diagonal(heavy(shape))
+        return smallest_diagonal(heavy(shape).points)
     return tight_diagonal(body(shape, outliers=outliers))
 
 
 def body(shape: Shape, *, outliers: Outliers = "auto") -> Array:
-    """The points [K, 3] of a shape without those that belong to no surface, if outliers are looked for ("auto").
+    """The points [K, 3] of a shape without those that belong to no surface, if outliers are looked for.
 
     Of very many points a sample stands for all.
+
+    Raises:
+        InputError: a floor asked for of what is no cloud of a surface.
     """
     if is_large(shape):
         shape = sampled(shape)
-    points = heavy(shape)
+    points = heavy(shape).points
+    if (floor := floor_under(shape, outliers)) is not None:
+        points = points[~floor.covers(points)]
     if shape.faces is not None or is_few(shape):
         return points
-    return points[sampling(points, np.random.default_rng(0), outliers=outliers == "auto").kept]
-
-
-def heavy(shape: Shape) -> Array:
-    """The points [K, n] that weigh anything."""
-    return shape.points if shape.weights is None else shape.points[shape.weights > 0.0]
+    return points[sampling(points, np.random.default_rng(0), outliers=outliers != "none").kept]

@@ -7,15 +7,16 @@ from typing import Literal
 import numpy as np
 
 from symrefine.decide.doubts import FLAT
-from symrefine.detection.measure import is_few
+from symrefine.detection.measure import heavy, is_few
 from symrefine.detection.sketch import is_large, sampled
 from symrefine.errors import DegenerateShapeError
 from symrefine.geometry import Array, ReadOnly
-from symrefine.lengths import heavy, object_diagonal
+from symrefine.lengths import object_diagonal
 from symrefine.moments.moments import shape_moments
 from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import count_parts
+from symrefine.surface.floor import floor_of
 from symrefine.surface.neighbourhoods import connected_parts, fills_volume
 from symrefine.surface.sampling import sampling
 from symrefine.surface.tree import Tree
@@ -63,13 +64,15 @@ class Cloud:
     Attributes:
         strays: points far from all others and in no plane with them.
         clumps: points of each group that stands apart and has no counterpart.
-        parts: that hang together, without these.
+        floor: points of a plane that all others stand on and that reaches beyond them; 0 if there is none.
+        parts: that hang together, without strays and clumps.
         even: whether the density does not fall off.
         volume: whether the points fill a volume instead of a surface.
     """
 
     strays: int
     clumps: tuple[int, ...]
+    floor: int
     parts: int
     even: bool
     volume: bool
@@ -174,13 +177,14 @@ def _is_solid(shape: Shape) -> bool:
 def _cloud(shape: Shape) -> Cloud:
     """How a cloud was sampled; of very many points a sample tells, in numbers of all."""
     some = sampled(shape) if is_large(shape) else shape
-    points, each = heavy(some), len(shape.points) / len(some.points)
-    found = sampling(points, np.random.default_rng(0), outliers=True)
+    points, each = heavy(some).points, len(shape.points) / len(some.points)
+    found, floor = sampling(points, np.random.default_rng(0), outliers=True), floor_of(points)
     kept = points[found.kept]
     kept = (kept - kept.mean(axis=0)) / kept.std()
     return Cloud(
         strays=round(each * len(found.strays)),
         clumps=tuple(round(each * len(clump)) for clump in found.clumps),
+        floor=0 if floor is None else round(each * np.count_nonzero(floor.covers(points))),
         parts=count_parts(kept, np.random.default_rng(0)),
         even=found.shares is None,
         volume=found.solid and fills_volume(kept, Tree(kept), np.random.default_rng(0)),
@@ -224,6 +228,8 @@ def _doubts_of_cloud(cloud: Cloud, count: int) -> Iterator[str]:
     if cloud.clumps:
         sizes = ", ".join(f"{size:,}" for size in cloud.clumps)
         yield f"clumps of {sizes} points stand apart without a counterpart and may be taken as outliers"
+    if cloud.floor:
+        yield f"{cloud.floor:,} points lie in a plane that all others stand on: if it is a floor, say --outliers floor"
     if not cloud.even:
         yield "the density falls off to one side: points are drawn more evenly, and weighted"
     if cloud.volume:

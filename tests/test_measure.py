@@ -23,7 +23,7 @@ RANKS = {"vanish": 0, "axis": 1, "plane": 2, "none": 3}
 TABLE = sample(table(), 3000, 0.0, np.random.default_rng(0))
 
 
-def reason(shape, tolerance=TOLERANCE, outliers="auto"):
+def reason(shape, tolerance=TOLERANCE, outliers=True):
     """The doubt about a shape, which is one line."""
     measured = measure(shape if isinstance(shape, Shape) else Shape.of(shape), outliers=outliers)
     found = doubt(measured, gather(measured, np.random.default_rng(0))[1], tolerance)
@@ -62,7 +62,7 @@ def test_atoms_in_a_row_have_a_group(ends, group):
 def test_a_stray_point_sets_the_scale(far):
     radius = np.linalg.norm(TABLE - TABLE.mean(axis=0), axis=1).max()
     cloud = np.concatenate([TABLE, TABLE.mean(axis=0) + far * radius * np.array([[0.6, 0.48, 0.64]])])
-    said = reason(cloud, outliers="none")
+    said = reason(cloud, outliers=False)
     assert said.startswith("1 of 3001 points stand")
     assert "stray" in said
     found = detect(cloud, outliers="none")

@@ -80,7 +80,7 @@ def ground(mesh: Shape, size: float, rng: Rng) -> Damaged:
     area = size**2 * float(np.prod((high - low)[:2]))
     count = round(area * POINTS / _area(mesh))
     floor = 0.5 * (low + high) + size * (rng.random((count, 3)) - 0.5) * (high - low)
-    floor[:, 2] = low[2] + rng.normal(scale=NOISE_REL * mesh.diagonal, size=count)
+    floor[:, 2] = mesh.points[:, 2].min() + rng.normal(scale=NOISE_REL * mesh.diagonal, size=count)
     return _left(points, floor)
 
 
@@ -124,6 +124,25 @@ def mild(mesh: Shape, strength: float, rng: Rng) -> Damaged:
     """Strays, uneven density and a hole at once: shares of `strength`, a ratio of 3."""
     points = _without_ball(_whole(mesh, rng, 4 * POINTS), strength, rng)
     return _scattered(_thinned(points, 3.0, rng)[: round((1.0 - strength) * POINTS)], strength, rng)
+
+
+def tabletop(mesh: Shape, count: float, rng: Rng) -> Damaged:
+    """What one or more cameras see from above of an object on a table, and of the table, as long as twice its box."""
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    corners = 0.5 * (low + high) + np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * (high - low).max()
+    corners[:, 2] = low[2]
+    assert mesh.faces is not None
+    faces = np.concatenate([mesh.faces, len(mesh.points) + np.array([[0, 1, 2], [0, 2, 3]])])
+    both = Shape(points=np.concatenate([mesh.points, corners]), faces=faces)
+    around, up = rng.random() + np.arange(round(count)) / count, rng.uniform(0.35, 0.95)
+    level = np.sqrt(1.0 - up**2)
+    seen = [view(both, np.array([level * np.cos(a), level * np.sin(a), up]), rng) for a in 2.0 * np.pi * around]
+    points = np.concatenate([s.points for s in seen])
+    return Damaged(
+        points=points,
+        strays=(points[:, 2] < low[2] + 1e-4 * mesh.diagonal).astype(np.int64),
+        viewpoint=np.concatenate([np.asarray(s.viewpoint) for s in seen]),
+    )
 
 
 def views(mesh: Shape, count: float, rng: Rng, *, rough: bool = False) -> Damaged:
@@ -190,7 +209,11 @@ KINDS: dict[str, tuple[Damage, tuple[float, ...]]] = {
     "views": (views, (1.0, 2.0, 4.0)),
     "rough views": (partial(views, rough=True), (1.0, 2.0)),
     "mild": (mild, (0.05,)),
+    "floor": (ground, (1.1, 1.5, 3.0)),
+    "tabletop": (tabletop, (1.0, 2.0)),
 }
+# Kinds of which it is told that there is a floor.
+FLOORS = ("floor", "tabletop")
 
 
 def can_show(points: Array, normal: Array, offset: float, *, share: float = 0.15, near_rel: float = 0.02) -> bool:

@@ -22,7 +22,7 @@ import numpy as np
 from experiments.objects import tangles
 from experiments.objects.built_symmetry import Truth, holds, specimen
 from experiments.objects.catalogue import catalogue
-from experiments.objects.damage import KINDS, Damaged, can_show
+from experiments.objects.damage import FLOORS, KINDS, Damaged, can_show
 from experiments.objects.poses import Pose
 from experiments.studies.answers import SURE, claims
 from experiments.studies.jobs import add_jobs, in_order
@@ -126,7 +126,7 @@ def run(case: Case) -> Row:
     made, truth = damaged(case)
     shape = Shape(points=made.points, viewpoint=made.viewpoint)
     start = perf_counter()
-    found = detect(shape)
+    found = detect(shape, outliers="floor" if case.kind in FLOORS else "auto")
     seconds = perf_counter() - start
     own = made.points[made.strays == 0]
     diagonal = tight_diagonal(own)

@@ -116,6 +116,7 @@ KIND_OF = {
         "surface.cameras": "RAYS BESIDE",
         "surface.clumps": "SPARSE",
         "surface.drift": "CELLS REACH PROBES",
+        "surface.floor": "TRIALS SOME FITS",
         "surface.misses": "DISCS ASKED AT_ONCE",
         "surface.neighbourhoods": "NEIGHBOURS PROBES UNCERTAIN CELLS",
         "surface.openings": "NEIGHBOURS LINKS",

@@ -88,7 +88,7 @@ _OPTIONS: Mapping[str, Callable[[str], Any]] = {
     "measure": _one_of("surface", "solid"),
     "seed": values.natural,
     "frame": values.natural,
-    "outliers": _one_of("auto", "none"),
+    "outliers": _one_of("auto", "floor", "none"),
     "viewpoint": values.place,
     "labels": str,
     "weights": str,

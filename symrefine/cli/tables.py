@@ -12,6 +12,7 @@ from symrefine.front.lines import handedness, map_rows
 from symrefine.groups import point_group
 from symrefine.picture.words import (
     DOUBLETS,
+    NO_FLOOR,
     TUPLES,
     evened,
     exactly,
@@ -50,8 +51,15 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
         yield f"labels: {_count(record['classes']['count'], 'class', 'classes')}"
     out, sample = record["outliers"], record["sample"]
     of = None if sample is None else (sample["points"], sample["of"])
-    told = taken_out(out["count"], out["share"], out["clumps"]), sampled(of), evened(record["even_sample"])
-    yield from filter(None, told)
+    yield from filter(
+        None,
+        (
+            taken_out(out["count"], out["share"], out["clumps"], floor=out["floor"] is not None),
+            NO_FLOOR if record["options"].get("outliers") == "floor" and out["floor"] is None else "",
+            sampled(of),
+            evened(record["even_sample"]),
+        ),
+    )
     if record["at_least"]:
         yield partial(record)
     yield from _apart(*_spatial(record))

@@ -46,10 +46,10 @@ def add_scan_options(parser: argparse.ArgumentParser) -> None:
     """The options that say how points were taken."""
     parser.add_argument(
         "--outliers",
-        choices=("auto", "none"),
+        choices=("auto", "floor", "none"),
         default="auto",
-        help="auto: points of a cloud that belong to no surface, single or in clumps, are set apart and told; none: "
-        "all points count (default: %(default)s)",
+        help="auto: points of a cloud that belong to no surface, single or in clumps, are set apart and told; floor: "
+        "so is the plane that the object stands on; none: all points count (default: %(default)s)",
     )
     add_viewpoint(parser)
 

@@ -71,7 +71,7 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     nothing = max(ALIKE * _hidden(surface), certain(finest))
     closed = None if surface.openings is None else surface.openings.closed
     whole = _of_whole(replace(surface, openings=closed), evidence, limit, nothing)
-    if surface.openings is None or surface.openings is closed:
+    if surface.openings is None or (surface.openings is closed and closed.floor is None):
         return whole
     ends, evident = ends_there(surface, whole.largest), surface.openings.evident
     if not whole.largest.group.is_polar and (ends or not evident):
@@ -83,7 +83,9 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     hidden = max((e.coverage.unseen for e in part.largest.elements), default=0.0)
     # A group that a single hole leaves may keep its border because it keeps the border of almost any.
     ends = ends and not (more and often_kept(surface, whole.largest, hidden))
-    missing = (evident or (more and hidden <= ENCLOSED)) and not ends
+    # Of what stands on a floor nobody saw the bottom.
+    open_ = evident or surface.openings.floor is not None
+    missing = (open_ or (more and hidden <= ENCLOSED)) and not ends
     missing = missing or places(whole.largest, part.largest) >= PLACES
     if missing and not (more and ends_too(surface, part.largest, ALIKE * limit)):
         return replace(part, at_least=True)

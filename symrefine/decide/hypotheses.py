@@ -217,7 +217,7 @@ def _counts_unseen(surface: Surface, most: float) -> bool:
     What is no more than a detail is rather missing: a flag, on one side.
     """
     openings = surface.openings
-    return openings is not None and (bool(openings.clumps) or most > SHARES[1])
+    return openings is not None and (bool(openings.covering) or most > SHARES[1])
 
 
 def _closely_judged(surface: Surface, found: tuple[Element, ...], need: float) -> tuple[tuple[Element, ...], float]:

@@ -1,7 +1,7 @@
 """What a decision is made from: a shape measured, its candidates fitted and judged, and joined to a chain of groups."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -13,14 +13,15 @@ from symrefine.decide.hypotheses import MOVED, Hypothesis
 from symrefine.decide.looks import LOOK, few_motions
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, meant
-from symrefine.detection.measure import Measured, Outliers, doubt, gather, measure
-from symrefine.detection.sketch import Sample, Sketch, is_large, set_apart, sketched
+from symrefine.detection.measure import Measured, Outliers, doubt, floor_under, gather, measure
+from symrefine.detection.sketch import Sample, Sketch, is_large, sampled, set_apart, sketched
 from symrefine.fit.placed import SAMPLED, Placed
 from symrefine.fit.vertices import ROUNDED, OnVertices, on_vertices
 from symrefine.geometry import Array, Mask, check_tolerance
 from symrefine.groups import PointGroup
 from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import CLUMP, COUNTERPART, Clump, clump_among
+from symrefine.surface.floor import Floor
 from symrefine.surface.misses import SHARES, TOLERANCE, disc_distances
 from symrefine.surface.surface import Surface
 from symrefine.surface.tree import Tree
@@ -42,6 +43,7 @@ class Examined:
         outlier_share: of all points.
         sample: how many points stand for how many, if they stand for more than themselves.
         carried: by the groups of a mesh that were asked for, where its vertices put them.
+        no_floor: whether it was told that it stands on one, and none was found.
     """
 
     measured: Measured
@@ -52,6 +54,13 @@ class Examined:
     outlier_share: float
     sample: Sample | None
     carried: Mapping[str, OnVertices | None]
+    no_floor: bool = False
+
+    def among(self, left: Mask) -> "Examined":
+        """The same of all points, of which those of the floor, that others are left of [N], are outliers, too."""
+        own, apart = np.flatnonzero(left), float(1.0 - left.mean())
+        outliers = np.union1d(np.flatnonzero(~left), own[self.outliers])
+        return replace(self, outliers=outliers, outlier_share=apart + (1.0 - apart) * self.outlier_share)
 
     @property
     def has_strays_left(self) -> bool:
@@ -132,16 +141,40 @@ def examined(
     """
     for t in (tolerance, *ladder):
         check_tolerance(t)
+    shape, floor, left = _without_floor(shape, outliers)
     if isinstance(shape, Shape) and is_large(shape):
         with clock("pass"):
             shape = sketched(shape, seed)
-    examine = partial(_examined, shape, outliers, tolerance, ladder, seed, clock)
+    examine = partial(_examined, shape, floor, outliers != "none", tolerance, ladder, seed, clock)
+    found = _likeliest(shape, examine, tolerance, outliers=outliers != "none")
+    if left is None:
+        return replace(found, no_floor=outliers == "floor")
+    return found.among(left)
+
+
+def _without_floor(shape: Shape | Sketch, outliers: Outliers) -> tuple[Shape | Sketch, Floor | None, Mask | None]:
+    """A shape without what it stands on, where that was asked for and found, that, and which of its points are left."""
+    some = shape.sample if isinstance(shape, Sketch) else shape
+    floor = floor_under(sampled(some) if is_large(some) else some, outliers)
+    if floor is None:
+        return shape, None, None
+    left = ~floor.covers(some.points)
+    rest = some.chosen(np.flatnonzero(left))
+    if isinstance(shape, Sketch):
+        return replace(shape, sample=rest, picked=shape.picked[left], moments=None, whole=None), floor, left
+    return rest, floor, left
+
+
+def _likeliest(
+    shape: Shape | Sketch, examine: Callable[..., Examined], tolerance: float, *, outliers: bool
+) -> Examined:
+    """What is found where that is set apart which alone hides a symmetry, and where no part of the object is."""
     found = examine(apart=True)
     apart = not _has_parts_apart(found, tolerance)
     if not apart:
         found = examine(apart=False)
     points = (shape.sample if isinstance(shape, Sketch) else shape).points
-    for suspects in (_suspects, _strangers) if outliers == "auto" else ():
+    for suspects in (_suspects, _strangers) if outliers else ():
         # What fills a volume beside a surface is taken for a clump only where it alone hides a symmetry.
         if foreign := suspects(found, points, tolerance):
             without = examine(apart=apart, foreign=foreign)
@@ -191,7 +224,8 @@ def _has_parts_apart(found: Examined, tolerance: float) -> bool:
 
 def _examined(
     given: Shape | Sketch,
-    outliers: Outliers,
+    floor: Floor | None,
+    outliers: bool,
     tolerance: float,
     ladder: Sequence[float],
     seed: int,
@@ -204,8 +238,8 @@ def _examined(
     shape = given.sample if isinstance(given, Sketch) else given
     with clock("moments", len(shape.points)):
         whole = sketch.moments if sketch is not None and sketch.seen else None
-        measured = measure(shape, outliers=outliers, apart=apart, foreign=foreign, whole=whole)
-        out, share = set_apart(measured, sketch, outliers=outliers == "auto")
+        measured = measure(shape, outliers=outliers, apart=apart, foreign=foreign, floor=floor, whole=whole)
+        out, share = set_apart(measured, sketch, outliers=outliers)
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed), tolerance)
     with clock("search"):

@@ -21,6 +21,7 @@ from symrefine.shape import Index, Shape
 from symrefine.surface.cameras import Camera, cameras, outwards
 from symrefine.surface.clumps import Clump
 from symrefine.surface.drift import Drift
+from symrefine.surface.floor import Floor, floor_of
 from symrefine.surface.misses import TOLERANCE, noise_distances, sampling_distances
 from symrefine.surface.neighbourhoods import fills_volume
 from symrefine.surface.openings import NEIGHBOURS, openings
@@ -29,7 +30,7 @@ from symrefine.surface.skin import FEW, LocalPlanes, Skin, drawn, isolated_point
 from symrefine.surface.surface import WINDOWS, Surface
 from symrefine.surface.tree import Tree, side_by_side
 
-Outliers = Literal["auto", "none"]
+Outliers = Literal["auto", "floor", "none"]
 # Order of the moments, and parts of their jackknife.
 ORDER, PARTS = 8, 16
 # Local planes of a cloud; points that a volume is known by, and planes of a mesh, whose normals are exact.
@@ -50,6 +51,7 @@ class Measured:
         shape: without what was taken as outliers, and of a density that falls off a more even sample.
         count: of its points, with those that were too many in dense parts.
         scan: all of these with where they were seen from, if that is known.
+        floor: what it stands on, where that was set apart.
         strays: indices of the points that were for being far from all others.
         clumps: of each group of points that was for standing apart from the body, or filling a volume beside it, and
             where they are.
@@ -63,6 +65,7 @@ class Measured:
     shape: Shape
     count: int
     scan: Shape | None
+    floor: Floor | None
     strays: Index
     clumps: tuple[tuple[Index, Array], ...]
     blobs: tuple[tuple[Index, Array], ...]
@@ -75,6 +78,11 @@ class Measured:
     def apart(self) -> list[Index]:
         """Indices of the strays, and of each clump."""
         return [self.strays, *(indices for indices, _ in self.clumps)]
+
+    @property
+    def is_thinned(self) -> bool:
+        """Whether the points are a more even sample of those that were kept, and weigh what each stands for."""
+        return len(self.shape.points) < self.count
 
     @cached_property
     def flaw(self) -> str:
@@ -98,25 +106,22 @@ class Measured:
 def measure(
     shape: Shape,
     *,
-    outliers: Outliers = "auto",
+    outliers: bool = True,
     apart: bool = True,
     foreign: Sequence[Index] = (),
+    floor: Floor | None = None,
     whole: Moments | None = None,
 ) -> Measured:
     """Moments to order 8 and the n-tuples of them, of the points that belong to the object.
 
     Args:
         shape: of which only some points may belong to the object.
-        outliers: "auto" or "none": whether any are set apart.
+        outliers: whether any are set apart.
         apart: whether clumps apart from the body count as outliers.
         foreign: indices of each group of points that is known to be no part of the object.
+        floor: what it stands on, where that was set apart.
         whole: moments of all the points that `shape` is a sample of; they count where no point is set apart.
-
-    Raises:
-        InputError: another word for outliers.
     """
-    if outliers not in get_args(Outliers):
-        raise InputError(f"outliers is {outliers!r}; expected one of {list(get_args(Outliers))}")
     strays: Index = np.empty(0, dtype=np.int64)
     clumps: tuple[tuple[Index, Array], ...] = ()
     scan: Shape | None = None
@@ -128,11 +133,10 @@ def measure(
         shape = shape.chosen(massive)  # points of no mass are no part of the object
     count, every = len(shape.points), shape
     if shape.faces is None and not is_few(shape):
-        auto = outliers == "auto"
         # What stands in front parts what a camera sees, and hides its counterparts.
         groups, rng = shape.viewpoint is None, np.random.default_rng(0)
         known = [np.flatnonzero(np.isin(massive, group)) for group in foreign]
-        seen = sampling(shape.points, rng, outliers=auto, groups=groups, apart=apart, foreign=known)
+        seen = sampling(shape.points, rng, outliers=outliers, groups=groups, apart=apart, foreign=known)
         strays = massive[seen.strays]
         clumps, blobs = (tuple((massive[g], shape.points[g]) for g in parts) for parts in (seen.clumps, seen.blobs))
         count, solid = len(seen.kept), seen.solid
@@ -152,6 +156,7 @@ def measure(
         shape=shape,
         count=count,
         scan=scan,
+        floor=floor,
         strays=strays,
         clumps=clumps,
         blobs=blobs,
@@ -160,6 +165,32 @@ def measure(
         moments=moments,
         vectors=vectors,
     )
+
+
+def floor_under(shape: Shape, outliers: Outliers) -> Floor | None:
+    """What the points of a shape stand on, where that was asked for; None if nothing is found, or hardly more is there.
+
+    Raises:
+        InputError: another word for outliers, or a floor asked for of what is no cloud of a surface.
+    """
+    if outliers not in get_args(Outliers):
+        raise InputError(f"outliers is {outliers!r}; expected one of {list(get_args(Outliers))}")
+    if outliers != "floor":
+        return None
+    if shape.faces is not None or is_few(shape):
+        what = "a mesh" if shape.faces is not None else f"{len(shape.points)} points"
+        raise InputError(
+            f"{shape.source}: outliers is 'floor', for a cloud of what stands on one, of more than {FEW} points; "
+            f"this is {what}, leave it out"
+        )
+    points = heavy(shape).points
+    found = floor_of(points)
+    return None if found is None or np.count_nonzero(~found.covers(points)) <= FEW else found
+
+
+def heavy(shape: Shape) -> Shape:
+    """The points that weigh anything."""
+    return shape if shape.weights is None else shape.chosen(np.flatnonzero(shape.weights > 0.0))
 
 
 def is_few(shape: Shape) -> bool:
@@ -186,7 +217,7 @@ def _few_decide(measured: Measured) -> str:
     if shape.faces is not None:
         return ""
     strays = set_by_strays(shape.points, few=is_few(shape))
-    if strays or is_few(shape) or shape.weights is None:
+    if strays or is_few(shape) or shape.weights is None or measured.is_thinned:
         return strays
     count = float(shape.weights.sum() / shape.weights.max())
     if count > FEW:
@@ -280,27 +311,22 @@ def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLE
     )
     if is_few(shape):
         return evidence, Surface(cloud=isolated_points(local, labels), diagonal=tight_diagonal(local))
-    hiding = tuple(Clump.of((p - moments.center) / moments.scale) for _, p in measured.clumps)
     if measured.solid and normals is None and fills_volume(local, Tree(local), np.random.default_rng(0)):
         return evidence, _volume(local, labels, tolerance, rng)
-    exact = shape.faces is not None
-    strays = len(measured.strays) > 0
-    return evidence, _surface(local, normals, weights, labels, exact, tolerance, measured.views, hiding, strays, rng)
+    return evidence, _surface(measured, local, normals, weights, labels, tolerance, rng)
 
 
 def _surface(
+    measured: Measured,
     local: Array,
     normals: Array | None,
     weights: Array,
     labels: Index | None,
-    exact: bool,
     tolerance: float,
-    views: tuple[Camera, ...],
-    hiding: tuple[Clump, ...],
-    strays: bool,
     rng: np.random.Generator,
 ) -> Surface:
-    """Local planes with what noise alone shows."""
+    """Local planes with what noise alone shows, and what is hidden of them."""
+    moments, views, exact = measured.moments, measured.views, measured.shape.faces is not None
     tree = None if exact else Tree(local)
     uneven = None if exact or np.ptp(weights) == 0.0 else weights
     whole = make_skin(local, rng, normals=normals, labels=labels, exact=exact, tree=tree)
@@ -329,10 +355,20 @@ def _surface(
     surface = Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, skin=skin, tolerance=tolerance)
     # Where noise alone needs all that is allowed, nobody sees what is open.
     if tree is not None and (surface.floor < tolerance or views):
-        surface = replace(surface, openings=openings(cloud, local, tree, views, near, clumps=hiding, strays=strays))
+        found = openings(
+            cloud,
+            local,
+            tree,
+            views,
+            near,
+            clumps=tuple(Clump.of((p - moments.center) / moments.scale) for _, p in measured.clumps),
+            floor=None if measured.floor is None else measured.floor.normalised(moments.center, moments.scale),
+            strays=len(measured.strays) > 0,
+        )
+        surface = replace(surface, openings=found)
     # Where density differs, as between what cameras saw from far and near or where a clump adds to it, a window and its
     # image hold more of chance than one window and itself.
-    if whole.noisy and uneven is None and not (views or hiding):
+    if whole.noisy and uneven is None and not (views or measured.clumps):
         surface = replace(surface, drift=Drift.of(local, whole.tree, WINDOWS, rng))
     return surface
 

@@ -11,6 +11,7 @@ from symrefine.groups import PointGroup
 from symrefine.ntuples.contract import NTuples
 from symrefine.ntuples.rank import FixedSubspace
 from symrefine.shape import Index
+from symrefine.surface.floor import Floor
 from symrefine.surface.misses import Deviation
 from symrefine.surface.surface import Coverage, Surface
 
@@ -147,6 +148,8 @@ class Detection(ReadOnly):
         at_least: whether the surface has open borders beyond which nobody looked, or is `strewn`: the object may have
             more symmetry.
         strewn: whether so many strays are left beside the surface that they may hide some, and all of it was seen.
+        floor: what the object stands on, in input units, where that was told and found: outliers, too.
+        no_floor: whether that was told and none found.
         clumps: how many groups of them stand apart from the body, the others being single strays.
         outlier_share: of all points.
         exact: that and how exactly the group maps vertices of a mesh onto vertices, if it does; None of anything else.
@@ -183,6 +186,8 @@ class Detection(ReadOnly):
     candidates: tuple[Candidate, ...]
     outliers: Index
     outlier_share: float
+    floor: Floor | None
+    no_floor: bool
     clumps: int
     exact: Exact | None
     sample: Sample | None

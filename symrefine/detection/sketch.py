@@ -43,7 +43,7 @@ class Sketch:
     Attributes:
         sample: one point at random of each of `SAMPLE` runs of equal length, with all that is known of it.
         picked: [S] indices of these among all, ascending.
-        moments: of all points, to order 8.
+        moments: of all points, to order 8; None where some are known to be no part of the object.
         low, high: [3] the box of all points.
         count: of all points.
         whole: all points, where they are in memory.
@@ -51,7 +51,7 @@ class Sketch:
 
     sample: Shape
     picked: Index
-    moments: Moments
+    moments: Moments | None
     low: Array
     high: Array
     count: int

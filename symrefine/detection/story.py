@@ -53,7 +53,7 @@ def detect(
         viewpoint: [3] or [N, 3] place of the camera that saw the points, or each of them: what lies in front of them or
             beside their outline, was seen to be free. Not with a `Shape`.
         outliers: "auto": points of a cloud that belong to no surface are set apart and told as `Detection.outliers`;
-            "none": all points count.
+            "floor": so is the plane that the object stands on, as `Detection.floor`; "none": all points count.
         tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal: 95 % of the
             surface must come within 0.75 of it, 99 % within 1.6, the mean within 0.22 (see `surface.misses`). How sure
             the answer is says how close the object comes to these limits.
@@ -61,7 +61,8 @@ def detect(
         seed: of the random choices (samples of a mesh, subsets of a cloud).
 
     Raises:
-        InputError: not a 3-D shape, tolerances outside (0, 0.2], or another word for outliers.
+        InputError: not a 3-D shape, tolerances outside (0, 0.2], another word for outliers, or a floor told of what is
+            no cloud of a surface.
         DegenerateShapeError: the points do not spread.
     """
     data, clock = _given(shape, weights, normals, labels, viewpoint), Clock()
@@ -229,10 +230,12 @@ def _report(
         outlier_share=found.outlier_share,
         at_least=(found.pool.at_least or strewn) and more,
         strewn=strewn and more,
+        floor=measured.floor,
+        no_floor=found.no_floor,
         clumps=len(measured.clumps),
         exact=None if on is None else Exact(miss=on.miss, faces=on.faces, point_group=on.finite.name),
         sample=found.sample,
-        even_sample=len(measured.shape.points) if len(measured.shape.points) < measured.count else None,
+        even_sample=len(measured.shape.points) if measured.is_thinned else None,
         origin=origin,
         scale=scale,
         timings=clock.seconds,

@@ -35,16 +35,18 @@ def verified(found: Detection, points: Stream) -> Detection:
     if not motions:
         return found
     sums = [_Tally() for _ in motions]
-    bound, done = MOST * found.tolerance * found.surface.diagonal, 0
+    bound, own, done = MOST * found.tolerance * found.surface.diagonal, 0, 0
     with clock("verify"):
-        for chunk in points:
+        floor = found.floor
+        for every in points:
+            chunk = every if floor is None else every[~floor.covers(every)]
             local = (chunk - found.origin) / found.scale
             for tally, motion in zip(sums, motions, strict=True):
                 away = disc_distances(found.surface.cloud, motion.apply(local), bound=bound)
                 tally.add(away / found.surface.diagonal, bound / found.surface.diagonal)
-            done += len(chunk)
+            own, done = own + len(chunk), done + len(every)
             passed(done, points.count)
-    return replace(found, verified=_worst(sums, found.tolerance, done), timings=found.timings | clock.seconds)
+    return replace(found, verified=_worst(sums, found.tolerance, own), timings=found.timings | clock.seconds)
 
 
 class _Tally:

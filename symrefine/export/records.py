@@ -48,7 +48,14 @@ def detection_record(
         **_answer(d),
         "at_least": bool(d.at_least),
         "strewn": bool(d.strewn),
-        "outliers": {"count": len(d.outliers), "clumps": int(d.clumps), "share": number(d.outlier_share)},
+        "outliers": {
+            "count": len(d.outliers),
+            "clumps": int(d.clumps),
+            "share": number(d.outlier_share),
+            "floor": None
+            if d.floor is None
+            else {"normal": numbers(d.floor.normal, 1.0), "offset": number(d.floor.offset, scale)},
+        },
         "exact": None
         if d.exact is None
         else {"miss": number(d.exact.miss), "faces": d.exact.faces, "point_group": d.exact.point_group},

@@ -56,7 +56,8 @@ def detect(
         normals: [N, n] normals, any sign; estimated where absent.
         labels: [N] whole numbers, [F] for a mesh: classes (elements, colours, materials) that every symmetry must keep.
         viewpoint: [3] or [N, 3] place of the camera that saw the points, or each of them.
-        outliers: "auto": points of a cloud that belong to no surface are set apart; "none": all points count.
+        outliers: "auto": points of a cloud that belong to no surface are set apart; "floor": so is the plane that the
+            object stands on; "none": all points count.
         tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal, or as a
             length: "0.5mm", "0.1A", "0.5u" in units of the object.
         units: what a length of 1 in the object is, such as "mm", for a tolerance with a unit; what its format says if

@@ -51,6 +51,8 @@ DOUBLETS = {
     "line": "lie on one line: a mirror line at most",
     "centre": "all vanish: turns, with or without mirror lines",
 }
+# Where somebody said that there is a floor.
+NO_FLOOR = "no floor was found: no plane has all else to one side of it and reaches beyond that"
 _KINDS = {"plane": "mirror plane", "axis": "rotation", "improper": "rotoreflection", "inversion": "inversion"}
 
 
@@ -158,7 +160,8 @@ def scanned(detection: Detection) -> str:
     d = detection
     of = None if d.sample is None else (d.sample.points, d.sample.of)
     exact = "" if d.exact is None else exactly(d.exact.miss, d.exact.faces, d.exact.point_group)
-    told = exact, taken_out(len(d.outliers), d.outlier_share, d.clumps), sampled(of), evened(d.even_sample)
+    apart = taken_out(len(d.outliers), d.outlier_share, d.clumps, floor=d.floor is not None)
+    told = exact, apart, NO_FLOOR if d.no_floor else "", sampled(of), evened(d.even_sample)
     unseen = "Parts of the surface were not seen: there may be more." if d.is_partial else ""
     unseen = "Strays that are left near the surface may hide more." if d.strewn else unseen
     return " ".join(said for said in (*(f"{t[:1].upper()}{t[1:]}." for t in told if t), unseen) if said)
@@ -171,9 +174,10 @@ def verdicts_told(detection: Detection) -> str:
     return "Green: inferred, where nobody looked. Red: seen, with an image where the scan says there is nothing."
 
 
-def taken_out(outliers: int, share: float, clumps: int) -> str:
+def taken_out(outliers: int, share: float, clumps: int, *, floor: bool) -> str:
     """How many points were taken as no part of the object, if any: `1,214 points (6 %) taken as outliers`."""
-    among = f", {count(clumps, 'clump')} among them" if clumps else ""
+    parts = [part for part in ("the floor" if floor else "", count(clumps, "clump") if clumps else "") if part]
+    among = f", {' and '.join(parts)} among them" if parts else ""
     return f"{outliers:,} points ({percent(share)}) taken as outliers{among}" if outliers else ""
 
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, Isometry, Mask, ReadOnly, rows
+from symrefine.surface.floor import Floor
 from symrefine.surface.neighbourhoods import NEIGHBOURS, in_cells
 from symrefine.surface.tree import Tree
 
@@ -129,6 +130,12 @@ class Drift(ReadOnly):
 
         each = zip(motions, unseen, strict=True)
         return np.stack([near(points, here) | near(m.apply(points), there) for m, (here, there) in each])
+
+    def cut(self, motions: Sequence[Isometry], sources: int, floor: Floor) -> Mask:
+        """Which of these windows reach a floor that was set apart, here or there [K, .], and all that was in it."""
+        points, reach = self.sources[self._some(sources)], REACH * self.windows.width
+        here = floor.above(points) < reach
+        return np.stack([here | (floor.above(m.apply(points)) < reach) for m in motions])
 
     def _some(self, sources: int) -> slice:
         return slice(None, None, max(1, len(self.sources) // sources))

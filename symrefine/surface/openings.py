@@ -15,6 +15,7 @@ from symrefine.geometry import Array, Isometry, Mask, rows, unit
 from symrefine.shape import Index
 from symrefine.surface.cameras import Camera
 from symrefine.surface.clumps import Clump
+from symrefine.surface.floor import Floor
 from symrefine.surface.misses import SHARES
 from symrefine.surface.neighbourhoods import (
     WIDEST,
@@ -59,7 +60,7 @@ TELLING = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Openings:
-    """The open borders of a surface, the cameras that saw it, and the clumps that hide parts of it.
+    """The open borders of a surface, the cameras that saw it, and what hides parts of it.
 
     Attributes:
         line: [M] which local planes make one up.
@@ -67,6 +68,7 @@ class Openings:
         evident: whether they are too long to be a whim of the sample.
         cameras: what saw it, in the frame of the surface; none if nothing is known of them.
         clumps: what hides parts of it, in the frame of the surface.
+        floor: what it stands on, likewise, if that was set apart: it hides the bottom, and bars all below.
         links: by stride, pairs [2, E] of every so many-th local planes that are neighbours, both ways.
     """
 
@@ -75,12 +77,24 @@ class Openings:
     evident: bool
     cameras: tuple[Camera, ...] = ()
     clumps: tuple[Clump, ...] = ()
+    floor: Floor | None = None
     links: dict[int, Index] = field(default_factory=dict)
+
+    def ends(self, cloud: LocalPlanes) -> Mask:
+        """Which local planes [M] make up a border where the surface may end: not where the floor begins."""
+        if self.floor is None:
+            return self.line
+        return self.line & (self.floor.above(cloud.points) > 2.0 * float(np.median(cloud.reach)))
+
+    @property
+    def covering(self) -> tuple[Clump | Floor, ...]:
+        """What hides parts of it."""
+        return self.clumps if self.floor is None else (*self.clumps, self.floor)
 
     @property
     def closed(self) -> "Openings | None":
         """What is left of it where the surface counts as closed: what hides it; None if nothing does."""
-        if not self.clumps:
+        if not self.covering:
             return None
         if not (self.cameras or self.line.any()):
             return self
@@ -128,9 +142,12 @@ class Openings:
         """
         there_cloud, there_openings = (cloud, self) if met is None else met
         covered = np.zeros_like(away)
-        if self.clumps or there_openings.clumps:
+        if self.covering or there_openings.covering:
             still = np.broadcast_to(cloud.points[::stride], moved.shape)
-            covered[away] = _covered(self.clumps, still[away]) | _covered(there_openings.clumps, moved[away])
+            covered[away] = _covered(self.covering, still[away]) | _covered(there_openings.covering, moved[away])
+        floor = there_openings.floor
+        barred = np.zeros_like(away) if floor is None else floor.bars(moved, margin)
+        covered &= ~barred
         away = away & ~covered
         one, other = self.linked(cloud, stride)
         if there_openings.cameras:
@@ -143,7 +160,7 @@ class Openings:
             beyond[which, other[pair]] = True
             if turned is not None:
                 beyond |= ~there_cloud.faced(moved, turned)
-            return covered | found | (beyond & ~away)
+            return covered | ((found | (beyond & ~away)) & ~barred)
         leave, enters = away.take(one, axis=1), ~away.take(other, axis=1)
         which, pair = np.nonzero(leave & enters)
         if not which.size:
@@ -174,7 +191,7 @@ class Openings:
         found = away & free[patch].reshape(away.shape)
         # What lies next to such a patch already reaches beyond the border.
         found.reshape(-1)[rim_of[free[own] & at_border]] = True
-        return found | covered
+        return covered | (found & ~barred)
 
     def _kept(self, cloud: LocalPlanes, at: Index, group: Sequence[Isometry]) -> Array:
         """Share of the operations of a group that carry the border next to local planes [N] onto a border.
@@ -210,6 +227,7 @@ def openings(
     near: Index | None = None,
     *,
     clumps: tuple[Clump, ...] = (),
+    floor: Floor | None = None,
     strays: bool = False,
     least: float = OPEN,
 ) -> Openings | None:
@@ -222,26 +240,28 @@ def openings(
         cameras: what saw it, where that is known.
         near: [M, NEIGHBOURS] of the points near each local plane, if they are known already.
         clumps: what hides parts of it.
+        floor: what it stands on, if that was set apart.
         strays: whether there were any: then what is lonely may be one more, which has all that is near to one side,
             and no end of the surface.
         least: share of the local planes that have to lie far aside, for each RMS radius that neighbourhoods are wide.
     """
     none = np.zeros(len(cloud.points), dtype=bool)
     if cameras:
-        return Openings(line=none, border=none, evident=True, cameras=cameras, clumps=clumps)
+        return Openings(line=none, border=none, evident=True, cameras=cameras, clumps=clumps, floor=floor)
     aside, width = _aside(cloud, points, tree, near)
     far = _lines(cloud, (aside > FAR_ASIDE) & ~(cloud.lonely & strays))
     far[far] = ~_folded(cloud.points[far], points, tree, None if near is None else near[far])
     if width > WIDEST or far.mean() < least * width or not far.any():
-        return Openings(line=none, border=none, evident=False, clumps=clumps) if clumps else None
+        closed = Openings(line=none, border=none, evident=False, clumps=clumps, floor=floor)
+        return closed if closed.covering else None
     line = (aside > ASIDE) & _beside(cloud, far)
     evident = bool(far.mean() > EVIDENT * width)
-    return Openings(line=line, border=_beside(cloud, line), evident=evident, clumps=clumps)
+    return Openings(line=line, border=_beside(cloud, line), evident=evident, clumps=clumps, floor=floor)
 
 
-def _covered(clumps: tuple[Clump, ...], points: Array) -> Mask:
-    """Which of points [N, 3] lie where a clump is."""
-    return np.any([np.zeros(len(points), dtype=bool), *(clump.covers(points) for clump in clumps)], axis=0)
+def _covered(covering: tuple[Clump | Floor, ...], points: Array) -> Mask:
+    """Which of points [N, 3] lie where something hides them."""
+    return np.any([np.zeros(len(points), dtype=bool), *(thing.covers(points) for thing in covering)], axis=0)
 
 
 def _beside(cloud: LocalPlanes, some: Mask) -> Mask:

@@ -220,7 +220,10 @@ class Surface:
         """How far windows of each of K images lie from those of the cloud [K, S], fractions of the diagonal."""
         if self.drift is None:
             return np.empty((len(motions), 0))
-        return self.drift.misses(motions, _windows_each(motions)) / self.diagonal
+        drifts = self.drift.misses(motions, _windows_each(motions)) / self.diagonal
+        if self.openings is None or self.openings.floor is None:
+            return drifts
+        return np.where(self.drift.cut(motions, _windows_each(motions), self.openings.floor), np.nan, drifts)
 
     def drifts_seen(self, drifts: Array, misses: Array, motions: Sequence[Isometry], *, sources: int = 10**9) -> Array:
         """The same, NaN where a window reaches what operations carry to where nobody looked, where they miss by NaN.
