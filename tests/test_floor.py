@@ -18,6 +18,7 @@ from symrefine.detection.verification import verified
 from symrefine.errors import InputError
 from symrefine.geometry import Isometry, householder
 from symrefine.lengths import object_diagonal
+from symrefine.picture.upright import upright
 from symrefine.picture.words import NO_FLOOR, scanned
 from symrefine.shape import Shape
 from symrefine.stream import Stream
@@ -101,6 +102,13 @@ def test_a_thing_that_stands_clear_of_the_floor_by_the_noise_may_have_more():
     lifted = made.points + np.where(made.strays == 0, 0.01 * mesh.diagonal, 0.0)[:, None] * [0.0, 0.0, 1.0]
     found = detect(lifted, outliers="floor")
     assert found.at_least or found.point_group == "Dinfh"
+
+
+@pytest.mark.parametrize("name", ["stool3", "clutter", "chair", "bossed_cube"])
+def test_a_picture_shows_a_thing_as_it_stands(name):
+    points, _, pose = standing(specimen("shape", name)[0], 14)
+    found = detect(points, outliers="floor")
+    assert upright(found, points - found.center)[2] @ pose.turn[:, 2] > 0.999
 
 
 def test_what_lies_below_a_floor_was_seen_not_to_be_there():

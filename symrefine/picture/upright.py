@@ -17,12 +17,15 @@ UPRIGHT_RAD, SIDES = math.radians(10.0), 400
 def upright(detection: Detection, points: Array) -> Array:
     """Frame with the vertical where a person would put it, as far as the symmetry lets it be.
 
-    The main axis of an axial group stands. Of other objects the third axis of the input does, where the symmetry found
+    What stands on a floor that was found stands so. The main axis of an axial group stands. Of other objects the third axis of the input does, where the symmetry found
     agrees that it is the vertical: it lies in the one mirror plane, or along a two-fold axis, within ten degrees. If
     not, the object was turned, and its largest flat side lies, again within the symmetry. Nothing found says nothing.
     """
     name, group = detection.point_group, detection.group
     x, y, z = group.frame
+    if detection.floor is not None:
+        up = detection.floor.normal
+        return _facing(up, group.frame[int(np.abs(group.frame @ up).argmin())])
     if name in ("C1", "Ci", "Kh", "undetermined"):
         return np.eye(3)
     if name == "Cs":
@@ -74,7 +77,11 @@ def _sides(points: Array) -> tuple[Array, Array]:
 def _standing(up: Array, side: Array) -> Array:
     """Right-handed rows (side, front, up), the vertical pointing to the upper side of the input."""
     largest = up[2] if abs(up[2]) > 0.05 else up[int(np.argmax(np.abs(up)))]
-    up = up * sign(float(largest))
+    return _facing(up * sign(float(largest)), side)
+
+
+def _facing(up: Array, side: Array) -> Array:
+    """Right-handed rows (side, front, up), the side as near to a direction as the vertical lets it be."""
     side = unit(side - (side @ up) * up)
     return np.stack([side, np.cross(up, side), up])
 
