@@ -17,9 +17,10 @@ UPRIGHT_RAD, SIDES = math.radians(10.0), 400
 def upright(detection: Detection, points: Array) -> Array:
     """Frame with the vertical where a person would put it, as far as the symmetry lets it be.
 
-    What stands on a floor that was found stands so. The main axis of an axial group stands. Of other objects the third axis of the input does, where the symmetry found
-    agrees that it is the vertical: it lies in the one mirror plane, or along a two-fold axis, within ten degrees. If
-    not, the object was turned, and its largest flat side lies, again within the symmetry. Nothing found says nothing.
+    What stands on a floor that was found stands so. The main axis of an axial group stands. Of other objects the third
+    axis of the input does, where the symmetry found agrees that it is the vertical: it lies in the one mirror plane, or
+    along a two-fold axis, within ten degrees. If not, the object was turned, and its largest flat side lies, again
+    within the symmetry. Nothing found says nothing.
     """
     name, group = detection.point_group, detection.group
     x, y, z = group.frame
