@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from symrefine.decide.doubts import FLAT
-from symrefine.detection.measure import heavy, is_few
+from symrefine.detection.measure import floor_under, heavy, is_few
 from symrefine.detection.sketch import is_large, sampled
 from symrefine.errors import DegenerateShapeError
 from symrefine.geometry import Array, ReadOnly
@@ -16,7 +16,6 @@ from symrefine.moments.moments import shape_moments
 from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import count_parts
-from symrefine.surface.floor import floor_of
 from symrefine.surface.neighbourhoods import connected_parts, fills_volume
 from symrefine.surface.sampling import sampling
 from symrefine.surface.tree import Tree
@@ -178,17 +177,23 @@ def _cloud(shape: Shape) -> Cloud:
     """How a cloud was sampled; of very many points a sample tells, in numbers of all."""
     some = sampled(shape) if is_large(shape) else shape
     points, each = heavy(some).points, len(shape.points) / len(some.points)
-    found, floor = sampling(points, np.random.default_rng(0), outliers=True), floor_of(points)
+    found = sampling(points, np.random.default_rng(0), outliers=True)
     kept = points[found.kept]
     kept = (kept - kept.mean(axis=0)) / kept.std()
     return Cloud(
         strays=round(each * len(found.strays)),
         clumps=tuple(round(each * len(clump)) for clump in found.clumps),
-        floor=0 if floor is None else round(each * np.count_nonzero(floor.covers(points))),
+        floor=points_of_floor(shape),
         parts=count_parts(kept, np.random.default_rng(0)),
         even=found.shares is None,
         volume=found.solid and fills_volume(kept, Tree(kept), np.random.default_rng(0)),
     )
+
+
+def points_of_floor(shape: Shape) -> int:
+    """How many points of a cloud lie in a plane that all others stand on, as on a floor; 0 if there is none."""
+    floor = floor_under(sampled(shape) if is_large(shape) else shape, "floor")
+    return 0 if floor is None else int(np.count_nonzero(floor.covers(shape.points)))
 
 
 def doubts(found: Survey) -> Iterator[str]:

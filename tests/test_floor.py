@@ -215,6 +215,10 @@ def test_the_command_tells_the_floor(tmp_path, capsys):
     assert (height > 0).mean() > 0.6
     assert invoke(["detect", str(tmp_path / "off.xyz"), "--outliers", "floor"]) == 0
     assert NO_FLOOR in capsys.readouterr().out
+    assert invoke(["detect", str(tmp_path / "on.xyz"), "--json", "-"]) == 0
+    assert "if it is a floor, try --outliers floor" in capsys.readouterr().err
+    assert invoke(["detect", str(tmp_path / "off.xyz")]) == 0
+    assert "floor" not in capsys.readouterr().err
     assert invoke(["info", str(tmp_path / "on.xyz")]) == 0
     assert "say --outliers floor" in capsys.readouterr().out
     assert invoke(["info", str(tmp_path / "off.xyz"), "--json", "-"]) == 0

@@ -173,6 +173,22 @@ def _notes(args: argparse.Namespace, shape: "Shape", detection: Any, record: dic
     is_grey = shape.dim == 2 and "threshold" in record["options"] and args.threshold is None
     if is_grey and (record["undetermined"] or record["point_group"] == "C1"):
         yield f"{shape.source}: if object and background are of different grey, try --threshold otsu"
+    if shape.dim == 3 and record["options"].get("outliers", "auto") == "auto":
+        yield from _floor(shape, detection)
+
+
+def _floor(shape: "Shape", detection: Any) -> Iterator[str]:
+    """That a scan in which not all was found may be one of a floor, too."""
+    if detection.surface.cloud.body != "surface" or shape.faces is not None:
+        return
+    if detection.at_least or detection.undetermined or detection.point_group == "C1":
+        from symrefine.survey import points_of_floor
+
+        if points := points_of_floor(shape):
+            yield (
+                f"{shape.source}: {points:,} points lie in a plane that all others stand on; if it is a floor, try "
+                "--outliers floor"
+            )
 
 
 def detected(
