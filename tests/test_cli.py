@@ -117,7 +117,7 @@ def test_the_report_holds_what_was_agreed(record: dict[str, Any], data: Path) ->
     assert set(record["planes"][0]) == {"normal", "offset", "residual", "confidence", "sigma", "coverage"}
     axis = {"direction", "point", "order", "improper", "residual", "confidence", "sigma", "coverage"}
     assert set(record["axes"][0]) == axis
-    assert record["outliers"] == {"count": 0, "clumps": 0, "share": 0.0}
+    assert record["outliers"] == {"count": 0, "clumps": 0, "share": 0.0, "floor": None}
     assert record["at_least"] is False
     assert set(record["ntuples"]) == {"kind", "singular_values", "significance"}
     assert {step["point_group"] for step in record["staircase"]} == {"D2h"}
