@@ -8,10 +8,10 @@ import pytest
 from experiments.objects import damage
 from experiments.objects.built_symmetry import specimen
 from experiments.objects.poses import Pose
-from experiments.objects.shapes import box, join, mug, sample, stool, table
+from experiments.objects.shapes import box, join, mug, revolve, sample, stool, table
 from experiments.studies import damaged
 from symrefine.cli import invoke
-from symrefine.detection.measure import measure
+from symrefine.detection.measure import floor_under, measure
 from symrefine.detection.sketch import MANY, sketched
 from symrefine.detection.story import detect
 from symrefine.detection.verification import verified
@@ -49,6 +49,38 @@ def test_a_floor_is_found_wherever_it_lies(make, seed):
     off = np.abs((points - middle) @ np.linalg.svd(others - middle, full_matrices=False)[2][2])
     assert (off[on] <= 2.0 * off[stray].max()).all()
     assert ((points[~on] @ found.normal - found.offset) > 0).mean() > 0.99, "the normal points to the object"
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.003, 0.006, 0.01])
+@pytest.mark.parametrize("strays", [0.0, 0.02])
+def test_neither_noise_nor_strays_hide_a_floor(noise, strays):
+    rng = np.random.default_rng(15)
+    low, high = np.array([-1.5, -1.5, 0.0]), np.array([1.5, 1.5, 1.5])
+    plane = rng.uniform(low, high, (8000, 3)) * [1.0, 1.0, 0.0]
+    cloud = np.concatenate([sample(stool(3), 8000, 0.0, rng), plane])
+    cloud = cloud + noise * object_diagonal(stool(3)) * rng.normal(size=cloud.shape)
+    cloud = np.concatenate([cloud, rng.uniform(low, high, (round(strays * len(cloud)), 3))])
+    found = floor_under(Shape(Pose.random(rng).of(cloud)), "floor")
+    assert 7900 < len(found.points) < 11000
+
+
+def test_a_wall_that_meets_the_floor_has_no_end_there():
+    """A tower on a plinth, off its middle: where the floor cut the plinth was an open rim, beyond which it could be."""
+    vertices, faces = revolve([(0, 0.1), (0.5, 0.1), (0.5, 1.5), (0, 1.5)], 64)
+    plinth = revolve([(0, 0), (1, 0), (1, 0.1), (0, 0.1)], 64)
+    mesh = join([plinth, (vertices + [0.2, 0.0, 0.0], faces)])
+    for seed in range(2):
+        found = detect(standing(mesh, seed, size=2.0)[0], outliers="floor")
+        assert found.point_group == "Cs"
+        assert found.at_least, "nobody saw the bottom"
+
+
+def test_a_slanted_cut_through_a_floor_is_none():
+    """Of a bowed floor no plane holds more than a cut does, which is filled evenly."""
+    rng = np.random.default_rng(16)
+    bowed = rng.uniform(-1.5, 1.5, (8000, 3))
+    bowed[:, 2] = 0.15 * (bowed[:, :2] ** 2).sum(axis=1) - 0.3
+    assert floor_of(np.concatenate([sample(stool(3), 8000, 0.003, rng), bowed])) is None
 
 
 @pytest.mark.parametrize("make", [lambda: stool(3), mug, table, lambda: BRICK])
@@ -117,7 +149,7 @@ def test_what_lies_below_a_floor_was_seen_not_to_be_there():
     wall = np.column_stack([rng.uniform(-1, 1, 4000), np.zeros(4000), rng.uniform(0, 1, 4000)])
     cloud = make_skin(wall, rng).local_planes(np.arange(1000))
     none = np.zeros(1000, dtype=bool)
-    under = Floor(normal=np.array([0.0, 0.0, 1.0]), offset=0.0, thick=0.01)
+    under = Floor(normal=np.array([0.0, 0.0, 1.0]), offset=0.0, thick=0.01, points=np.empty((0, 3)))
     mirror = Isometry(matrix=householder(np.array([0.0, 0.0, 1.0])), shift=np.array([0.0, 0.0, 0.4]))
     moved = mirror.apply(cloud.points)[None]
     away = moved[..., 2] < -0.05

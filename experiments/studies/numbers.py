@@ -60,6 +60,7 @@ KIND_OF = {
         "propose.consensus": "COMMON FACING SAME",
         "surface.cameras": "WITHIN",
         "surface.clumps": "CLUMP COUNTERPART FILLED RIM SIZES FRACTIONS",
+        "surface.floor": "THICK",
         "surface.misses": "LIMITS SHARES SPECK SPECK_LIMIT ATOM_LIMITS SURE",
         "surface.neighbourhoods": "WIDEST FLAT VOLUME WIDEST_BLOB",
         "surface.openings": "ASIDE OPEN FAR_ASIDE BENDS WIRE EVIDENT MOST PARTED",

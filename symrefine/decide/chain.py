@@ -76,6 +76,7 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     ends, evident = ends_there(surface, whole.largest), surface.openings.evident
     if not whole.largest.group.is_polar and (ends or not evident):
         return replace(whole, at_least=evident)  # no single hole leaves such a group, and there is hardly one
+    evident = evident or surface.openings.floor is not None  # nobody saw the bottom of what stands on one
     part = _of_part(surface, whole)
     more = _size(part.largest.placed) > _size(whole.largest.placed)
     # What may not be open at all is missing a part only where that explains more, and no more than so short a border
@@ -83,9 +84,7 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     hidden = max((e.coverage.unseen for e in part.largest.elements), default=0.0)
     # A group that a single hole leaves may keep its border because it keeps the border of almost any.
     ends = ends and not (more and often_kept(surface, whole.largest, hidden))
-    # Of what stands on a floor nobody saw the bottom.
-    open_ = evident or surface.openings.floor is not None
-    missing = (open_ or (more and hidden <= ENCLOSED)) and not ends
+    missing = (evident or (more and hidden <= ENCLOSED)) and not ends
     missing = missing or places(whole.largest, part.largest) >= PLACES
     if missing and not (more and ends_too(surface, part.largest, ALIKE * limit)):
         return replace(part, at_least=True)

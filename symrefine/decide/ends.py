@@ -20,12 +20,9 @@ HOLES, RIMS = 50, 1000
 
 def ends_there(surface: Surface, found: Hypothesis) -> bool:
     """Whether a group carries the open borders onto themselves, as what a sensor leaves out has no symmetry."""
-    if surface.openings is None or surface.viewed:
+    if surface.openings is None or surface.viewed or not surface.openings.line.any():
         return False
-    cloud = surface.cloud
-    line = surface.openings.ends(cloud)
-    if not line.any():
-        return False
+    line, cloud = surface.openings.line, surface.cloud
     near = [cloud.nearest(m.apply(cloud.points[line]), cloud.classes(np.flatnonzero(line)))[1] for m in _motions(found)]
     return bool(near) and float(np.median([surface.openings.border[n].mean() for n in near])) > KEPT
 

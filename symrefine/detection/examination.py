@@ -154,6 +154,8 @@ def examined(
 
 def _without_floor(shape: Shape | Sketch, outliers: Outliers) -> tuple[Shape | Sketch, Floor | None, Mask | None]:
     """A shape without what it stands on, where that was asked for and found, that, and which of its points are left."""
+    if isinstance(shape, Sketch) and shape.whole is not None and outliers == "floor":
+        shape = shape.whole
     some = shape.sample if isinstance(shape, Sketch) else shape
     floor = floor_under(sampled(some) if is_large(some) else some, outliers)
     if floor is None:
@@ -161,7 +163,7 @@ def _without_floor(shape: Shape | Sketch, outliers: Outliers) -> tuple[Shape | S
     left = ~floor.covers(some.points)
     rest = some.chosen(np.flatnonzero(left))
     if isinstance(shape, Sketch):
-        return replace(shape, sample=rest, picked=shape.picked[left], moments=None, whole=None), floor, left
+        return replace(shape, sample=rest, picked=shape.picked[left], moments=None), floor, left
     return rest, floor, left
 
 

@@ -173,6 +173,8 @@ def _report(
     inversion = next((e for e in chosen.elements if e.operations.kind == "inversion"), None)
     more = not reason and chosen.group.name != "Kh"  # of which there is none
     strewn = found.has_strays_left and not any(e.coverage.unseen for e in chosen.elements)
+    # Nobody saw the bottom of what stands on a floor.
+    hidden = measured.floor is not None and chosen.group.is_polar
     return Detection(
         point_group="undetermined" if reason else chosen.group.name,
         confidence=0.0 if reason else decision.probabilities[index],
@@ -228,7 +230,7 @@ def _report(
         ),
         outliers=found.outliers,
         outlier_share=found.outlier_share,
-        at_least=(found.pool.at_least or strewn) and more,
+        at_least=(found.pool.at_least or strewn or hidden) and more,
         strewn=strewn and more,
         floor=measured.floor,
         no_floor=found.no_floor,

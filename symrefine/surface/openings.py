@@ -80,12 +80,6 @@ class Openings:
     floor: Floor | None = None
     links: dict[int, Index] = field(default_factory=dict)
 
-    def ends(self, cloud: LocalPlanes) -> Mask:
-        """Which local planes [M] make up a border where the surface may end: not where the floor begins."""
-        if self.floor is None:
-            return self.line
-        return self.line & (self.floor.above(cloud.points) > 2.0 * float(np.median(cloud.reach)))
-
     @property
     def covering(self) -> tuple[Clump | Floor, ...]:
         """What hides parts of it."""
@@ -249,6 +243,8 @@ def openings(
     if cameras:
         return Openings(line=none, border=none, evident=True, cameras=cameras, clumps=clumps, floor=floor)
     aside, width = _aside(cloud, points, tree, near)
+    if floor is not None:
+        aside[floor.meets(cloud.points, 2.0 * float(np.median(cloud.reach)))] = 0.0
     far = _lines(cloud, (aside > FAR_ASIDE) & ~(cloud.lonely & strays))
     far[far] = ~_folded(cloud.points[far], points, tree, None if near is None else near[far])
     if width > WIDEST or far.mean() < least * width or not far.any():
