@@ -16,8 +16,10 @@ from symrefine.detection.sketch import MANY, sketched
 from symrefine.detection.story import detect
 from symrefine.detection.verification import verified
 from symrefine.errors import InputError
+from symrefine.export.bop import diameter
 from symrefine.geometry import Isometry, householder
 from symrefine.lengths import object_diagonal
+from symrefine.load import load
 from symrefine.picture.upright import upright
 from symrefine.picture.words import NO_FLOOR, scanned
 from symrefine.shape import Shape
@@ -232,6 +234,20 @@ def test_weights_that_make_up_for_density_decide_whatever_the_largest_is():
     assert found.is_thinned
     assert found.shape.weights.sum() / found.shape.weights.max() < 250
     assert found.flaw == ""
+
+
+def test_what_is_written_of_an_object_is_without_its_floor(tmp_path, capsys):
+    points, stray, _ = standing(stool(3), 17, size=2.0)
+    np.savetxt(tmp_path / "on.xyz", points)
+    size = diameter(points[~stray])
+    file = ["detect", str(tmp_path / "on.xyz"), "--outliers", "floor", "--bop", str(tmp_path / "models_info.json")]
+    assert invoke([*file, "--bop-scale", "1"]) == 0
+    assert json.loads((tmp_path / "models_info.json").read_text())["1"]["diameter"] == pytest.approx(size, rel=0.03)
+    out = str(tmp_path / "own.ply")
+    export = ["export", str(tmp_path / "on.xyz"), "--outliers", "floor", "--to", "canonical", "--out", out]
+    assert invoke(export) == 0
+    assert diameter(load(out).points) == pytest.approx(size, rel=0.03)
+    capsys.readouterr()
 
 
 def test_the_command_tells_the_floor(tmp_path, capsys):

@@ -168,7 +168,8 @@ def _notes(args: argparse.Namespace, shape: "Shape", detection: Any, record: dic
     if args.bop is not None:
         from symrefine.export.bop import bop_limits, diameter, metres_doubt
 
-        doubt = "" if args.bop_scale else metres_doubt(shape.source, diameter(shape.points), "--bop-scale")
+        size = diameter(detection.own(shape).points)
+        doubt = "" if args.bop_scale else metres_doubt(shape.source, size, "--bop-scale")
         yield from filter(None, (bop_limits(detection), doubt))
     is_grey = shape.dim == 2 and "threshold" in record["options"] and args.threshold is None
     if is_grey and (record["undetermined"] or record["point_group"] == "C1"):
@@ -234,7 +235,7 @@ def _writers(args: argparse.Namespace, shape: "Shape", detection: Any) -> dict[s
     if args.bop is not None:
         from symrefine.export.bop import bop_entry, bop_text
 
-        entry = bop_entry(detection, shape, scale=args.bop_scale or 1.0)
+        entry = bop_entry(detection, detection.own(shape), scale=args.bop_scale or 1.0)
         number = 1 if args.bop_id is None else args.bop_id
         writers[args.bop] = text_writer(bop_text(Path(args.bop), {number: entry}))
     return writers | shown_writers(args, detection)

@@ -8,10 +8,19 @@ from typing import TYPE_CHECKING, Any
 from symrefine.cli.inputs import loaded
 from symrefine.cli.outputs import check_outputs, note, tell
 from symrefine.cli.signs import waiting
-from symrefine.cli.values import add_detection_options, add_frame_option, add_path, count, millimetres, natural
+from symrefine.cli.values import (
+    add_detection_options,
+    add_frame_option,
+    add_outliers,
+    add_path,
+    count,
+    millimetres,
+    natural,
+)
 from symrefine.errors import InputError
 
 if TYPE_CHECKING:
+    from symrefine.detection.measure import Outliers
     from symrefine.front.space import Detection
     from symrefine.shape import Shape
 
@@ -58,6 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the symmetries of the shape with its texture, of which the images are read as `detect --texture` does",
     )
     add_frame_option(parser)
+    add_outliers(parser)
     add_detection_options(parser)
 
 
@@ -68,6 +78,7 @@ def run(args: argparse.Namespace) -> int:
     _check(args)
     with waiting("detecting"):
         shape, detection = detected(args)
+        shape = detection.own(shape)
         package = package_of(args.to, Path(args.out), detection, shape, **_options(args))
         write_package(package, args.to, Path(args.out))
     tell(None, {}, [f"{args.path}: {detection.point_group}"], map(str, package.files))
@@ -93,7 +104,8 @@ def detected(args: argparse.Namespace) -> tuple["Shape", "Detection"]:
 
     texture = bool(getattr(args, "texture", None))
     shape = loaded(args.path, args.format, partial(load, measure=args.measure, frame=args.frame, texture=texture))
-    found = detect_in_space(shape, tolerance=args.tolerance, units=args.units, seed=args.seed)
+    outliers: Outliers = getattr(args, "outliers", "auto")
+    found = detect_in_space(shape, outliers=outliers, tolerance=args.tolerance, units=args.units, seed=args.seed)
     if texture:
         assert isinstance(found.textured, Detection)
         found = found.textured

@@ -44,6 +44,12 @@ def add_path(parser: argparse.ArgumentParser, what: str, *, several: bool = Fals
 
 def add_scan_options(parser: argparse.ArgumentParser) -> None:
     """The options that say how points were taken."""
+    add_outliers(parser)
+    add_viewpoint(parser)
+
+
+def add_outliers(parser: argparse.ArgumentParser) -> None:
+    """The option that says which points are no part of the object."""
     parser.add_argument(
         "--outliers",
         choices=("auto", "floor", "none"),
@@ -51,7 +57,6 @@ def add_scan_options(parser: argparse.ArgumentParser) -> None:
         help="auto: points of a cloud that belong to no surface, single or in clumps, are set apart and told; floor: "
         "so is the plane that the object stands on; none: all points count (default: %(default)s)",
     )
-    add_viewpoint(parser)
 
 
 def add_viewpoint(parser: argparse.ArgumentParser) -> None:

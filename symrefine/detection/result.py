@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from symrefine.decide.posterior import Alternative
 from symrefine.detection.examination import Examined
 from symrefine.detection.sketch import Sample
@@ -10,7 +12,7 @@ from symrefine.geometry import Array, Axis, Plane, ReadOnly
 from symrefine.groups import PointGroup
 from symrefine.ntuples.contract import NTuples
 from symrefine.ntuples.rank import FixedSubspace
-from symrefine.shape import Index
+from symrefine.shape import Index, Shape
 from symrefine.surface.floor import Floor
 from symrefine.surface.misses import Deviation
 from symrefine.surface.surface import Coverage, Surface
@@ -205,6 +207,10 @@ class Detection(ReadOnly):
     def is_partial(self) -> bool:
         """Whether there may be more for parts of the surface that were not seen."""
         return self.at_least and not self.strewn
+
+    def own(self, shape: Shape) -> Shape:
+        """The shape it was found in without the outliers, if a floor is among them: what stands on it."""
+        return shape if self.floor is None else shape.chosen(np.delete(np.arange(len(shape.points)), self.outliers))
 
     def choices(self, tolerance: float | None = None) -> tuple[Alternative, ...]:
         """Every group that a person may choose instead, C1 first, each inside the next, as likely as at a tolerance.

@@ -154,7 +154,12 @@ def _verified(found: Any, given: "Shape | Stream") -> Any:
 
 
 def detect_in_space(
-    shape: Any, *, tolerance: float | str = TOLERANCE, units: str | None = None, seed: int = 0
+    shape: Any,
+    *,
+    outliers: "Outliers" = "auto",
+    tolerance: float | str = TOLERANCE,
+    units: str | None = None,
+    seed: int = 0,
 ) -> "Detection":
     """What `detect` says of an object in space.
 
@@ -166,7 +171,7 @@ def detect_in_space(
     shape = shape_of(shape)
     if shape.dim != 3:
         raise InputError(f"{shape.source}: points have {shape.dim} coordinates; this is for objects in space")
-    found = detect(shape, tolerance=tolerance, units=units, seed=seed)
+    found = detect(shape, outliers=outliers, tolerance=tolerance, units=units, seed=seed)
     assert isinstance(found, Detection)
     return found
 
