@@ -267,6 +267,8 @@ def test_the_command_tells_the_floor(tmp_path, capsys):
     assert "if it is a floor, try --outliers floor" in capsys.readouterr().err
     assert invoke(["detect", str(tmp_path / "off.xyz")]) == 0
     assert "floor" not in capsys.readouterr().err
+    assert invoke(["detect", str(tmp_path / "on.xyz"), str(tmp_path / "off.xyz"), "--outliers", "floor"]) == 0
+    assert f"no floor was found in 1 of 2: {tmp_path / 'off.xyz'}" in capsys.readouterr().err
     assert invoke(["info", str(tmp_path / "on.xyz")]) == 0
     assert "say --outliers floor" in capsys.readouterr().out
     assert invoke(["info", str(tmp_path / "off.xyz"), "--json", "-"]) == 0

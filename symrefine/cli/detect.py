@@ -119,6 +119,8 @@ def run(args: argparse.Namespace) -> int:
             writers = json_writer(args.json, record) | _writers(args, shape, detection)
             write_all(writers)
     if several:
+        for text in _floorless(records):
+            note(text)
         return many.end(records, undetermined=args.strict and any(r.get("undetermined") for r in records))
     for text in _notes(args, shape, detection, record):
         note(text)
@@ -176,6 +178,13 @@ def _notes(args: argparse.Namespace, shape: "Shape", detection: Any, record: dic
         yield f"{shape.source}: if object and background are of different grey, try --threshold otsu"
     if shape.dim == 3 and record["options"].get("outliers", "auto") == "auto":
         yield from _floor(shape, detection)
+
+
+def _floorless(records: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """In which of several objects no floor was found that was asked for, as their lines do not say."""
+    asked = [r for r in records if r.get("options", {}).get("outliers") == "floor" and "outliers" in r]
+    if without := [r["source"] for r in asked if r["outliers"]["floor"] is None]:
+        yield f"no floor was found in {len(without)} of {len(asked)}: {', '.join(without)}"
 
 
 def _floor(shape: "Shape", detection: Any) -> Iterator[str]:
