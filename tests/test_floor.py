@@ -53,7 +53,7 @@ def test_a_floor_is_found_wherever_it_lies(make, seed):
     assert ((points[~on] @ found.normal - found.offset) > 0).mean() > 0.99, "the normal points to the object"
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.003, 0.006, 0.01])
+@pytest.mark.parametrize("noise", [0.0, 0.003, 0.006, 0.01, 0.03])
 @pytest.mark.parametrize("strays", [0.0, 0.02])
 def test_neither_noise_nor_strays_hide_a_floor(noise, strays):
     rng = np.random.default_rng(15)
@@ -75,6 +75,25 @@ def test_a_wall_that_meets_the_floor_has_no_end_there():
         found = detect(standing(mesh, seed, size=2.0)[0], outliers="floor")
         assert found.point_group == "Cs"
         assert found.at_least, "nobody saw the bottom"
+
+
+def test_windows_that_reach_into_a_floor_tell_no_drift():
+    """Half of what a window near the floor holds was taken away with it, which moves its middle; the rim lies low."""
+    points, _, _ = standing(specimen("shape", "wheel5")[0], 18)
+    found = detect(points, outliers="floor")
+    assert (found.point_group, found.confidence > 0.95) == ("D5h", True)
+
+
+def test_what_seems_to_fill_a_volume_has_a_bottom_too():
+    """Bars as thick as their noise: without a surface nothing is covered, and D4d falls to C4v, sure."""
+    rng, mesh = np.random.default_rng(0), specimen("shape", "crossed4")[0]
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    half = 1.5 * (high - low).max()
+    plane = np.column_stack([rng.uniform(-half, half, (27000, 2)), np.full(27000, low[2])])
+    plane = plane + [*(0.5 * (low + high)[:2]), 0.0] + 0.01 * mesh.diagonal * rng.normal(size=plane.shape)
+    found = detect(np.concatenate([sample(mesh, 9000, 0.01, rng), plane]), outliers="floor")
+    assert found.surface.cloud.body == "volume"
+    assert found.at_least or found.point_group == "D4d"
 
 
 def test_a_slanted_cut_through_a_floor_is_none():

@@ -4,8 +4,8 @@ Every damage takes a mesh and a strength and returns the points that are left, i
 known of each. Strengths are shares of the points, ratios of densities, or numbers of cameras.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -137,12 +137,8 @@ def tabletop(mesh: Shape, count: float, rng: Rng) -> Damaged:
     around, up = rng.random() + np.arange(round(count)) / count, rng.uniform(0.35, 0.95)
     level = np.sqrt(1.0 - up**2)
     seen = [view(both, np.array([level * np.cos(a), level * np.sin(a), up]), rng) for a in 2.0 * np.pi * around]
-    points = np.concatenate([s.points for s in seen])
-    return Damaged(
-        points=points,
-        strays=(points[:, 2] < low[2] + 1e-4 * mesh.diagonal).astype(np.int64),
-        viewpoint=np.concatenate([np.asarray(s.viewpoint) for s in seen]),
-    )
+    made = _together(seen)
+    return replace(made, strays=(made.points[:, 2] < low[2] + 1e-4 * mesh.diagonal).astype(np.int64))
 
 
 def views(mesh: Shape, count: float, rng: Rng, *, rough: bool = False) -> Damaged:
@@ -151,6 +147,11 @@ def views(mesh: Shape, count: float, rng: Rng, *, rough: bool = False) -> Damage
     across = unit(np.cross(first, rng.normal(size=3)))
     ring = 2.0 * np.pi * np.arange(round(count)) / count
     seen = [view(mesh, np.cos(a) * first + np.sin(a) * across, rng, rough=rough) for a in ring]
+    return _together(seen)
+
+
+def _together(seen: Sequence[Damaged]) -> Damaged:
+    """What several cameras see, one after the other."""
     return Damaged(
         points=np.concatenate([s.points for s in seen]),
         strays=np.concatenate([s.strays for s in seen]),

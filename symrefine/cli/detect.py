@@ -13,6 +13,7 @@ from symrefine.cli.outputs import (
     check_beside,
     check_outputs,
     complain,
+    is_quiet,
     is_verbose,
     json_writer,
     note,
@@ -176,7 +177,7 @@ def _notes(args: argparse.Namespace, shape: "Shape", detection: Any, record: dic
     is_grey = shape.dim == 2 and "threshold" in record["options"] and args.threshold is None
     if is_grey and (record["undetermined"] or record["point_group"] == "C1"):
         yield f"{shape.source}: if object and background are of different grey, try --threshold otsu"
-    if shape.dim == 3 and record["options"].get("outliers", "auto") == "auto":
+    if shape.dim == 3 and record["options"].get("outliers", "auto") == "auto" and not is_quiet():
         yield from _floor(shape, detection)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from symrefine.geometry import Array, Mask, tight_diagonal
+from symrefine.geometry import Array, Mask, frame_with_z, tight_diagonal
 from symrefine.surface.clumps import RIM
 from symrefine.surface.misses import SHARES
 from symrefine.surface.neighbourhoods import ROUNDING
@@ -55,10 +55,13 @@ class Floor:
 
     def meets(self, points: Array, reach: float) -> Mask:
         """Which of points [N, 3] lie so near above it, where it was seen: there a surface goes on, and has no end."""
-        flat = np.linalg.svd(self.normal[None])[2][1:].T
         found = self.above(points) < reach
-        found[found] = np.isfinite(Tree(self.points @ flat).nearest(points[found] @ flat, bound=reach)[0])
+        found[found] = np.isfinite(Tree(self.flat(self.points)).nearest(self.flat(points[found]), bound=reach)[0])
         return found
+
+    def flat(self, points: Array) -> Array:
+        """Points [N, 3] seen along its normal [N, 2]."""
+        return np.asarray(points @ frame_with_z(self.normal)[:2].T)
 
     def bars(self, points: Array, margin: float) -> Mask:
         """Which of points [..., 3] lie below it by more than a margin, where nothing of what stands on it is."""
@@ -122,12 +125,12 @@ def _has_sides(offsets: Array, thick: float) -> Mask:
 def _reaches_beyond(points: Array, found: Floor) -> bool:
     """Whether more of a floor than a detail lies beside what stands on it, seen along its normal; that is no detail."""
     # What noise leaves of the floor itself lies no farther above it than once more its thickness.
-    others, flat = points[found.above(points) > found.thick], np.linalg.svd(found.normal[None])[2][1:].T
+    others = points[found.above(points) > found.thick]
     if len(others) <= SHARES[0] * len(points):
         return False
     try:
-        hull = ConvexHull(others @ flat)
+        hull = ConvexHull(found.flat(others))
     except (QhullError, ValueError):  # fewer than three points, or all on a line
         return False
-    sides = found.points @ flat @ hull.equations[:, :2].T + hull.equations[:, 2]
+    sides = found.flat(found.points) @ hull.equations[:, :2].T + hull.equations[:, 2]
     return bool((sides > 0.0).any(axis=1).mean() > SHARES[0])
