@@ -12,7 +12,7 @@ from experiments.objects.shapes import bottle, sample, table
 from experiments.studies import boundary
 from symrefine.cli.tables import record_lines
 from symrefine.export.bop import decided
-from symrefine.fit.vertices import NEAR, ROUNDED, on_vertices
+from symrefine.fit.vertices import NEAR, ROUNDED, exact_symmetry, on_vertices
 from symrefine.geometry import random_orthogonal, rotation
 from symrefine.groups import PointGroup
 from symrefine.shape import Shape
@@ -55,10 +55,24 @@ def test_vertices_know_the_place_of_their_group_to_rounding(name, scale, away):
     assert nearest.max() < 10.0 * rounding * shape.diagonal
 
 
+@pytest.mark.parametrize("name", EXACT)
+@pytest.mark.parametrize(("scale", "away"), [(1.0, 0.0), (1e-3, 3.0), (1e4, 100.0)])
+def test_vertices_know_their_group_with_nothing_else_known(name, scale, away):
+    shape, near, center, _ = posed(name, len(name), scale, away)
+    found, given = exact_symmetry(shape, shape.diagonal), on_vertices(shape, near, center)
+    assert found.group.name == near.name
+    assert found.faces == given.faces
+    assert found.group.distance_rad(given.group.operations()).max() < 1e-11 * (1.0 + away)
+    # About the same point, but for what a polar group leaves free along its axis.
+    moved = np.einsum("kij,j->ki", given.group.operations(), found.center - given.center)
+    assert np.ptp(moved, axis=0).max() < 1e-11 * (1.0 + away) * shape.diagonal
+
+
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_tessellation_that_breaks_the_symmetry_is_not_exact(name):
     shape, near, center, _ = posed(name)
     assert on_vertices(shape, near, center) is None
+    assert exact_symmetry(shape, shape.diagonal).group.name != near.name
 
 
 @pytest.mark.parametrize("name", [*WITH_FACES, *WITHOUT])
@@ -163,6 +177,22 @@ def test_report_nearest_shape_and_export_agree_to_the_last_digit(name):
         if not turn.improper:
             moved = (shape.points - turn.axis.point) @ matrix.T + turn.axis.point
             assert np.linalg.norm(moved[:, None] - shape.points, axis=2).min(axis=1).max() < 1e-12 * size
+
+
+def test_the_centre_is_that_of_the_surface_where_vertices_crowd_at_one_end():
+    """A group with one axis leaves free where on it the centre is: next to the centroid."""
+    mesh, (group, _) = mesh_of("fan8"), placed_group(DESIGNS["fan8"].parts())
+    heights = mesh.points[mesh.faces].mean(axis=1) @ group.frame[2]
+    far = heights > np.median(heights)
+    corners = mesh.points[mesh.faces[far]]
+    finer = [np.stack([corners.mean(axis=1), corners[:, k], corners[:, k - 2]], axis=1) for k in range(3)]
+    whole = np.concatenate([mesh.points[mesh.faces[~far]], *finer]).reshape(-1, 3)
+    dense = symrefine.detect(Shape(whole, np.arange(len(whole)).reshape(-1, 3)))
+    plain = symrefine.detect(mesh)
+    assert group.is_polar
+    assert dense.point_group == plain.point_group
+    assert dense.exact is not None
+    np.testing.assert_allclose(dense.center, plain.center, atol=1e-9 * mesh.diagonal)
 
 
 def test_the_record_and_the_table_say_how_exact():

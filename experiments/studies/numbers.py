@@ -90,6 +90,7 @@ KIND_OF = {
         "detection.measure": "ORDER PARTS PLANES SAMPLES",
         "detection.sketch": "MANY SAMPLE",
         "detection.textured": "MARKED FEW",
+        "fit.anchors": "LEVER PROBES",
         "fit.finite": "TURNS FEWEST_TURNS SECTOR PROBES",
         "fit.frame": "LONGEST",
         "fit.matching": "ROBUST SCALE_FLOOR AGREE",
@@ -154,7 +155,7 @@ KIND_OF = {
     "limit": {
         "detection.textured": "MOST",
         "errors": "LONGEST",
-        "fit.vertices": "LARGEST",
+        "fit.anchors": "LARGEST CANDIDATES",
         "geometry": "_AT_ONCE",
         "groups.closure": "DEFAULT_MAX_FOLD",
         "groups.names": "MAX_FOLD",

@@ -106,9 +106,13 @@ def _hidden(surface: Surface) -> float:
 
 
 def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float) -> Pool:
-    pool = _with(surface, Pool(nothing=nothing, limit=limit), proposals(evidence))
+    pool, starts = Pool(nothing=nothing, limit=limit), proposals(evidence)
+    if evidence.vertices is not None:
+        pool = _with_vertices(surface, pool, evidence.vertices, proven=evidence.proven)
+        starts = [*beside(pool.largest.placed), *starts]
+    pool = _with(surface, pool, starts)
     for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
-        if glance < HOPELESS and not pool.has(axis):
+        if glance < HOPELESS and pool.wants(axis):
             pool = _with(surface, pool, about(evidence, axis.group.frame[2]))
     # Turns that hold better than the largest group may have half turns across them which that has not.
     better = [h for h in pool.small if ALIKE * h.need < pool.largest.need]
@@ -116,6 +120,16 @@ def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float
         pool = _with(surface, pool, turned_over(evidence, known.placed))
     nearest = sorted((*pool.looked, *pool.hopeless), key=lambda k: k[1])[:TOLD] if not pool.small else []
     return replace(pool, small=(*pool.small, *(fitted(surface, start) for start, _ in nearest)))
+
+
+def _with_vertices(surface: Surface, pool: Pool, known: Placed, *, proven: bool) -> Pool:
+    """The pool with what the vertices of a mesh have, unless they are those of something round."""
+    if known.group.symbol.fold > 2:
+        pool = _tried(surface, pool, [_endless(known)])
+    if pool.has(known):
+        return pool
+    found = fitted(surface, known)
+    return _grown(surface, pool, replace(found, need=0.0) if proven else found)
 
 
 def _of_part(surface: Surface, whole: Pool) -> Pool:
@@ -148,7 +162,7 @@ def _hopeless(surface: Surface) -> float:
 
 def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tuple[Placed, float]]:
     """The starts that are new with what they seem to need at a glance, large groups that look good first."""
-    new = [s for s in starts if not pool.has(s)]
+    new = [s for s in starts if pool.wants(s)]
     seen = zip(new, glances(surface, new, _hopeless(surface)), strict=True)
     best = sorted(seen, key=lambda k: max(k[1], pool.nothing) / math.log2(1.0 + _size(k[0])))
     return best[:LOOKED] if surface.is_open else best
@@ -167,7 +181,7 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
     """The pool with candidates fitted, but for those that the group so far has anyway."""
     parts: list[Placed] = []
     for start, glance in _glanced(surface, pool, starts):
-        if pool.has(start) or pool.shows(start, glance):
+        if not pool.wants(start) or pool.shows(start, glance):
             continue
         if glance >= _hopeless(surface):
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
@@ -276,11 +290,16 @@ def _told_apart(placed: Placed | None, parts: Sequence[Placed]) -> Placed | None
     """
     if placed is None:
         return None
-    group, fold = placed.group, placed.group.symbol.fold
+    fold = placed.group.symbol.fold
     if not math.inf > fold > math.pi / SAME_RAD or any(fold <= p.group.symbol.fold for p in parts):
         return placed
-    name = "Cinfv" if group.symbol.family in ("C", "Cv") else "Dinfh"
-    return replace(placed, group=PointGroup(name=name, frame=group.frame))
+    return _endless(placed)
+
+
+def _endless(placed: Placed) -> Placed:
+    """The continuous group about the axis of a group."""
+    name = "Cinfv" if placed.group.symbol.family in ("C", "Cv") else "Dinfh"
+    return replace(placed, group=PointGroup(name=name, frame=placed.group.frame))
 
 
 def _worst(found: Hypothesis, hidden: float) -> tuple[float, float]:

@@ -12,6 +12,8 @@ from symrefine.groups import PointGroup, is_subgroup
 
 # Needs within this factor are the same, as the elements of a true group miss alike.
 ALIKE = 1.5
+# Groups of points that no other one but that of a ball contains.
+MAXIMAL = ("Oh", "Ih")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,6 +55,15 @@ class Pool:
         """Whether a group is in one that was fitted and needs no more than it does, or as good as nothing."""
         most = max(ALIKE * needs, self.nothing)
         return any(h.need <= most and h.holds(placed) for h in (self.largest, *self.small))
+
+    def wants(self, start: Placed) -> bool:
+        """Whether a group is in none that is as good as exact, and something may hold both it and the largest.
+
+        The largest, if it needs nothing, is in every larger one, and of those that hold all of a cube or an icosahedron
+        there is but that of a ball.
+        """
+        alone = self.largest.group.name in MAXIMAL and self.largest.need <= self.nothing
+        return not (self.has(start) or (alone and start.group.name != "Kh"))
 
     def met(self, placed: Placed) -> bool:
         """Whether a group was fitted at this very place."""

@@ -1,7 +1,7 @@
 """What a decision is made from: a shape measured, its candidates fitted and judged, and joined to a chain of groups."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -9,16 +9,16 @@ import numpy as np
 
 from symrefine.clock import Clock
 from symrefine.decide.chain import chain, explore
-from symrefine.decide.hypotheses import MOVED, Hypothesis
+from symrefine.decide.hypotheses import MOVED, SAME_RAD, Hypothesis
 from symrefine.decide.looks import LOOK, few_motions
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, meant
 from symrefine.detection.measure import Measured, Outliers, doubt, floor_under, gather, measure
 from symrefine.detection.sketch import Sample, Sketch, is_large, sampled, set_apart, sketched
-from symrefine.fit.placed import SAMPLED, Placed
-from symrefine.fit.vertices import ROUNDED, OnVertices, on_vertices
+from symrefine.fit.placed import SAMPLED, Placed, common_center
+from symrefine.fit.vertices import OnVertices, exact_symmetry, on_vertices
 from symrefine.geometry import Array, Mask, check_tolerance
-from symrefine.groups import PointGroup
+from symrefine.groups import PointGroup, is_subgroup
 from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import CLUMP, COUNTERPART, Clump, clump_among
 from symrefine.surface.floor import Floor
@@ -42,7 +42,7 @@ class Examined:
         outliers: indices of the points that are no part of the object, ascending.
         outlier_share: of all points.
         sample: how many points stand for how many, if they stand for more than themselves.
-        carried: by the groups of a mesh that were asked for, where its vertices put them.
+        exact: the group that maps the vertices of a mesh onto one another, where they put it, if that can be told.
         no_floor: whether it was told that it stands on one, and none was found.
     """
 
@@ -53,7 +53,7 @@ class Examined:
     outliers: Index
     outlier_share: float
     sample: Sample | None
-    carried: Mapping[str, OnVertices | None]
+    exact: OnVertices | None
     no_floor: bool = False
 
     def among(self, left: Mask) -> "Examined":
@@ -73,9 +73,21 @@ class Examined:
 
     def vertices_of(self, found: Hypothesis) -> OnVertices | None:
         """Where the vertices of a mesh put a group of the chain, if it maps them onto one another."""
-        if found.group.name in self.carried:
-            return self.carried[found.group.name]
-        return carried_vertices(self.measured, found, self.surface.diagonal)
+        known, group = self.exact, found.group
+        if group.name == "C1":
+            return None
+        if known is not None and group.name == known.group.name:
+            return known
+        if known is not None and not group.is_finite:
+            # Polar groups leave the centre free along the axis.
+            fold = known.group.symbol.fold if known.group.is_polar == group.is_polar else 0
+            on_rings = fold > 2 and is_subgroup(known.group, group, SAME_RAD)
+            return replace(known, group=PointGroup(name=group.name, frame=known.group.frame)) if on_rings else None
+        if known is not None and not is_subgroup(group, known.group, SAME_RAD):
+            return None
+        origin, scale = self.measured.moments.center, self.measured.moments.scale
+        center = origin + scale * found.placed.center
+        return on_vertices(self.measured.shape, group, center, diagonal=scale * self.surface.diagonal)
 
     def decided(self, tolerance: float, *, shown: bool = False) -> Decision:
         """The likeliest group of the chain at a tolerance; with `shown` as if what no camera saw kept to the rest."""
@@ -244,12 +256,16 @@ def _examined(
         out, share = set_apart(measured, sketch, outliers=outliers)
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed), tolerance)
+    with clock("vertices"):
+        exact = _exact(measured, surface.diagonal)
+    if exact is not None and exact.group.name != "C1":
+        place = Placed(group=exact.group, center=(exact.center - measured.moments.center) / measured.moments.scale)
+        evidence = replace(evidence, vertices=place, proven=exact.faces)
     with clock("search"):
         # Where the tolerance asked for is too small to decide anything, the ladder is told from the first that is not.
         steps = [t for t in sorted({tolerance, *ladder}) if t >= tolerance and not doubt(measured, surface, t)]
         pool = explore(surface, evidence, steps[0], min(tolerance, *ladder, 1.0)) if steps else Pool()
         links = chain(surface, pool, BEYOND * max((tolerance, *ladder)))
-        links, carried = _by_vertices(links, measured, surface.diagonal)
     return Examined(
         measured=measured,
         surface=surface,
@@ -258,7 +274,7 @@ def _examined(
         outliers=out,
         outlier_share=share,
         sample=None if sketch is None else Sample(points=len(sketch.picked), of=sketch.count),
-        carried=carried,
+        exact=exact,
     )
 
 
@@ -293,28 +309,16 @@ def _replaces(found: Examined, clump: Array, tolerance: float) -> bool:
     return max(hidden) * found.measured.count >= COUNTERPART * len(clump) * len(own)
 
 
-def _by_vertices(
-    links: tuple[Hypothesis, ...], measured: Measured, diagonal: float
-) -> tuple[tuple[Hypothesis, ...], dict[str, OnVertices | None]]:
-    """The chain, where a group needs nothing that maps a mesh onto itself exactly, whatever its samples told.
-
-    And what the vertices said of those groups that were asked for.
-    """
-    asked: dict[str, OnVertices | None] = {}
-    for k in reversed(range(len(links))):
-        if measured.shape.faces is None or links[k].need <= ROUNDED:
-            break  # and those below
-        on = asked[links[k].group.name] = carried_vertices(measured, links[k], diagonal)
-        if on is not None and on.faces and links[k].group.is_finite:
-            return (*(replace(link, need=0.0) for link in links[: k + 1]), *links[k + 1 :]), asked
-    return links, asked
-
-
-def carried_vertices(measured: Measured, found: Hypothesis, diagonal: float) -> OnVertices | None:
-    """Where the vertices of a mesh put a group, if it maps them onto one another; `diagonal` in normalised units."""
+def _exact(measured: Measured, diagonal: float) -> OnVertices | None:
+    """The group that the vertices of a mesh have, about the point nearest the centroid that it leaves in place."""
+    if measured.shape.faces is None:
+        return None
     origin, scale = measured.moments.center, measured.moments.scale
-    center = origin + scale * found.placed.center
-    return on_vertices(measured.shape, found.group, center, diagonal=scale * diagonal)
+    found = exact_symmetry(measured.shape, scale * diagonal)
+    if found is None:
+        return None
+    center = common_center([Placed(group=found.group, center=(found.center - origin) / scale)])
+    return replace(found, center=origin + scale * center)
 
 
 def _belongs(found: Examined, clump: Array, tolerance: float) -> bool:

@@ -37,7 +37,7 @@ def mean_back(counterparts: Iterable[Array], operations: Array) -> Array:
 
 def act(points: Array, operations: Array, labels: Index | None, reach: float) -> Action:
     """The nearest point of the same label as counterpart of each image, up to `reach`."""
-    tree, shifted = _labelled(points, labels)
+    tree, shifted = labelled(points, labels)
     images, miss = np.empty((len(operations), len(points)), dtype=np.intp), np.zeros(len(points))
     for k, g in enumerate(operations):
         distance, images[k] = tree.query(np.column_stack([points @ g.T, shifted]))
@@ -56,7 +56,7 @@ def permutations(points: Array, operations: Array, labels: Index | None, reach: 
 
     Only generators are looked up, the others follow from them.
     """
-    tree, shifted = _labelled(points, labels)
+    tree, shifted = labelled(points, labels)
     images = np.empty((len(operations), len(points)), dtype=np.intp)
     images[0] = np.arange(len(points))
     known, found = [0], []
@@ -77,7 +77,7 @@ def permutations(points: Array, operations: Array, labels: Index | None, reach: 
     return images
 
 
-def _labelled(points: Array, labels: Index | None) -> tuple[cKDTree, Array]:
+def labelled(points: Array, labels: Index | None) -> tuple[cKDTree, Array]:
     """A kd-tree in which other labels are far away, and the coordinate that makes them so."""
     size = 0.0 if labels is None else 4.0 * float(np.abs(points).max())
     shifted = np.zeros(len(points)) if labels is None else np.unique(labels, return_inverse=True)[1] * size

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from symrefine.fit.action import generators, mean_back, permutations
+from symrefine.fit.anchors import LARGEST, permuting_group
 from symrefine.fit.finite import finite_group
 from symrefine.fit.placed import Placed
 from symrefine.geometry import Array, orthogonal_factor, tight_diagonal
@@ -20,8 +21,8 @@ from symrefine.shape import Index, Shape
 # Rounds that fit a group's place to points that correspond, the step that counts as none, and that from which on steps
 # which no longer shrink are rounding.
 ROUNDS, STILL, ROUNDING = 30, 1e-15, 1e-12
-# An exact shape misses the place that detection found by no more than this; more images than this are not looked up.
-NEAR, LARGEST = 2e-3, 5_000_000
+# An exact shape misses the place that detection found by no more than this.
+NEAR = 2e-3
 # A shape is exact where no vertex misses its counterpart by more than what rounding to five digits leaves.
 ROUNDED = 1e-5
 # Vertices of parts that touch are one where they are nearer than single precision tells.
@@ -80,6 +81,27 @@ class OnVertices:
     faces: bool
 
 
+def exact_symmetry(shape: Shape, diagonal: float) -> OnVertices | None:
+    """The group that maps the points of a shape, the vertices of a mesh, onto one another to rounding.
+
+    Nothing else has to be known of the shape but its diagonal, input units. None if it cannot be told so (see
+    `permuting_group`).
+    """
+    origin = shape.points.mean(axis=0)
+    own = Distinct.of(shape, origin, diagonal, weld=WELD)
+    middle = own.points.mean(axis=0)
+    # What some of the points seem to have a few others may break: then all are asked.
+    for every in (False, True):
+        group = permuting_group(own.points - middle, own.labels, ROUNDED, every=every)
+        if group is None:
+            return None
+        if group.name == "C1":
+            return OnVertices(group=group, center=origin, finite=group, miss=0.0, faces=True)
+        if found := _on(shape, own, group, Placed(group=group, center=middle), origin, ROUNDED, diagonal):
+            return found
+    return None
+
+
 def on_vertices(
     shape: Shape, group: PointGroup, center: Array, *, within: float = ROUNDED, diagonal: float = 0.0
 ) -> OnVertices | None:
@@ -104,12 +126,17 @@ def on_vertices(
     if place.group.order * len(own.rows) > LARGEST:
         return None
     glanced = _glanced(own, place, within)
-    if glanced is None:
-        return None
-    images = permutations(own.points - glanced.center, glanced.group.operations(), own.labels, NEAR)
+    return None if glanced is None else _on(shape, own, group, glanced, center, within, diagonal)
+
+
+def _on(
+    shape: Shape, own: Distinct, group: PointGroup, near: Placed, center: Array, within: float, diagonal: float
+) -> OnVertices | None:
+    """Where the distinct points of a shape put a group of which the finite part that maps them stands nearby."""
+    images = permutations(own.points - near.center, near.group.operations(), own.labels, NEAR)
     if images is None:
         return None
-    place = settled(own.points, images, glanced)
+    place = settled(own.points, images, near)
     miss = _largest_miss(own.points - place.center, place.group.operations(), images)
     if miss > within:
         return None

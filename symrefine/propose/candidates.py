@@ -15,6 +15,7 @@ from symrefine.fit.placed import Placed
 from symrefine.geometry import Array, frame_with_z
 from symrefine.groups import MAX_FOLD as MAX_ORDER
 from symrefine.groups import PointGroup, close
+from symrefine.groups.identify import POLYHEDRAL
 from symrefine.moments.harmonics import harmonic_moments
 from symrefine.moments.moments import Moments
 from symrefine.ntuples.rank import FixedSubspace
@@ -40,7 +41,8 @@ ON_AXIS = (0.03, 0.15)
 class Evidence:
     """What is known before any point is matched: moments, the class of the n-tuples, and points to take azimuths of.
 
-    `atoms` says that the points stand for themselves, so that they can be counted.
+    `atoms` says that the points stand for themselves, so that they can be counted. `vertices` is the group that maps
+    those of a mesh onto one another, where they put it; `proven` says that it maps the faces, too.
     """
 
     moments: Moments
@@ -48,6 +50,8 @@ class Evidence:
     points: Array
     weights: Array
     atoms: bool = False
+    vertices: Placed | None = None
+    proven: bool = False
 
     @cached_property
     def harmonics(self) -> dict[int, Array]:
@@ -147,6 +151,8 @@ def beside(known: Placed) -> list[Placed]:
     group, center = known.group, known.center
     main = [(u, k) for u, k in group.rotation_axes()[:1] if group.symbol.fold > 0]
     found = [Placed(group=PointGroup(name="Ci"), center=center)] if not group.has_inversion else []
+    if group.name in POLYHEDRAL:
+        found.append(placed("Kh", group.frame, center))
     if not group.is_finite:
         mirrored = [placed("Cs", group.frame, center)] if group.name == "Cinfv" else []
         return [*mirrored, placed("Kh", group.frame, center)] if group.name != "Kh" else []

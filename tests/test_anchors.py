@@ -1,0 +1,85 @@
+"""The group that permutes points, found from nothing but the points."""
+
+import numpy as np
+import pytest
+
+from symrefine.fit.anchors import permuting_group
+from symrefine.geometry import random_orthogonal, unit
+from symrefine.groups import PointGroup, point_group
+
+WITHIN = 1e-5
+NAMES = (
+    *("Cs", "Ci", "C2", "C7", "C2v", "C5v", "C3h", "S4", "S10", "D2", "D9", "D2d", "D5d", "D2h", "D7h"),
+    *("T", "Td", "Th", "O", "Oh", "I", "Ih", "C60", "D48h"),
+)
+
+
+def orbits(group, rng, count=3):
+    """Points [N, 3] of generic orbits about the origin, in random order, and of which orbit each is [N]."""
+    seeds = unit(rng.standard_normal((count, 3))) * rng.uniform(0.5, 1.0, (count, 1))
+    points = np.concatenate([group.operations() @ seed for seed in seeds])
+    order = rng.permutation(len(points))
+    return points[order], np.repeat(np.arange(count), len(points) // count)[order]
+
+
+def posed(name, seed):
+    rng = np.random.default_rng(seed)
+    group = PointGroup(name=name, frame=random_orthogonal(rng))
+    return group, *orbits(group, rng), rng
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_generic_orbits_have_their_group_and_place_it(name, seed):
+    group, points, _, _ = posed(name, seed)
+    found = permuting_group(points, None, WITHIN)
+    assert found.name == name
+    if name not in ("C1", "Ci"):
+        assert found.distance_rad(group.operations()).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", ["D9", "Oh", "C60"])
+def test_rounded_coordinates_have_it_too_but_not_noisy_ones(name):
+    _, points, _, rng = posed(name, 4)
+    assert permuting_group(np.round(points, 6), None, WITHIN).name == name
+    noisy = points + 1e-3 * rng.standard_normal(points.shape)
+    assert permuting_group(noisy - noisy.mean(axis=0), None, WITHIN).name == "C1"
+
+
+def test_one_point_out_of_place_leaves_the_operations_that_leave_it():
+    """A corner of a cube that is cut off a little: three of its nine mirrors pass through it."""
+    group, points, _, _ = posed("Oh", 5)
+    corner = group.frame.T @ np.array([0.3, 0.3, 0.3])
+    with_corners = np.concatenate([points, [1.1 * corner], [-corner]])
+    middle = with_corners.mean(axis=0)
+    found = permuting_group(with_corners - middle, None, WITHIN, every=True)
+    assert found.name == "C3v"
+    np.testing.assert_allclose(np.abs(found.frame[2] @ unit(corner)), 1.0, atol=1e-9)
+
+
+def test_labels_tell_points_apart():
+    _, points, _, _ = posed("D4h", 6)
+    assert permuting_group(points, np.zeros(len(points), dtype=int), WITHIN).name == "D4h"
+    above = (points @ posed("D4h", 6)[0].frame[2] > 0).astype(int)
+    assert permuting_group(points, above, WITHIN).name == "C4v"
+
+
+def test_what_has_none_is_c1_and_what_cannot_be_told_is_none():
+    rng = np.random.default_rng(0)
+    cloud = rng.standard_normal((500, 3))
+    assert permuting_group(cloud - cloud.mean(axis=0), None, WITHIN).name == "C1"
+    line = np.outer(np.linspace(-1.0, 1.0, 9), [1.0, 2.0, 3.0])
+    assert permuting_group(line, None, WITHIN) is None
+    ball = unit(rng.standard_normal((4000, 3)))
+    assert permuting_group(ball, None, WITHIN) is None  # all as far from the centre: too many pairs
+
+
+def test_a_mirror_image_is_told_from_a_turn():
+    """Points in a plane have the mirror that leaves all of them; chiral ones no mirror at all."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 7, endpoint=False)
+    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(7)], axis=1)
+    assert permuting_group(ring, None, WITHIN).name == point_group("D7h").name
+    twisted = np.concatenate(
+        [ring + [0, 0, 0.5], 0.8 * ring @ [[0.9, 0.1, 0], [-0.1, 0.9, 0], [0, 0, 1]] - [0, 0, 0.5]]
+    )
+    assert permuting_group(twisted - twisted.mean(axis=0), None, WITHIN).name == "C7"
