@@ -344,6 +344,23 @@ def test_a_clump_of_few_points_that_touches_the_body_is_found_by_what_it_speaks_
     assert made.strays[found.outliers].mean() > 0.9
 
 
+def test_what_is_taken_for_a_clump_may_be_a_part_and_the_answer_says_how_likely():
+    """Noise as thick as a tap makes a ball of it: one of two may be missing, or somebody's finger is there."""
+    faucet = [box((0, 0, 0), (0.6, 0.2, 0.06)), box((0, 0, 0.3), (0.09, 0.09, 0.6))]
+    faucet += [box((0, 0.25, 0.6), (0.09, 0.59, 0.09)), box((0, 0.5, 0.5), (0.09, 0.09, 0.2))]
+    tap = [box((0.24, 0, 0.08), (0.05, 0.05, 0.12))]
+    tap += [box((0.24, 0, 0.13), (0.14, 0.03, 0.03)), box((0.24, 0, 0.13), (0.03, 0.14, 0.03))]
+    points, _ = posed(sample(join(faucet + tap), 8000, 0.01, np.random.default_rng(1)), 3)
+    found = detect(points)
+    assert (found.point_group, found.clumps) == ("Cs", 1)
+    told = {a.point_group: a.probability for a in found.alternatives}
+    assert told["C1"] == pytest.approx(1.0 - found.confidence)
+    assert 0.8 < found.confidence < 0.95
+    assert found.planes[0].confidence < 0.95
+    sharp, _ = posed(sample(join(faucet + tap), 8000, 0.003, np.random.default_rng(1)), 3)
+    assert (detect(sharp).point_group, detect(sharp).clumps) == ("C1", 0)
+
+
 def test_only_what_hangs_together_and_fills_a_volume_is_a_clump():
     rng = np.random.default_rng(3)
     body = sample(table(), 20000, 0.003, rng)

@@ -90,6 +90,11 @@ def _broken(group: PointGroup) -> float:
     return BROKEN[min(alone, len(BROKEN) - 1)]
 
 
+def odd(group: PointGroup) -> float:
+    """Probability that an object which else has a group has a single thing that breaks it, as what nobody saw does."""
+    return min(_broken(group), BROKEN[1])
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
     """Which group of a chain is meant: its index, the probability of each, and that the true group holds it."""

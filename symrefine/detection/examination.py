@@ -12,7 +12,7 @@ from symrefine.decide.chain import chain, explore
 from symrefine.decide.hypotheses import MOVED, SAME_RAD, Hypothesis
 from symrefine.decide.looks import LOOK, few_motions
 from symrefine.decide.pool import Pool
-from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, meant
+from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, meant, odd
 from symrefine.detection.measure import Measured, Outliers, doubt, floor_under, gather, measure
 from symrefine.detection.sketch import Sample, Sketch, is_large, sampled, set_apart, sketched
 from symrefine.fit.placed import SAMPLED, Placed, common_center
@@ -44,6 +44,7 @@ class Examined:
         sample: how many points stand for how many, if they stand for more than themselves.
         exact: the group that maps the vertices of a mesh onto one another, where they put it, if that can be told.
         no_floor: whether it was told that it stands on one, and none was found.
+        denied: if points were taken for a clump because they alone speak against it, the group that they leave.
     """
 
     measured: Measured
@@ -55,6 +56,7 @@ class Examined:
     sample: Sample | None
     exact: OnVertices | None
     no_floor: bool = False
+    denied: Hypothesis | None = None
 
     def among(self, left: Mask) -> "Examined":
         """The same of all points, of which those of the floor, that others are left of [N], are outliers, too."""
@@ -99,9 +101,16 @@ class Examined:
         """The groups beyond C1 as the decision sees them."""
         surface, needs = self.surface, [*(h.need for h in self.links), math.inf]
         # At the tolerance that was asked for, so that a larger one takes no group away that a smaller one tells.
-        placed = (1.0 - meant(Link(need=h.elsewhere), surface.tolerance, surface.floor) for h in self.links)
+        placed = (
+            (1.0 - meant(Link(need=h.elsewhere), surface.tolerance, surface.floor)) * self._foreign(h)
+            for h in self.links
+        )
         every = zip(self.links, needs[1:], placed, strict=True)
         return [Link.of(h.group, h.need, beyond, believed=h.believed, placed=sure) for h, beyond, sure in every][1:]
+
+    def _foreign(self, found: Hypothesis) -> float:
+        """How likely it is that no part of the object was taken for a clump, if that alone speaks against a group."""
+        return 1.0 if self.denied is None or self.denied.holds(found.placed) else 1.0 - odd(found.group)
 
     def choices(self, tolerance: float) -> tuple[Alternative, ...]:
         """Every group of the chain, C1 first, as likely as at a tolerance."""
@@ -193,7 +202,7 @@ def _likeliest(
         if foreign := suspects(found, points, tolerance):
             without = examine(apart=apart, foreign=foreign)
             if without.size(tolerance) > found.size(tolerance) and not _has_parts_apart(without, tolerance):
-                return without
+                return replace(without, denied=found.links[found.decided(tolerance).index])
     return found
 
 
