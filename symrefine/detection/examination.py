@@ -265,8 +265,10 @@ def _examined(
         out, share = set_apart(measured, sketch, outliers=outliers)
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed), tolerance)
-    with clock("vertices"):
-        exact = _exact(measured, surface.diagonal)
+    exact = None
+    if measured.shape.faces is not None:
+        with clock("vertices"):
+            exact = _exact(measured, surface.diagonal)
     if exact is not None and exact.group.name != "C1":
         place = Placed(group=exact.group, center=(exact.center - measured.moments.center) / measured.moments.scale)
         evidence = replace(evidence, vertices=place, proven=exact.faces)
@@ -320,8 +322,6 @@ def _replaces(found: Examined, clump: Array, tolerance: float) -> bool:
 
 def _exact(measured: Measured, diagonal: float) -> OnVertices | None:
     """The group that the vertices of a mesh have, about the point nearest the centroid that it leaves in place."""
-    if measured.shape.faces is None:
-        return None
     origin, scale = measured.moments.center, measured.moments.scale
     found = exact_symmetry(measured.shape, scale * diagonal)
     if found is None:
