@@ -161,10 +161,7 @@ def _report(
     names, needs = [h.group.name for h in links], [h.need for h in links]
     told = alternatives(names, needs, decision, -1 if reason else index)
     history = chosen.history
-    on = None
-    if measured.shape.faces is not None:
-        with clock("vertices"):
-            on = found.vertices_of(chosen)
+    on = None if measured.shape.faces is None else found.vertices_of(chosen)
     chosen = chosen if on is None else _polished(chosen, on, measured)
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
     planes = [e for e in chosen.elements if e.operations.kind == "plane"]
