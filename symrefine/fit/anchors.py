@@ -35,7 +35,7 @@ def permuting_group(points: Array, labels: Index | None, within: float, *, every
 
     Returns:
         C1 if nothing else does; None where that cannot be told: where points lie on a line, where too many operations
-        would have to be asked, and for folds beyond `MAX_FOLD`.
+        would have to be asked, for folds beyond `MAX_FOLD`, and where some points are mapped by what makes no group.
     """
     tree, shifted = labelled(points, labels)
     radii = np.linalg.norm(points, axis=1)
@@ -71,7 +71,7 @@ def permuting_group(points: Array, labels: Index | None, within: float, *, every
         return None
     try:
         return identify(operations)
-    except InputError:  # points so near one another that what rounding leaves is no group
+    except InputError:  # of what others break, or of points nearly as near one another as rounding
         return None
 
 

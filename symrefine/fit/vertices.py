@@ -94,7 +94,7 @@ def exact_symmetry(shape: Shape, diagonal: float) -> OnVertices | None:
     for every in (False, True):
         group = permuting_group(own.points - middle, own.labels, ROUNDED, every=every)
         if group is None:
-            return None
+            continue
         if group.name == "C1":
             return OnVertices(group=group, center=origin, finite=group, miss=0.0, faces=True)
         if found := _on(shape, own, group, Placed(group=group, center=middle), origin, ROUNDED, diagonal):
