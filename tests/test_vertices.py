@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 import symrefine
 from experiments.objects.boundary import instance
@@ -193,6 +194,44 @@ def test_the_centre_is_that_of_the_surface_where_vertices_crowd_at_one_end():
     assert dense.point_group == plain.point_group
     assert dense.exact is not None
     np.testing.assert_allclose(dense.center, plain.center, atol=1e-9 * mesh.diagonal)
+
+
+def icosphere(rounds):
+    """An icosahedron [F, 3, 3] whose triangles are cut into four, over and over, their corners moved onto a sphere."""
+    phi = 0.5 * (1.0 + np.sqrt(5.0))
+    corners = np.array([[0.0, a, b * phi] for a in (-1, 1) for b in (-1, 1)])
+    corners = np.concatenate([np.roll(corners, k, axis=1) for k in range(3)])
+    hull = ConvexHull(corners)
+    faces = corners[hull.simplices]
+    for _ in range(rounds):
+        middles = 0.5 * (faces + np.roll(faces, -1, axis=1))
+        inner = [np.stack([faces[:, k], middles[:, k], middles[:, k - 1]], axis=1) for k in range(3)]
+        faces = np.concatenate([middles, *inner])
+    points = (faces / np.linalg.norm(faces, axis=2, keepdims=True)).reshape(-1, 3)
+    return Shape(points @ rotation([1.0, 2.0, 0.5], 0.7).T, np.arange(len(points)).reshape(-1, 3))
+
+
+@pytest.mark.parametrize(("rounds", "name"), [(0, "Ih"), (1, "Ih"), (3, "Kh")])
+def test_an_exact_icosahedral_mesh_may_stand_for_a_ball(rounds, name):
+    found = symrefine.detect(icosphere(rounds))
+    assert (found.point_group, found.exact is not None) == (name, name == "Ih")
+    assert found.staircase[0].point_group == name
+
+
+def test_vertices_of_a_polar_group_do_not_place_the_centre_of_what_is_round():
+    """One cap of a cylinder has a vertex in its middle, the other none: they have C48v, the surface nearly Dinfh."""
+    angles = 2.0 * np.pi * np.arange(48) / 48
+    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(48)], axis=1)
+    points = np.concatenate([ring, ring + [0.0, 0.0, 3.0], [[0.0, 0.0, 3.0]]])
+    here, there = np.arange(48), np.roll(np.arange(48), -1)
+    sides = np.concatenate([np.stack([here, there, here + 48], 1), np.stack([there, there + 48, here + 48], 1)])
+    fan = np.stack([np.zeros(46, dtype=int), here[1:-1], here[2:]], 1)
+    cap = np.stack([here + 48, there + 48, np.full(48, 96)], 1)
+    shape = Shape(points, np.concatenate([sides, fan, cap]))
+    assert exact_symmetry(shape, shape.diagonal).group.name == "C48v"
+    found = symrefine.detect(shape)
+    assert (found.point_group, found.exact) == ("Dinfh", None)
+    assert found.center[2] == pytest.approx(1.5, abs=0.01)
 
 
 def test_the_record_and_the_table_say_how_exact():

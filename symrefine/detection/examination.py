@@ -19,6 +19,7 @@ from symrefine.fit.placed import SAMPLED, Placed, common_center
 from symrefine.fit.vertices import OnVertices, exact_symmetry, on_vertices
 from symrefine.geometry import Array, Mask, check_tolerance
 from symrefine.groups import PointGroup, is_subgroup
+from symrefine.propose.candidates import Evidence
 from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import CLUMP, COUNTERPART, Clump, clump_among
 from symrefine.surface.floor import Floor
@@ -81,10 +82,7 @@ class Examined:
         if known is not None and group.name == known.group.name:
             return known
         if known is not None and not group.is_finite:
-            # Polar groups leave the centre free along the axis.
-            fold = known.group.symbol.fold if known.group.is_polar == group.is_polar else 0
-            on_rings = fold > 2 and is_subgroup(known.group, group, SAME_RAD)
-            return replace(known, group=PointGroup(name=group.name, frame=known.group.frame)) if on_rings else None
+            return _round(known, group)
         if known is not None and not is_subgroup(group, known.group, SAME_RAD):
             return None
         origin, scale = self.measured.moments.center, self.measured.moments.scale
@@ -141,6 +139,14 @@ class Examined:
         by = sorted(zip(probabilities, self.links, strict=True), key=lambda k: -k[0])
         told = ", ".join(f"{h.group.name} ({100 * p:.0f} %)" for p, h in by[:3])
         return f"no group is more likely than not: {told}"
+
+
+def _round(known: OnVertices, group: PointGroup) -> OnVertices | None:
+    """A continuous group where the vertices put the fold that they have of it; none if that leaves its centre free."""
+    fold = known.group.symbol.fold if known.group.is_polar == group.is_polar else 0
+    if fold <= 2 or not is_subgroup(known.group, group, SAME_RAD):
+        return None
+    return replace(known, group=PointGroup(name=group.name, frame=known.group.frame))
 
 
 def _size(group: PointGroup) -> tuple[float, float]:
@@ -268,10 +274,7 @@ def _examined(
     exact = None
     if measured.shape.faces is not None:
         with clock("vertices"):
-            exact = _exact(measured, surface.diagonal)
-    if exact is not None and exact.group.name != "C1":
-        place = Placed(group=exact.group, center=(exact.center - measured.moments.center) / measured.moments.scale)
-        evidence = replace(evidence, vertices=place, proven=exact.faces)
+            exact, evidence = _by_vertices(measured, surface.diagonal, evidence)
     with clock("search"):
         # Where the tolerance asked for is too small to decide anything, the ladder is told from the first that is not.
         steps = [t for t in sorted({tolerance, *ladder}) if t >= tolerance and not doubt(measured, surface, t)]
@@ -320,14 +323,18 @@ def _replaces(found: Examined, clump: Array, tolerance: float) -> bool:
     return max(hidden) * found.measured.count >= COUNTERPART * len(clump) * len(own)
 
 
-def _exact(measured: Measured, diagonal: float) -> OnVertices | None:
-    """The group that the vertices of a mesh have, about the point nearest the centroid that it leaves in place."""
+def _by_vertices(measured: Measured, diagonal: float, evidence: Evidence) -> tuple[OnVertices | None, Evidence]:
+    """The group that the vertices of a mesh have, and the evidence with it.
+
+    It is put about the point nearest the centroid that it leaves in place.
+    """
     origin, scale = measured.moments.center, measured.moments.scale
     found = exact_symmetry(measured.shape, scale * diagonal)
-    if found is None:
-        return None
+    if found is None or found.group.name == "C1":
+        return found, evidence
     center = common_center([Placed(group=found.group, center=(found.center - origin) / scale)])
-    return replace(found, center=origin + scale * center)
+    place = Placed(group=found.group, center=center)
+    return replace(found, center=origin + scale * center), replace(evidence, vertices=place, proven=found.faces)
 
 
 def _belongs(found: Examined, clump: Array, tolerance: float) -> bool:
