@@ -24,6 +24,7 @@ from symrefine.decide import chain
 from symrefine.decide.ends import often_kept
 from symrefine.decide.hypotheses import judged
 from symrefine.decide.looks import COARSE, looked_at
+from symrefine.decide.pool import Pool
 from symrefine.detection import examination
 from symrefine.detection.measure import HIDDEN, gather, measure
 from symrefine.detection.story import detect
@@ -542,6 +543,34 @@ def test_missing_surface_is_no_evidence_against(make, group, kind):
 def test_where_a_rim_ends_nothing_is_missing_whatever_adjoins_it(name, view, seed):
     told = boundary.run(boundary.Case(family="vessels", name=name, view=view, seed=seed))
     assert told.outcome == "right"
+
+
+def desk(ends):
+    """Thin boards, and drawers at one end or both."""
+    legs = [box((x, y, 0.36), (0.05, 0.05, 0.72)) for x in (-0.65, 0.65) for y in (-0.3, 0.3)]
+    boards = [box((0, 0, 0.73), (1.4, 0.7, 0.04)), box((0, 0.3, 0.5), (1.3, 0.02, 0.4))]
+    return join([*boards, *legs, *(box((0.4 * end, 0, 0.47), (0.4, 0.6, 0.5)) for end in ends)])
+
+
+@pytest.mark.parametrize(("ends", "group"), [((1,), "C1"), ((1, -1), "Cs")])
+def test_what_ends_all_along_misses_no_part(ends, group):
+    """Boards as thin as neighbourhoods have borders all along, which a mirror keeps where it finds any."""
+    rng = np.random.default_rng(44)
+    found = detect(Pose.random(rng).of(sample(desk(ends), 20000, 0.0085, rng)))
+    assert found.point_group == group
+
+
+def test_a_surface_that_is_whole_is_judged_as_that_to_the_end():
+    """What is fitted last, too: a hole is then none, but where the object ends."""
+    mesh, truth = specimen("shape", "table")
+    measured = measure(Shape(points=damage.hole(mesh, 0.15, np.random.default_rng(15)).points))
+    surface = gather(measured, np.random.default_rng(0))[1]
+    assert surface.is_open
+    assert not surface.closed.is_open
+    place = Placed(group=truth.group, center=(truth.center - measured.moments.center) / measured.moments.scale)
+    pool = Pool(looked=((place, TOLERANCE),), limit=TOLERANCE)
+    needs = [chain.chain(surface, replace(pool, whole=whole), 1.0)[-1].need for whole in (False, True)]
+    assert needs[0] < TOLERANCE < needs[1]
 
 
 @pytest.mark.parametrize("name", ["C5", "C5v", "Cinfv"])

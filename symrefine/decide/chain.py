@@ -69,9 +69,8 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
         finest: the smallest tolerance that is asked for.
     """
     nothing = max(ALIKE * _hidden(surface), certain(finest))
-    closed = None if surface.openings is None else surface.openings.closed
-    whole = _of_whole(replace(surface, openings=closed), evidence, limit, nothing)
-    if surface.openings is None or (surface.openings is closed and closed.floor is None):
+    whole = replace(_of_whole(surface.closed, evidence, limit, nothing), whole=True)
+    if surface.openings is None or (surface.closed is surface and surface.openings.floor is None):
         return whole
     ends, evident = ends_there(surface, whole.largest), surface.openings.evident
     if not whole.largest.group.is_polar and (ends or not evident):
@@ -332,6 +331,7 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
 
     Those that no fit brings within the limit of the pool are only looked at: what larger tolerances would make of them.
     """
+    surface = surface.closed if pool.whole else surface
     elements = [single(e) for e in pool.largest.elements if e.need < pool.largest.need / ALIKE]
     near = [h for h in pool.turned_down() if h.need <= COARSE * pool.limit]
     # What is hidden by noise, or by the least tolerance that is asked for, tells no two groups apart.

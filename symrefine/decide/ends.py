@@ -9,9 +9,9 @@ from symrefine.geometry import Array, Isometry
 from symrefine.surface.openings import TELLING
 from symrefine.surface.surface import Surface
 
-# Share of its open borders that a group carries onto open borders where the object ends there: flat plates 1, mugs 0.75
-# and more, chance up to 0.6.
-KEPT = 2.0 / 3.0
+# Share of its open borders, of those that it carries to where anything was seen, that a group carries onto open borders
+# where the object ends there: most. Flat plates 1, mugs 0.6 and more; holes and cuts on one side of a mirror up to 0.5.
+KEPT = 0.5
 # Mirrors or axes of a group from which on a hole often lies on one of them by chance, and its border is kept by that.
 PLACES = 3
 # Places where a hole is tried, and local planes that tell its rim: a share of one in three is told to a fifteenth.
@@ -19,12 +19,20 @@ HOLES, RIMS = 50, 1000
 
 
 def ends_there(surface: Surface, found: Hypothesis) -> bool:
-    """Whether a group carries the open borders onto themselves, as what a sensor leaves out has no symmetry."""
+    """Whether a group carries the open borders onto themselves, as what a sensor leaves out has no symmetry.
+
+    What it carries to where nothing was seen tells nothing of that.
+    """
     if surface.openings is None or surface.viewed or not surface.openings.line.any():
         return False
     line, cloud = surface.openings.line, surface.cloud
-    near = [cloud.nearest(m.apply(cloud.points[line]), cloud.classes(np.flatnonzero(line)))[1] for m in _motions(found)]
-    return bool(near) and float(np.median([surface.openings.border[n].mean() for n in near])) > KEPT
+    width, classes = 2.0 * float(np.median(cloud.reach)), cloud.classes(np.flatnonzero(line))
+    shares = []
+    for motion in _motions(found):
+        away, near = cloud.nearest(motion.apply(cloud.points[line]), classes)
+        met = away < width
+        shares.append(float(surface.openings.border[near][met].sum() / max(met.sum(), 1)))
+    return bool(shares) and float(np.median(shares)) > KEPT
 
 
 def ends_too(surface: Surface, found: Hypothesis, limit: float) -> bool:

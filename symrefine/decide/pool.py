@@ -27,6 +27,7 @@ class Pool:
         looks: what candidates that were looked at seemed to need at a glance, and where the look put them.
         looked: candidates turned down after a look, where a coarse fit put them, with what they seem to need.
         hopeless: the same of those turned down at a glance.
+        whole: whether the surface was taken as whole, and not as what was seen of one.
         at_least: whether there may be more that was not seen.
         nothing: what is as good as no need: noise hides it, or no tolerance that is asked for makes a doubt of it.
         limit: what the largest may need.
@@ -38,6 +39,7 @@ class Pool:
     looks: tuple[tuple[float, Placed], ...] = ()
     looked: tuple[tuple[Placed, float], ...] = ()
     hopeless: tuple[tuple[Placed, float], ...] = ()
+    whole: bool = False
     at_least: bool = False
     nothing: float = 0.0
     limit: float = 0.0

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -108,6 +108,12 @@ class Surface:
     def is_open(self) -> bool:
         """Whether parts of it may be missing: cameras did not see them, or it ends somewhere. A clump only hides."""
         return self.viewed or (self.openings is not None and bool(self.openings.line.any()))
+
+    @cached_property
+    def closed(self) -> "Surface":
+        """The surface taken as whole: it ends where it does, and something may hide parts of it."""
+        closed = None if self.openings is None else self.openings.closed
+        return self if closed is self.openings else replace(self, openings=closed)
 
     @cached_property
     def unclosed(self) -> float:
