@@ -292,6 +292,7 @@ def test_of_what_has_no_symmetry_the_nearest_misses_are_fitted():
     assert all(h.need > 0.005 for h in pool.small)
 
 
+@pytest.mark.slow
 def test_a_chain_ends_where_directions_part_what_together_makes_the_same_group_again():
     """A cloud of 48 blades, of which directions tell C48v and D48h apart though both together are D48h."""
     made = instance("rotors", "impeller48", 21)
@@ -341,7 +342,7 @@ def mirror_frame():
     return frame_with_z(point_group("C5v").mirrors()[0])
 
 
-@pytest.mark.parametrize("name", ["goblet", "spool"])
+@pytest.mark.parametrize("name", [pytest.param("goblet", marks=pytest.mark.slow), "spool"])
 def test_of_mirrors_that_noise_does_not_tell_apart_none_is_sure(name):
     """A small part on a body of revolution: noise hides which way its mirror faces, not that there is one."""
     case = groups.Case(shape=name, sibling=True, noise_rel=0.01, seed=101)

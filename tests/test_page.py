@@ -358,7 +358,7 @@ def test_the_model_misses_by_what_its_image_is_away(shapeless: Case, pages: Page
         assert np.quantile(off, 0.95) < 0.01
 
 
-@pytest.mark.parametrize("most", [model.MOST_TRIANGLES, 200])
+@pytest.mark.parametrize("most", [pytest.param(model.MOST_TRIANGLES, marks=pytest.mark.slow), 200])
 def test_the_model_shows_the_texture(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """A brick, red above its middle and white below it, whether all of its triangles are shown or a few."""
     monkeypatch.setattr(model, "MOST_TRIANGLES", most)

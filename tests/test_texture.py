@@ -285,7 +285,7 @@ def test_files_show_the_colours_they_were_made_with(kind: str, tmp_path: Path) -
     assert np.abs(shape.texture.colours(face, weights) - ramp(places)).max() < 3.0
 
 
-@pytest.mark.parametrize("kind", WRITERS)
+@pytest.mark.parametrize("kind", [k if k == "glb" else pytest.param(k, marks=SLOW) for k in WRITERS])
 def test_the_command_tells_both_groups(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = WRITERS[kind](tmp_path, BOX, dot((0, 0, 0.2), 0.15))
     page = tmp_path / "x.html"

@@ -43,7 +43,10 @@ def posed(name, seed=0, scale=1.0, away=0.0):
 
 
 @pytest.mark.parametrize("name", EXACT)
-@pytest.mark.parametrize(("scale", "away"), [(1.0, 0.0), (1e-3, 3.0), (1e4, 100.0)])
+@pytest.mark.parametrize(
+    ("scale", "away"),
+    [pytest.param(1.0, 0.0, marks=pytest.mark.slow), (1e-3, 3.0), pytest.param(1e4, 100.0, marks=pytest.mark.slow)],
+)
 def test_vertices_know_the_place_of_their_group_to_rounding(name, scale, away):
     shape, near, center, truth = posed(name, len(name), scale, away)
     found = on_vertices(shape, near, center)

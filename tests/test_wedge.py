@@ -82,10 +82,10 @@ def test_a_surface_that_neighbourhoods_resolve_is_not_folded():
 @pytest.mark.parametrize(
     ("family", "name", "view"),
     [
-        ("rotors", "fan23", NOISY),
+        pytest.param("rotors", "fan23", NOISY, marks=pytest.mark.slow),
         ("rotors", "ratchet16", NOISY),
-        ("rotors", "turbine60", View(form="cloud", points=20000, tolerance=0.004)),
-        ("rotors", "impeller48", CLEAN),
+        pytest.param("rotors", "turbine60", View(form="cloud", points=20000, tolerance=0.004), marks=pytest.mark.slow),
+        pytest.param("rotors", "impeller48", CLEAN, marks=pytest.mark.slow),
         ("rotors", "propeller41", CLEAN),
     ],
 )
