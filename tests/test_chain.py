@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from experiments.objects import household
 from experiments.objects.boundary import instance
-from experiments.objects.shapes import box, join, sample
+from experiments.objects.shapes import box, join, revolve, sample
 from experiments.studies import groups
 from experiments.studies.boundary import Case, look
-from symrefine.decide.chain import _holding, _told_apart, _with, chain, explore
+from symrefine.decide.chain import _best, _holding, _told_apart, _with, chain, explore
 from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted
 from symrefine.decide.looks import START_ERROR
 from symrefine.decide.pool import Pool
@@ -163,11 +164,15 @@ def test_the_exact_mirror_of_a_group_that_nearly_holds_is_found():
 ORIGIN = np.zeros(3)
 
 
+def atoms():
+    points = np.einsum("kij,pj->kpi", point_group("C6v").operations(), [[1.0, 0.3, 0.2], [0.4, 0.9, -0.7]])
+    return Shape(points=points.reshape(-1, 3))
+
+
 @cache
 def ring():
     """Atoms of C6v, and a surface of theirs."""
-    points = np.einsum("kij,pj->kpi", point_group("C6v").operations(), [[1.0, 0.3, 0.2], [0.4, 0.9, -0.7]])
-    return gather(measure(Shape(points=points.reshape(-1, 3))), np.random.default_rng(0))
+    return gather(measure(atoms()), np.random.default_rng(0))
 
 
 def of(name):
@@ -235,6 +240,25 @@ def test_groups_that_generate_none_do_not_stop_the_chain():
     exact = [h.group.name for h in links if h.need < 0.001]
     assert exact[-1] == "C6"
     assert set(exact) <= {"C1", "C2", "C3", "C6"}
+
+
+def test_of_groups_that_hold_and_exclude_one_another_none_is_sure():
+    """A kettle showed one view a mirror and turns of order 4, which together make C4v, which it has not."""
+    tilted = Placed(group=point_group("C2", rotation([1, 0, 0], np.radians(30.0))), center=ORIGIN)
+    turned = Placed(group=point_group("C6", rotation([1, 0, 0], np.radians(30.0))), center=ORIGIN)
+    whole, inside, found = of("C6"), of("C2"), detect(atoms()).examined
+    for others, named, share in (
+        ([inside], 1.0, 1.0),
+        ([replace(inside, placed=tilted)], 0.5, 1.0),
+        ([replace(whole, placed=turned)], 1.0, 0.5),
+        ([replace(inside, placed=tilted), replace(whole, placed=turned)], 1.0, 0.5),
+    ):
+        best = _best([*others, whole], TOLERANCE, TOLERANCE)
+        assert best.group.name == "C6"
+        assert (best.named, best.share) == (named, share)
+        assert replace(found, links=(NOTHING, best)).decided(TOLERANCE).inside[1] == pytest.approx(named, abs=1e-3)
+    # What needs more than noise, and more than the best, is no rival of it.
+    assert _best([replace(inside, placed=tilted, need=0.1 * TOLERANCE), whole], TOLERANCE, 0.0).named == 1.0
 
 
 @pytest.mark.parametrize("name", ["Cinfv", "Dinfh"])
@@ -406,6 +430,22 @@ def test_of_a_group_that_does_not_hold_the_elements_that_do_are_known(seed):
     pool = _with(surface, Pool(nothing=1e-6, limit=TOLERANCE), [placed])
     assert pool.largest.group.name == "Cs"
     assert detect(points).point_group == "Cs"
+
+
+def test_of_a_group_that_nearly_holds_the_elements_that_do_are_kept():
+    """One of eight bosses is too near the middle: the mirror through it is proposed by nothing but all eight."""
+    at = 2.0 * np.pi * np.arange(8) / 8.0
+    radii = np.array([0.58, *[0.75] * 7])
+    boss = revolve([(0, -0.3), (0.18, -0.3), (0.18, 0.3), (0, 0.3)], 48)
+    bosses = [household.placed(boss, (r * np.cos(a), r * np.sin(a), 0)) for r, a in zip(radii, at, strict=True)]
+    disc = revolve([(0, -0.08), (1, -0.08), (1, 0.08), (0, 0.08)])
+    rng = np.random.default_rng(3)
+    measured = measure(Shape(points=sample(join([disc, *bosses]), 8000, 0.002, rng)))
+    surface = gather(measured, np.random.default_rng(0))[1]
+    placed = Placed(group=point_group("D8h"), center=-measured.moments.center / measured.moments.scale)
+    assert TOLERANCE < fitted(surface, placed).need < 1.5 * TOLERANCE
+    pool = _with(surface, Pool(nothing=1e-6, limit=TOLERANCE), [placed])
+    assert pool.largest.group.name == "C2v"
 
 
 @pytest.mark.parametrize("name", ["S4", "S6", "Ci", "C5", "Cs"])

@@ -24,7 +24,7 @@ from symrefine.decide.hypotheses import (
 )
 from symrefine.decide.looks import COARSE, START_ERROR, exact_need, glances, looked_at
 from symrefine.decide.place import SUPPORTED, least_elsewhere
-from symrefine.decide.pool import ALIKE, Pool, is_at, is_same
+from symrefine.decide.pool import ALIKE, Pool, is_at
 from symrefine.decide.posterior import ALONE, EVEN, LEAST, Link, certain, meant
 from symrefine.fit.placed import Placed, elements, joined
 from symrefine.groups import PointGroup
@@ -197,6 +197,8 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
                 found = fitted(surface, moved, error_rad=look.error_rad, close=ALIKE * pool.limit)
                 if surface.openings is None or surface.viewed or found.supported >= SUPPORTED:
                     pool = _grown(surface, pool, found)
+                    # What does not hold may have elements that do, which nothing else proposes.
+                    parts += [p.placed for p in _better(found)] if found.need > pool.limit else []
     return _tried(surface, pool, parts) if parts else pool
 
 
@@ -208,6 +210,11 @@ def _holding(surface: Surface, placed: Placed, most: float) -> list[Placed]:
     every = [e.alone(placed.center) for e in elements(placed.group)]
     alone = [p for p in every if p.group.name != placed.group.name]  # of S4 one generates all of it
     return [p for p, needs in zip(alone, glances(surface, alone, most), strict=True) if needs < most]
+
+
+def _better(found: Hypothesis) -> list[Hypothesis]:
+    """The elements of a group that need less than all of it does, each alone."""
+    return [single(e) for e in found.elements if ALIKE * e.need < found.need]
 
 
 def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
@@ -306,11 +313,11 @@ def _worst(found: Hypothesis, hidden: float) -> tuple[float, float]:
     return max(found.need, hidden), max((e.deviation.mean for e in found.elements), default=0.0)
 
 
-def _best(tried: Sequence[Hypothesis], hidden: float) -> Hypothesis | None:
-    """Of groups that do not hold together the one that needs least; of those that need as little as noise the largest.
+def _best(tried: Sequence[Hypothesis], hidden: float, noise: float) -> Hypothesis | None:
+    """Of groups that do not hold together the one that needs least; of those that need as good as nothing the largest.
 
     By chance fewer operations hold than many. Of those as large it is the one that misses least in the mean; how many
-    others there are tells how sure its place is.
+    others there are that need as little, or as little as noise, tells how sure it is.
     """
 
     def rank(found: Hypothesis) -> tuple[float, float, float]:
@@ -320,9 +327,9 @@ def _best(tried: Sequence[Hypothesis], hidden: float) -> Hypothesis | None:
     best = min((h for h in tried if h.elements), key=rank, default=None)
     if best is None or best.need > hidden:
         return best
-    apart = [best.placed]
-    for other in (h.placed for h in tried if h.elements and h.need <= hidden and h.group.name == best.group.name):
-        apart += [] if any(is_same(other, p) for p in apart) else [other]
+    apart, most = [best.placed], max(ALIKE * best.need, noise)
+    for other in sorted((h for h in tried if h.elements and h.need <= most), key=rank):
+        apart += [] if any(has_all(p, other.placed) or has_all(other.placed, p) for p in apart) else [other.placed]
     return replace(best, rivals=tuple(apart[1:]))
 
 
@@ -332,12 +339,11 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     Those that no fit brings within the limit of the pool are only looked at: what larger tolerances would make of them.
     """
     surface = surface.closed if pool.whole else surface
-    elements = [single(e) for e in pool.largest.elements if e.need < pool.largest.need / ALIKE]
     near = [h for h in pool.turned_down() if h.need <= COARSE * pool.limit]
     # What is hidden by noise, or by the least tolerance that is asked for, tells no two groups apart.
     hidden = max(_hidden(surface), pool.nothing / ALIKE)
     worst = partial(_worst, hidden=hidden)
-    rest = sorted([*pool.small, *elements, pool.largest, *near], key=worst)
+    rest = sorted([*pool.small, *_better(pool.largest), pool.largest, *near], key=worst)
     known = [pool.largest, *pool.failed, *pool.small]
     links = [NOTHING]
     while rest := [h for h in rest if not links[-1].holds(h.placed)]:
@@ -356,7 +362,7 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
                 tried += [] if one is None else [one]
             tried = [h for h in tried if not _is_loose(surface, h)]
             known += tried
-            found = _best(tried, hidden)
+            found = _best(tried, hidden, _hidden(surface))
         # Directions may part what together makes the same group again.
         if found is None or found.group.name == here.group.name:
             rest = [h for h in rest if h not in batch]

@@ -48,7 +48,7 @@ class Hypothesis:
 
     `history` holds the iterates of the fit; `before` counts those of the parts that it was put together from. `seen` is
     what it needs by what was seen alone, without belief in the rest, which denies nothing either; `believed` is the
-    part, in squares, of what it needs that is belief. `rivals` are those of its name that may be meant as well as it,
+    part, in squares, of what it needs that is belief. `rivals` are those that may be meant as well as it,
     and instead of it. Where cameras are known, `told` says whether what they saw of its elements makes up the group,
     and `elsewhere` what it needs at least where it does not stand.
     """
@@ -75,8 +75,17 @@ class Hypothesis:
 
     @property
     def share(self) -> float:
-        """How likely it is this one that is meant, and none of its rivals."""
-        return 1.0 / (1.0 + len(self.rivals))
+        """How likely it is this one that is meant, if one of its name is, and none of its rivals."""
+        return 1.0 / (1.0 + self._namesakes)
+
+    @property
+    def named(self) -> float:
+        """How likely it is one of its name that is meant, and none of its rivals of another."""
+        return (1.0 + self._namesakes) / (1.0 + len(self.rivals))
+
+    @property
+    def _namesakes(self) -> int:
+        return sum(r.group.name == self.group.name for r in self.rivals)
 
     @property
     def group(self) -> PointGroup:

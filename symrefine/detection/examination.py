@@ -100,7 +100,7 @@ class Examined:
         surface, needs = self.surface, [*(h.need for h in self.links), math.inf]
         # At the tolerance that was asked for, so that a larger one takes no group away that a smaller one tells.
         placed = (
-            (1.0 - meant(Link(need=h.elsewhere), surface.tolerance, surface.floor)) * self._foreign(h)
+            (1.0 - meant(Link(need=h.elsewhere), surface.tolerance, surface.floor)) * self._foreign(h) * h.named
             for h in self.links
         )
         every = zip(self.links, needs[1:], placed, strict=True)
