@@ -6,22 +6,23 @@ from functools import cache, partial
 import numpy as np
 import pytest
 
-from experiments.objects import damage
+from experiments.objects import damage, household
 from experiments.objects.constructions import polygon
 from experiments.objects.parts import assembled, extruded
-from experiments.objects.shapes import bottle, box, join, mug, sample, table
+from experiments.objects.shapes import bottle, box, join, mug, revolve, sample, table
 from symrefine.decide.hypotheses import fitted, judged
 from symrefine.decide.looks import few_motions, looked_at
 from symrefine.decide.place import SUPPORTED, is_told, least_elsewhere
 from symrefine.detection.measure import gather, measure
 from symrefine.detection.story import detect
 from symrefine.fit.freedom import freest
-from symrefine.fit.placed import Placed, elements
+from symrefine.fit.placed import FITTED, Placed, elements
 from symrefine.fit.refine import Framed
 from symrefine.geometry import Isometry, frame_with_z, line_angle_rad, rotation
 from symrefine.groups import PointGroup
 from symrefine.propose.votes import revolution
 from symrefine.shape import Shape
+from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.skin import local_planes
 
 
@@ -243,3 +244,22 @@ def test_a_larger_tolerance_takes_no_group_away_that_a_smaller_one_tells(name):
     steps = [found.examined.decided(t).index for t in (0.02, 0.04, 0.08)]
     assert steps == sorted(steps)
     assert steps[0] > 0
+
+
+@pytest.mark.parametrize("seed", [2, 3, 14])
+def test_turns_are_judged_forth_and_back_where_a_part_was_seen(seed):
+    """By a third of a turn the spout goes out of sight, back by a third to where a camera saw that nothing is."""
+    body = revolve([(0, 0), (0.5, 0), (0.55, 0.2), (0.42, 0.6), (0.2, 0.75), (0, 0.78)])
+    kettle = join([body, household.rod((0.4, 0, 0.3), (0.85, 0, 0.65), 0.1, 0.05)])
+    made = damage.views(kettle, 1, np.random.default_rng(seed))
+    measured = measure(Shape(points=made.points, viewpoint=made.viewpoint))
+    surface = gather(measured, np.random.default_rng(0))[1]
+    center = -measured.moments.center * [1, 1, 0] / measured.moments.scale
+    assert judged(surface, Placed(group=PointGroup(name="C3"), center=center)).need > 2.0 * TOLERANCE
+
+
+@pytest.mark.parametrize("name", ["C3", "C4", "C7", "S4", "S6", "D3d"])
+def test_what_stands_for_an_element_of_a_part_that_was_seen_has_its_inverses(name):
+    for part in elements(PointGroup(name=name), powers=FITTED):
+        for matrix in part.matrices:
+            assert min(np.linalg.norm(matrix.T - other) for other in part.matrices) < 1e-9

@@ -77,7 +77,8 @@ class Operations:
 def elements(group: PointGroup, *, powers: int = 0) -> list[Operations]:
     """Every mirror, axis and rotoreflection axis of a group, and the inversion; of a continuous family, a member.
 
-    An axis stands for its smallest turn and a wide one, and for at most so many `powers` of the first.
+    An axis stands for its smallest turn and a wide one, and for at most so many `powers` of the first, forth and back:
+    of a part of a surface these carry other things out of sight.
     """
     normals = group.mirrors()
     if group.name in ("Cinfv", "Kh"):
@@ -90,7 +91,8 @@ def elements(group: PointGroup, *, powers: int = 0) -> list[Operations]:
         found.append(Operations(kind="axis", direction=direction, order=order, matrices=turns))
     for direction, order in group.improper_axes() if group.is_finite else []:
         turn = rotoreflection(direction, wide_angle_rad(int(order)))
-        found.append(Operations(kind="improper", direction=direction, order=order, matrices=(turn,)))
+        both = (turn, turn.T) if powers else (turn,)
+        found.append(Operations(kind="improper", direction=direction, order=order, matrices=both))
     if group.has_inversion:
         z = np.array([0.0, 0.0, 1.0])
         found.append(Operations(kind="inversion", direction=z, order=2.0, matrices=(-np.eye(3),)))
@@ -108,7 +110,7 @@ def _angles(order: float, powers: int) -> tuple[float, ...]:
     if math.isinf(order):
         return tuple(FREE_TURNS)
     smallest = 2.0 * math.pi / order
-    others = evenly([smallest * k for k in range(1, int(order) // 2 + 1)], powers)
+    others = evenly([smallest * k for k in range(1, int(order))], powers)
     return tuple(dict.fromkeys((wide_angle_rad(int(order)), smallest, *others)))
 
 
