@@ -4,8 +4,8 @@
 
 prints them. Families: rotors without mirrors and gears, surfaces of revolution with something to them, meshes of uneven
 area, scans with defects and their siblings, prisms for sparse clouds, objects without symmetry, clouds with something
-extreme, molecules for a ladder of tolerances, and thin-walled open vessels. Names are keys; a seed varies all
-dimensions.
+extreme, molecules for a ladder of tolerances, thin-walled open vessels, furniture of thin boards and rods. Names are
+keys; a seed varies all dimensions.
 """
 
 import zlib
@@ -14,6 +14,7 @@ import numpy as np
 
 from experiments.objects.blobs import BLOBS
 from experiments.objects.extremes import FAR
+from experiments.objects.furniture import FURNITURE
 from experiments.objects.instances import Build, Instance
 from experiments.objects.ladders import LADDERS
 from experiments.objects.lathe import ROUND
@@ -34,6 +35,7 @@ FAMILIES: dict[str, dict[str, Build]] = {
     "far": FAR,
     "tolerances": LADDERS,
     "vessels": VESSELS,
+    "furniture": FURNITURE,
 }
 
 

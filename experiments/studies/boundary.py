@@ -88,6 +88,11 @@ VIEWS: dict[str, tuple[View, ...]] = {
         View(form="cloud", points=20000, noise_rel=0.003),
         View(form="cloud", points=20000, noise_rel=0.01),
     ),
+    "furniture": (
+        MESH,
+        NOISY,
+        *(View(form="cloud", points=20000, noise_rel=s) for s in (0.003, 0.005, 0.008)),
+    ),
 }
 
 
