@@ -1,4 +1,4 @@
-"""Furniture of boards and rods as thin as the neighbourhoods of a sample, whole or with one part out of place.
+"""Furniture of boards and rods as thin as the neighbourhoods of a sample: whole, one part out of place, or one lacking.
 
 Such parts are one sheet or one line to a sample: open borders run all along them, where nothing is missing.
 """
@@ -14,7 +14,7 @@ from experiments.objects.lathe import Rng
 from experiments.objects.parts import Part, assembled, ball, block, placed_group, ring_of, rod, spun
 from symrefine.geometry import rotation
 
-# What stays, and what is repeated: of these a broken one has the first out of place.
+# What stays, and what is repeated: of these the first is out of place, or lacks.
 Parts = tuple[list[Part], list[Part]]
 
 
@@ -49,7 +49,7 @@ def bed(rng: Rng) -> Parts:
     long, wide = rng.uniform(1.9, 2.1), rng.uniform(1.4, 1.6)
     boards = [block((0.5 * long, 0, 0.3), (0.06, wide, 0.6)), block((-0.5 * long, 0, 0.5), (0.06, wide, 1.0))]
     posts = [block((x, y, 0.1), (0.1, 0.1, 0.25)) for x in _apart(0.9 * long) for y in _apart(0.9 * wide)]
-    pillows = [block((-0.37 * long, y, 0.55), (0.4, 0.6, 0.12)) for y in _apart(0.5 * wide)]
+    pillows = [block((-0.37 * long, y, 0.62), (0.4, 0.6, 0.25)) for y in _apart(0.5 * wide)]
     return [block((0, 0, 0.35), (long - 0.05, wide - 0.1, 0.3)), *boards, *posts], pillows
 
 
@@ -84,13 +84,12 @@ def trestle(rng: Rng) -> Parts:
     return [beam], [rod((0.85 * x, 0.1 * y, 0.8), (x, y, z), 0.03) for x, y, z in feet]
 
 
-def furnished(make: Callable[[Rng], Parts], whole: bool, rng: Rng) -> Instance:
-    """A piece of furniture; if it is not whole, one part stands turned about the middle and is moved as well."""
-    body, repeated = make(rng)
-    if not whole:
-        turn = rotation([0, 0, 1], rng.uniform(0.25, 0.4))
-        repeated = [repeated[0].turned(turn, (0.0, 0.0, 0.05)), *repeated[1:]]
-    return _instance([*body, *repeated])
+def furnished(make: Callable[[Rng], Parts], state: str, rng: Rng) -> Instance:
+    """A piece of furniture; if it is broken, one part stands turned about the middle and is moved as well."""
+    body, (first, *others) = make(rng)
+    turn = rotation([0, 0, 1], rng.uniform(0.45, 0.6))
+    own = {"whole": [first], "broken": [first.turned(turn, (0.0, 0.0, 0.05))], "lacking": []}[state]
+    return _instance([*body, *own, *others])
 
 
 def _apart(distance: float) -> tuple[float, float]:
@@ -104,7 +103,7 @@ def _instance(parts: Sequence[Part]) -> Instance:
 
 
 FURNITURE: dict[str, Build] = {
-    f"{make.__name__} {state}": partial(furnished, make, state == "whole")
+    f"{make.__name__} {state}": partial(furnished, make, state)
     for make in (lamp, desk, picnic, bed, shelf, stool, hatstand, trestle)
-    for state in ("whole", "broken")
+    for state in ("whole", "broken", "lacking")
 }
