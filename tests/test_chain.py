@@ -14,7 +14,7 @@ from experiments.objects.boundary import instance
 from experiments.objects.shapes import box, join, revolve, sample
 from experiments.studies import groups
 from experiments.studies.boundary import Case, look
-from symrefine.decide.chain import _best, _holding, _told_apart, _with, chain, explore
+from symrefine.decide.chain import _best, _excluded, _holding, _told_apart, _with, chain, explore
 from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted
 from symrefine.decide.looks import START_ERROR
 from symrefine.decide.pool import Pool
@@ -259,6 +259,17 @@ def test_of_groups_that_hold_and_exclude_one_another_none_is_sure():
         assert replace(found, links=(NOTHING, best)).decided(TOLERANCE).inside[1] == pytest.approx(named, abs=1e-3)
     # What needs more than noise, and more than the best, is no rival of it.
     assert _best([replace(inside, placed=tilted, need=0.1 * TOLERANCE), whole], TOLERANCE, 0.0).named == 1.0
+
+
+@pytest.mark.parametrize(("need", "kept"), [(0.5 * LIMIT, 1), (2.0 * LIMIT, 2)])
+def test_what_a_larger_group_may_hold_as_well_excludes_nothing(need, kept):
+    """Of one view of a cube two of its groups hold beside one another, and all of it nearly does."""
+    tilted, turned = (
+        Placed(group=point_group(name, rotation([1, 0, 0], np.radians(30.0))), center=ORIGIN) for name in ("C2", "C6")
+    )
+    ball = Hypothesis(placed=Placed(group=point_group("Kh"), center=ORIGIN), elements=(), need=need)
+    link = _excluded(replace(of("C6"), rivals=(tilted, turned)), [ball], LIMIT)
+    assert [r.group.name for r in link.rivals] == ["C2", "C6"][2 - kept :]
 
 
 @pytest.mark.parametrize("name", ["Cinfv", "Dinfh"])

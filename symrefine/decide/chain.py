@@ -373,7 +373,15 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
         links.append(replace(found, need=asks.need, believed=asks.believed))
         if asks.need > limit:
             break
+    links = [_excluded(link, links[i + 1 :], limit) for i, link in enumerate(links)]
     return (NOTHING, *_one_mirror(surface, links[1:]), *links[1:])
+
+
+def _excluded(link: Hypothesis, larger: Sequence[Hypothesis], limit: float) -> Hypothesis:
+    """A link without rivals of another name that a larger group within the limit may hold as well."""
+    both = [h for h in larger if h.need <= limit]
+    kept = [r for r in link.rivals if r.group.name == link.group.name or not any(h.holds(r) for h in both)]
+    return replace(link, rivals=tuple(kept))
 
 
 def _one_mirror(surface: Surface, links: Sequence[Hypothesis]) -> list[Hypothesis]:
