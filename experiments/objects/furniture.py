@@ -3,7 +3,7 @@
 Such parts are one sheet or one line to a sample: open borders run all along them, where nothing is missing.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -89,17 +89,14 @@ def furnished(make: Callable[[Rng], Parts], state: str, rng: Rng) -> Instance:
     body, (first, *others) = make(rng)
     turn = rotation([0, 0, 1], rng.uniform(0.45, 0.6))
     own = {"whole": [first], "broken": [first.turned(turn, (0.0, 0.0, 0.05))], "lacking": []}[state]
-    return _instance([*body, *own, *others])
+    parts = [*body, *own, *others]
+    group, center = placed_group(parts)
+    shape = assembled(parts)
+    return Instance(shape=shape, truth=Truth(group=group, center=center), diagonal=shape.diagonal)
 
 
 def _apart(distance: float) -> tuple[float, float]:
     return (0.5 * distance, -0.5 * distance)
-
-
-def _instance(parts: Sequence[Part]) -> Instance:
-    group, center = placed_group(parts)
-    shape = assembled(parts)
-    return Instance(shape=shape, truth=Truth(group=group, center=center), diagonal=shape.diagonal)
 
 
 FURNITURE: dict[str, Build] = {

@@ -26,11 +26,10 @@ def ends_there(surface: Surface, found: Hypothesis) -> bool:
     if surface.openings is None or surface.viewed or not surface.openings.line.any():
         return False
     line, cloud = surface.openings.line, surface.cloud
-    width, classes = 2.0 * float(np.median(cloud.reach)), cloud.classes(np.flatnonzero(line))
-    shares = []
+    classes, shares = cloud.classes(np.flatnonzero(line)), []
     for motion in _motions(found):
         away, near = cloud.nearest(motion.apply(cloud.points[line]), classes)
-        met = away < width
+        met = away < cloud.beside
         shares.append(float(surface.openings.border[near][met].sum() / max(met.sum(), 1)))
     return bool(shares) and float(np.median(shares)) > KEPT
 
@@ -58,7 +57,7 @@ def often_kept(surface: Surface, found: Hypothesis, share: float) -> bool:
     """
     every = surface.cloud.points
     some = every[:: -(-len(every) // RIMS)]
-    places, width = some[:: -(-len(some) // HOLES)], 2.0 * float(np.median(surface.cloud.reach))
+    places, width = some[:: -(-len(some) // HOLES)], surface.cloud.beside
 
     def away(points: Array) -> Array:
         """Distances [P, N] of points [N, 3] from the places."""

@@ -109,9 +109,9 @@ def _angles(order: float, powers: int) -> tuple[float, ...]:
     """Turns that together stand for an axis: the smallest one moves hardly anything, so that a wide one goes along."""
     if math.isinf(order):
         return tuple(FREE_TURNS)
-    smallest = 2.0 * math.pi / order
-    others = evenly([smallest * k for k in range(1, int(order))], powers)
-    return tuple(dict.fromkeys((wide_angle_rad(int(order)), smallest, *others)))
+    fold = int(order)
+    turns = dict.fromkeys((_wide(fold), 1, *evenly(range(1, fold), powers)))
+    return tuple(2.0 * math.pi * k / fold for k in turns)
 
 
 def wide_angle_rad(order: int) -> float:
@@ -119,8 +119,13 @@ def wide_angle_rad(order: int) -> float:
 
     The smaller part of the section: no turn by few steps comes near it.
     """
+    return 2.0 * math.pi * _wide(order) / order
+
+
+def _wide(order: int) -> int:
+    """By how many steps it turns."""
     powers = [k for k in range(1, order) if math.gcd(k, order) == 1]
-    return 2.0 * math.pi * min(powers, key=lambda k: abs(k / order - 2.0 + GOLDEN)) / order
+    return min(powers, key=lambda k: abs(k / order - 2.0 + GOLDEN))
 
 
 def fitted_matrices(group: PointGroup) -> list[Array]:

@@ -244,7 +244,7 @@ def openings(
         return Openings(line=none, border=none, evident=True, cameras=cameras, clumps=clumps, floor=floor)
     aside, width = _aside(cloud, points, tree, near)
     if floor is not None:
-        aside[floor.meets(cloud.points, 2.0 * float(np.median(cloud.reach)))] = 0.0
+        aside[floor.meets(cloud.points, cloud.beside)] = 0.0
     far = _lines(cloud, (aside > FAR_ASIDE) & ~(cloud.lonely & strays))
     far[far] = ~_folded(cloud.points[far], points, tree, None if near is None else near[far])
     if width > WIDEST or far.mean() < least * width or not far.any():
@@ -262,7 +262,7 @@ def _covered(covering: tuple[Clump | Floor, ...], points: Array) -> Mask:
 
 def _beside(cloud: LocalPlanes, some: Mask) -> Mask:
     """Which local planes [M] lie within twice the usual reach of some of them."""
-    return np.asarray(Tree(cloud.points[some]).nearest(cloud.points)[0] < 2.0 * np.median(cloud.reach))
+    return np.asarray(Tree(cloud.points[some]).nearest(cloud.points)[0] < cloud.beside)
 
 
 def _aside(cloud: LocalPlanes, points: Array, tree: Tree, near: Index | None) -> tuple[Array, float]:

@@ -27,7 +27,6 @@ AROUND = 6
 # Classes stand so far apart along a fourth coordinate (RMS radii) that no query finds a point of another class first.
 APART = 1e3
 
-
 Body = Literal["surface", "atoms", "volume"]
 
 
@@ -110,9 +109,14 @@ class LocalPlanes(Patches):
         return self
 
     @cached_property
+    def beside(self) -> float:
+        """How far off a place is that still lies beside a local plane: twice as far as they usually reach."""
+        return 2.0 * float(np.median(self.reach))
+
+    @cached_property
     def lonely(self) -> Mask:
-        """[M] which reach more than twice as far as usual: as far as at the corner of a sheet, with a quarter disc."""
-        return np.asarray(self.reach > 2.0 * np.median(self.reach))
+        """[M] which reach farther: as far as at the corner of a sheet, with a quarter disc."""
+        return np.asarray(self.reach > self.beside)
 
     @property
     def isolated(self) -> bool:
