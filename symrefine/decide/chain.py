@@ -137,7 +137,7 @@ def _of_part(surface: Surface, whole: Pool) -> Pool:
         if known.elements:
             # What holds without them asks nothing of openings, unless cameras tell how little of it was seen.
             exact = known.need <= exact_need(surface.floor) and not surface.viewed
-            again = known if exact else fitted(surface, known.placed)
+            again = known if exact else fitted(surface, known.placed, close=ALIKE * pool.limit)
             pool = _grown(surface, pool, again)
             # Of what was not seen enough to tell the whole group, enough may have been seen of its elements.
             parts += _holding(surface, again.placed, ALIKE * pool.limit) if _is_loose(surface, again) else []
@@ -162,7 +162,9 @@ def _hopeless(surface: Surface) -> float:
 def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tuple[Placed, float]]:
     """The starts that are new with what they seem to need at a glance, large groups that look good first."""
     new = [s for s in starts if pool.wants(s)]
-    seen = zip(new, glances(surface, new, _hopeless(surface)), strict=True)
+    # The little that may be missing where hardly anything is does not make a glance hopeless.
+    at = surface if surface.lacks_much else surface.closed
+    seen = zip(new, glances(at, new, _hopeless(surface)), strict=True)
     best = sorted(seen, key=lambda k: max(k[1], pool.nothing) / math.log2(1.0 + _size(k[0])))
     return best[:LOOKED] if surface.is_open else best
 

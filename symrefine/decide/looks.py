@@ -74,14 +74,15 @@ def looked_at(
     surface: Surface,
     start: Placed,
     most: float,
-    known: Callable[[Placed], bool] = lambda _: False,
+    known: Callable[[Placed, float], bool] = lambda _, __: False,
     *,
     useful: float = math.inf,
 ) -> Look:
     """A fit on a few points; one that needs more than `most` after `SHORT` steps ends, and is judged by fewer.
 
-    One that comes to what is `known` to need nothing ends there. What it asks to believe in is needed as well, and one
-    that asks for more than is `useful`, or needs more wherever it is moved sideways, stays where the fit put it.
+    One that comes to what is `known` to need nothing, or after those steps no more than it asks to believe in, ends
+    there. That is needed as well, and one that asks for more than is `useful`, or needs more wherever it is moved
+    sideways, stays where the fit put it.
     """
     state, error, history = start.roughly_framed(), start_error(surface), []
     stride = surface.stride(max(GLANCE, LOOK // len(state.standard)))
@@ -90,15 +91,18 @@ def looked_at(
         if iterate.converged or iterate.index < SHORT:
             continue
         here = start.moved(iterate.state)
-        if known(here):
+        if known(here, 0.0):
             needs, asked = 0.0, _told(surface, here, LOOK)[1]
             break
         if iterate.index == SHORT:
-            needs, asked = _told(surface, here, GLANCE)
-            if needs > most:
+            needs, asked, least = _told(surface, here, GLANCE, min(error, SPREAD * iterate.step))
+            if known(here, asked):
+                needs = 0.0
+                break
+            if needs > most or least > useful:
                 break
     else:
-        needs, asked = _told(surface, start.moved(iterate.state), LOOK)
+        needs, asked, _ = _told(surface, start.moved(iterate.state), LOOK)
         # Where noise is as thick as a surface it may draw a fit away, step by step.
         if not iterate.converged and (stayed := seems(surface, start)) < needs:
             aside, needs = slid(surface, start, stayed, useful)
@@ -113,13 +117,13 @@ def looked_at(
 
 
 def slid(surface: Surface, placed: Placed, needs: float, useful: float = math.inf) -> tuple[Placed, float]:
-    """A group that seems to need so much, moved sideways to where it needs least; of open surfaces only.
+    """A group that seems to need so much, moved sideways to where it needs least, of surfaces that lack much.
 
     Of a sofa one view shows no two sides that a mirror exchanges, and where their middle is no pair of local planes
     tells: the edges of the seat do, which have to meet one another. Where it needs more than is `useful` nowhere, it
     stays.
     """
-    if not surface.is_open or not exact_need(surface.floor) < needs <= mended(surface):
+    if not surface.lacks_much or not exact_need(surface.floor) < needs <= mended(surface):
         return placed, needs
     steps = start_error(surface) / ASIDE * np.arange(-ASIDE, ASIDE + 1.0)
     for way in _sideways(placed):
@@ -214,18 +218,21 @@ def start_error(surface: Surface) -> float:
     return AGREE_RAD if surface.is_open else START_ERROR
 
 
-def _told(surface: Surface, placed: Placed, sources: int) -> tuple[float, float]:
-    """What a group needs where it stands as it `seems`, and to be believed where nobody looked.
+def _told(surface: Surface, placed: Placed, sources: int, error_rad: float = 0.0) -> tuple[float, float, float]:
+    """What a group needs where it stands as it `seems`, to be believed where nobody looked, and at least near there.
 
-    Half of the operations of a group have to be believed, or more: the others follow.
+    Half of the operations of a group have to be believed, or more: the others follow. No image is farther off than by
+    twice what the group is, as of a mirror.
     """
     motions = few_motions(placed)
     seen = surface.seen(surface.misses(motions, sources=sources), motions, sources=sources, together=True)
     needs = float(surface.needed(seen, motions, GLANCED).max())
+    nearer = np.maximum(seen - 2.0 * error_rad / surface.diagonal, 0.0)
+    least = float(surface.needed(nearer, motions, GLANCED).max())
     if not surface.is_open or surface.viewed:
-        return needs, 0.0
+        return needs, 0.0, least
     each = [surface.coverage(miss[None], [m], sources=sources).belief for miss, m in zip(seen, motions, strict=True)]
-    return needs, surface.tolerance * sorted(each)[len(each) // 2]
+    return needs, surface.tolerance * sorted(each)[len(each) // 2], least
 
 
 def exact_need(floor: float) -> float:

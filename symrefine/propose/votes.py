@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.geometry import Array, rows, unit
+from symrefine.geometry import Array, rows
 from symrefine.propose.folds import ROUNDING
 from symrefine.shape import Index
 
@@ -41,23 +41,28 @@ def mirror_votes(
     Pairs within one flat part agree under any mirror across it and say nothing: a pair counts by how much its normals
     turn. Where all are known to point `outwards` a mirror keeps their signs, too.
     """
-    x, n, i, j = _pairs(points, normals, VOTERS, rng)
-    across, own = unit_rows(rows(x, j) - rows(x, i)), rows(n, i)
-    along = np.einsum("ki,ki->k", across, own)
-    image = own - 2.0 * along[:, None] * across
-    turned = np.einsum("ki,ki->k", image, rows(n, j))
-    agree = (turned if outwards else np.abs(turned)) > np.cos(AGREE_RAD)
-    i, j, m, worth = i[agree], j[agree], rows(across, agree), np.abs(along[agree])
-    return _densest(m, 0.5 * np.einsum("ki,ki->k", m, rows(x, i) + rows(x, j))[:, None] * m, worth, told)
-
-
-def _pairs(points: Array, normals: Array, count: int, rng: np.random.Generator) -> tuple[Array, Array, Index, Index]:
-    """Some local planes, and the pairs of them that are not next to one another."""
-    some = rng.permutation(len(points))[:count]
+    some = rng.permutation(len(points))[:VOTERS]
     x, n = points[some], normals[some]
-    i, j = np.triu_indices(len(some), 1)
-    far = ((rows(x, j) - rows(x, i)) ** 2).sum(axis=1) > FEET**-2.0
-    return x, n, i[far], j[far]
+    i, j = _mirrored(x, n, outwards=outwards)
+    across = unit_rows(rows(x, j) - rows(x, i))
+    middle = np.einsum("ki,ki->k", across, rows(x, i) + rows(x, j))
+    return _densest(across, 0.5 * middle[:, None] * across, np.abs(np.einsum("ki,ki->k", across, rows(n, i))), told)
+
+
+def _mirrored(points: Array, normals: Array, *, outwards: bool) -> tuple[Index, Index]:
+    """Pairs of local planes [N, 3], not next to one another, the normals of which the mirror between them exchanges.
+
+    It takes n_i to n_i - 2 (u.n_i) u, of which the part along n_j is m_ij - 2 (u.n_i) (u.n_j): products of matrices, in
+    single precision, which is finer than any normal.
+    """
+    x, n = points.astype(np.float32), normals.astype(np.float32)
+    squares, high = (x**2).sum(axis=1), n @ x.T
+    slopes = high - np.diag(high)[:, None]  # (x_j - x_i).n_i
+    away = squares[:, None] + squares - 2.0 * (x @ x.T)
+    far = np.triu(away > FEET**-2.0, 1)
+    turned = n @ n.T + 2.0 * slopes * slopes.T / np.where(far, away, 1.0)
+    i, j = np.nonzero(far & ((turned if outwards else np.abs(turned)) > np.cos(AGREE_RAD)))
+    return i, j
 
 
 def unit_rows(vectors: Array) -> Array:
@@ -75,31 +80,38 @@ def _densest(directions: Array, feet: Array, worth: Array, told: int = TOLD) -> 
     owner = cells @ [1, 7, 7 * 64, 7 * 64**2, 7 * 64**3, 7 * 64**4]
     order = np.argsort(owner, kind="stable")
     starts = np.flatnonzero(np.diff(owner[order], prepend=-1))
-    density = np.add.reduceat((worth / volume)[order], starts)
-    ends = np.append(starts, len(order))
-    found: list[Vote] = []
+    fullest = np.argsort(-np.add.reduceat((worth / volume)[order], starts))[: 8 * told]
+    middles = (m[fullest] for m in _middles(rows(directions, order), rows(feet, order), worth[order], starts))
+    known, count = np.zeros((2, told, 3)), 0
 
-    def middle(votes: Index) -> Vote:
-        voted, count = rows(directions, votes), worth[votes]
-        sign = np.where(voted @ voted[0] < 0.0, -1.0, 1.0)
-        return Vote(direction=unit((count * sign) @ voted), foot=count @ rows(feet, votes) / count.sum())
+    def is_known(direction: Array, foot: Array) -> bool:
+        along = np.abs(known[0, :count] @ direction) > np.cos(AGREE_RAD)
+        return bool((along & (((known[1, :count] - foot) ** 2).sum(axis=1) < FEET**-2.0)).any())
 
-    def is_known(here: Vote) -> bool:
-        near = (v for v in found if abs(v.direction @ here.direction) > np.cos(AGREE_RAD))
-        return any(np.linalg.norm(v.foot - here.foot) < 1.0 / FEET for v in near)
-
-    for cell in np.argsort(-density)[: 8 * told]:
-        here = middle(order[ends[cell] : ends[cell + 1]])
-        if is_known(here):
+    for direction, foot in zip(*middles, strict=True):
+        if is_known(direction, foot):
             continue
         # One sweep over all is quicker than a tree of directions and feet would be made.
-        along = np.flatnonzero(np.abs(directions @ here.direction) > np.cos(AGREE_RAD))
-        votes = along[((rows(feet, along) - here.foot) ** 2).sum(axis=1) < FEET**-2.0]
-        if votes.size and not is_known(here := middle(votes)):
-            found.append(here)
-        if len(found) == told:
+        along = np.flatnonzero(np.abs(directions @ direction) > np.cos(AGREE_RAD))
+        votes = along[((rows(feet, along) - foot) ** 2).sum(axis=1) < FEET**-2.0]
+        if not votes.size:
+            continue
+        here = [m[0] for m in _middles(rows(directions, votes), rows(feet, votes), worth[votes], np.zeros(1, int))]
+        if not is_known(*here):
+            known[:, count] = here
+            count += 1
+        if count == told:
             break
-    return found
+    return [Vote(direction=d, foot=f) for d, f in known[:, :count].transpose(1, 0, 2)]
+
+
+def _middles(directions: Array, feet: Array, worth: Array, starts: Index) -> tuple[Array, Array]:
+    """Mean unit vectors [C, 3], without a sign, and feet [C, 3] of groups of votes [K], each from `starts` [C] on."""
+    counts = np.diff(starts, append=len(worth))
+    first = np.repeat(rows(directions, starts), counts, axis=0)
+    signed = np.where(np.einsum("ki,ki->k", directions, first) < 0.0, -worth, worth)
+    sums = np.add.reduceat(np.column_stack([signed[:, None] * directions, worth[:, None] * feet, worth]), starts)
+    return unit_rows(sums[:, :3]), sums[:, 3:6] / sums[:, 6:]
 
 
 def _cells(directions: Array, feet: Array) -> tuple[Index, Array]:

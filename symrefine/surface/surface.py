@@ -109,6 +109,13 @@ class Surface:
         """Whether parts of it may be missing: cameras did not see them, or it ends somewhere. A clump only hides."""
         return self.viewed or (self.openings is not None and bool(self.openings.line.any()))
 
+    @property
+    def lacks_much(self) -> bool:
+        """Whether much of it may be missing: what it ends at is no whim of the sample, or it stands on something."""
+        if self.openings is None or not self.is_open:
+            return False
+        return self.openings.evident or self.openings.floor is not None
+
     @cached_property
     def closed(self) -> "Surface":
         """The surface taken as whole: it ends where it does, and something may hide parts of it."""
