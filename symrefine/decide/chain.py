@@ -137,7 +137,7 @@ def _of_part(surface: Surface, whole: Pool) -> Pool:
         if known.elements:
             # What holds without them asks nothing of openings, unless cameras tell how little of it was seen.
             exact = known.need <= exact_need(surface.floor) and not surface.viewed
-            again = known if exact else fitted(surface, known.placed, close=ALIKE * pool.limit)
+            again = known if exact else fitted(surface, known.placed)
             pool = _grown(surface, pool, again)
             # Of what was not seen enough to tell the whole group, enough may have been seen of its elements.
             parts += _holding(surface, again.placed, ALIKE * pool.limit) if _is_loose(surface, again) else []

@@ -109,21 +109,21 @@ def looked_at(
             return Look(placed=aside, history=tuple(history[:1]), needs=needs, error_rad=error)
     off = max(iterate.step, math.sqrt(max(float(np.diag(iterate.covariance).max()), 0.0)))
     aside = start.moved(iterate.state)
-    # Where it asks to believe in too much it is not worth a search.
-    if asked <= useful:
+    # Where it asks to believe in too much it is not worth a search, and where little is missing most of it tells.
+    if asked <= useful and surface.lacks_much:
         aside, needs = slid(surface, aside, needs, useful)
     needs = math.hypot(needs, asked)
     return Look(placed=aside, history=tuple(history), needs=needs, error_rad=min(error, SPREAD * off))
 
 
 def slid(surface: Surface, placed: Placed, needs: float, useful: float = math.inf) -> tuple[Placed, float]:
-    """A group that seems to need so much, moved sideways to where it needs least, of surfaces that lack much.
+    """A group that seems to need so much, moved sideways to where it needs least; of open surfaces only.
 
     Of a sofa one view shows no two sides that a mirror exchanges, and where their middle is no pair of local planes
     tells: the edges of the seat do, which have to meet one another. Where it needs more than is `useful` nowhere, it
     stays.
     """
-    if not surface.lacks_much or not exact_need(surface.floor) < needs <= mended(surface):
+    if not surface.is_open or not exact_need(surface.floor) < needs <= mended(surface):
         return placed, needs
     steps = start_error(surface) / ASIDE * np.arange(-ASIDE, ASIDE + 1.0)
     for way in _sideways(placed):
@@ -227,9 +227,12 @@ def _told(surface: Surface, placed: Placed, sources: int, error_rad: float = 0.0
     motions = few_motions(placed)
     seen = surface.seen(surface.misses(motions, sources=sources), motions, sources=sources, together=True)
     needs = float(surface.needed(seen, motions, GLANCED).max())
+    if not surface.is_open:
+        return needs, 0.0, 0.0
+    # Misses end early on open surfaces, so that a group may need more than it seems to.
     nearer = np.maximum(seen - 2.0 * error_rad / surface.diagonal, 0.0)
     least = float(surface.needed(nearer, motions, GLANCED).max())
-    if not surface.is_open or surface.viewed:
+    if surface.viewed:
         return needs, 0.0, least
     each = [surface.coverage(miss[None], [m], sources=sources).belief for miss, m in zip(seen, motions, strict=True)]
     return needs, surface.tolerance * sorted(each)[len(each) // 2], least
