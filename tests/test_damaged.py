@@ -565,6 +565,12 @@ def test_what_ends_all_along_misses_no_part(ends, group):
     assert found.point_group == group
 
 
+def test_a_border_that_hides_nothing_is_none():
+    """Where hardly anything seems open what explains more has to lie there: not at the feet of a stool, a leg aside."""
+    told = boundary.run(boundary.Case(family="furniture", name="stool broken", view=3, seed=93))
+    assert told.outcome == "right"
+
+
 def test_a_surface_that_is_whole_is_judged_as_that_to_the_end():
     """What is fitted last, too: a hole is then none, but where the object ends."""
     mesh, truth = specimen("shape", "table")

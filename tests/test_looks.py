@@ -10,7 +10,7 @@ import pytest
 from experiments.objects import damage
 from experiments.objects.shapes import box, join, mug, sample, table
 from symrefine.decide import chain, looks
-from symrefine.decide.looks import ASIDE, LOOK, START_ERROR, glances, looked_at, start_error
+from symrefine.decide.looks import ASIDE, LOOK, SHORT, START_ERROR, glances, looked_at, start_error
 from symrefine.detection.measure import gather, measure
 from symrefine.fit.placed import Placed
 from symrefine.fit.refine import refine
@@ -99,11 +99,20 @@ def test_what_asks_to_believe_in_as_much_as_was_seen_is_not_slid(monkeypatch):
     asked = as_told(surface, through, LOOK)[1]
     assert asked > surface.tolerance
     monkeypatch.setattr(looks, "seems", lambda *_: 0.0)
-    monkeypatch.setattr(looks, "_told", lambda *args: (0.0, as_told(*args)[1]))
+    monkeypatch.setattr(looks, "_told", lambda *args: (0.0, as_told(*args)[1], 0.0))
     monkeypatch.setattr(looks, "refine", lambda *args, **options: islice(refine(*args, **options), 1))
     monkeypatch.setattr(looks, "slid", lambda *_: pytest.fail("it is not worth a search"))
     look = looked_at(surface, through, np.inf, useful=0.5 * surface.tolerance)
     assert look.needs == as_told(surface, look.placed, LOOK)[1] > 0.5 * surface.tolerance
+
+
+def test_what_is_missed_by_more_than_it_may_be_off_ends_early():
+    """Misses end where hardly any candidate is worth more, so that a handle on one side needs little less than fits."""
+    surface, center = surface_of("mug")
+    across = Placed(group=PointGroup(name="Cs", frame=frame_with_z(np.eye(3)[0])), center=center)
+    whole, early = (looked_at(surface, across, np.inf, useful=most) for most in (np.inf, 1.5 * surface.tolerance))
+    assert len(early.history) == SHORT + 1 < len(whole.history)
+    assert whole.needs > 1.5 * surface.tolerance
 
 
 @pytest.mark.parametrize("evident", [False, True])

@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 from operator import attrgetter
 
-from symrefine.decide.ends import PLACES, ends_there, ends_too, often_kept, places
+from symrefine.decide.ends import PLACES, ends_there, ends_too, hides_there, often_kept, places
 from symrefine.decide.hypotheses import (
     NOTHING,
     SAME_RAD,
@@ -83,7 +83,7 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     hidden = max((e.coverage.unseen for e in part.largest.elements), default=0.0)
     # A group that a single hole leaves may keep its border because it keeps the border of almost any.
     ends = ends and not (more and often_kept(surface, whole.largest, hidden))
-    missing = (evident or (more and hidden <= ENCLOSED)) and not ends
+    missing = (evident or (more and hidden <= ENCLOSED and hides_there(surface, part.largest))) and not ends
     missing = missing or places(whole.largest, part.largest) >= PLACES
     if missing and not (more and ends_too(surface, part.largest, ALIKE * limit)):
         return replace(part, at_least=True)

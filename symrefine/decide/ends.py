@@ -5,9 +5,11 @@ import math
 import numpy as np
 
 from symrefine.decide.hypotheses import Hypothesis, seen_to_end
+from symrefine.decide.looks import few_motions
 from symrefine.geometry import Array, Isometry
-from symrefine.surface.openings import TELLING
+from symrefine.surface.openings import MOST, TELLING
 from symrefine.surface.surface import Surface
+from symrefine.surface.tree import Tree
 
 # Share of its open borders, of those that it carries to where anything was seen, that a group carries onto open borders
 # where the object ends there: most. Flat plates 1, mugs 0.6 and more; holes and cuts on one side of a mirror up to 0.5.
@@ -44,6 +46,22 @@ def ends_too(surface: Surface, found: Hypothesis, limit: float) -> bool:
         return False  # what cameras see to be free says it
     few = len(found.placed.motions()) < TELLING
     return ends_there(surface, found) if few else seen_to_end(surface, found) > limit
+
+
+def hides_there(surface: Surface, found: Hypothesis) -> bool:
+    """Whether one in so many of the places at open borders is where a group carries something that nobody saw.
+
+    A patch is unseen if it begins at a border; a border that hides nothing may be a whim of the sample.
+    """
+    if surface.openings is None or not (motions := few_motions(found.placed)):
+        return False
+    cloud, line = surface.cloud, surface.openings.line
+    unseen = np.isnan(surface.seen(surface.misses(motions), motions, together=True))
+    shares = [
+        float(np.mean(Tree(m.apply(cloud.points[hidden])).nearest(cloud.points[line])[0] < cloud.beside))
+        for m, hidden in zip(motions, unseen, strict=True)
+    ]
+    return MOST * float(np.median(shares)) >= 1.0
 
 
 def _motions(found: Hypothesis) -> list[Isometry]:

@@ -74,14 +74,14 @@ def looked_at(
     surface: Surface,
     start: Placed,
     most: float,
-    known: Callable[[Placed, float], bool] = lambda _, __: False,
+    known: Callable[[Placed], bool] = lambda _: False,
     *,
     useful: float = math.inf,
 ) -> Look:
     """A fit on a few points; one that needs more than `most` after `SHORT` steps ends, and is judged by fewer.
 
-    One that comes to what is `known` to need nothing, or after those steps no more than it asks to believe in, ends
-    there. That is needed as well, and one that asks for more than is `useful`, or needs more wherever it is moved
+    One that comes to what is `known` to need nothing ends there, and one that will need more than is `useful`. What it
+    asks to believe in is needed as well, and one that asks for more than that, or needs more wherever it is moved
     sideways, stays where the fit put it.
     """
     state, error, history = start.roughly_framed(), start_error(surface), []
@@ -91,14 +91,13 @@ def looked_at(
         if iterate.converged or iterate.index < SHORT:
             continue
         here = start.moved(iterate.state)
-        if known(here, 0.0):
+        if known(here):
             needs, asked = 0.0, _told(surface, here, LOOK)[1]
             break
         if iterate.index == SHORT:
-            needs, asked, least = _told(surface, here, GLANCE, min(error, SPREAD * iterate.step))
-            if known(here, asked):
-                needs = 0.0
-                break
+            # No image is farther off than by twice what the group may be, as of a mirror.
+            reach = 2.0 * min(error, SPREAD * iterate.step) / surface.diagonal
+            needs, asked, least = _told(surface, here, GLANCE, reach)
             if needs > most or least > useful:
                 break
     else:
@@ -218,11 +217,11 @@ def start_error(surface: Surface) -> float:
     return AGREE_RAD if surface.is_open else START_ERROR
 
 
-def _told(surface: Surface, placed: Placed, sources: int, error_rad: float = 0.0) -> tuple[float, float, float]:
+def _told(surface: Surface, placed: Placed, sources: int, reach: float = 0.0) -> tuple[float, float, float]:
     """What a group needs where it stands as it `seems`, to be believed where nobody looked, and at least near there.
 
-    Half of the operations of a group have to be believed, or more: the others follow. No image is farther off than by
-    twice what the group is, as of a mirror.
+    Half of the operations of a group have to be believed, or more: the others follow. Near is where images are no more
+    than `reach` away, a fraction of the diagonal.
     """
     motions = few_motions(placed)
     seen = surface.seen(surface.misses(motions, sources=sources), motions, sources=sources, together=True)
@@ -230,7 +229,7 @@ def _told(surface: Surface, placed: Placed, sources: int, error_rad: float = 0.0
     if not surface.is_open:
         return needs, 0.0, 0.0
     # Misses end early on open surfaces, so that a group may need more than it seems to.
-    nearer = np.maximum(seen - 2.0 * error_rad / surface.diagonal, 0.0)
+    nearer = np.maximum(seen - reach, 0.0)
     least = float(surface.needed(nearer, motions, GLANCED).max())
     if surface.viewed:
         return needs, 0.0, least
