@@ -81,7 +81,7 @@ KIND_OF = {
         "align.sides": "ORDERS",
         "align.witnesses": "ASKED",
         "complete": "ROUND",
-        "decide.chain": "HOPELESS HOPELESS_VOTES LOOKED SINGLY",
+        "decide.chain": "LOOKED SINGLY",
         "decide.ends": "HOLES RIMS",
         "decide.hypotheses": "MOVED MOVED_EACH",
         "decide.looks": "GLANCE LOOK COARSE SHORT GLANCED ASIDE START_ERROR",

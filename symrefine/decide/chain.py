@@ -22,7 +22,7 @@ from symrefine.decide.hypotheses import (
     roughly_judged,
     single,
 )
-from symrefine.decide.looks import COARSE, START_ERROR, exact_need, glances, looked_at
+from symrefine.decide.looks import COARSE, exact_need, glances, hopeless, looked_at, start_error
 from symrefine.decide.place import SUPPORTED, least_elsewhere
 from symrefine.decide.pool import ALIKE, Pool, is_at
 from symrefine.decide.posterior import ALONE, EVEN, LEAST, Link, certain, meant
@@ -38,13 +38,8 @@ from symrefine.propose.candidates import (
     turned_over,
     voted_mirrors,
 )
-from symrefine.propose.votes import AGREE_RAD
-from symrefine.surface.misses import LIMITS
 from symrefine.surface.surface import Surface
 
-# What a start that is off by START_ERROR may miss by: half a diagonal is the longest lever. Votes know no more than to
-# AGREE_RAD.
-HOPELESS, HOPELESS_VOTES = 0.5 * START_ERROR / LIMITS[0], 0.5 * AGREE_RAD / LIMITS[0]
 # Share of a surface that a border encloses at most which is too short to be evident: of a ball that is 3 %, by the
 # isoperimetric inequality, and four times that where half of the border was seen.
 ENCLOSED = 0.12
@@ -111,7 +106,7 @@ def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float
         starts = [*beside(pool.largest.placed), *starts]
     pool = _with(surface, pool, starts)
     for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
-        if glance < HOPELESS and pool.wants(axis):
+        if glance < hopeless(start_error(surface)) and pool.wants(axis):
             pool = _with(surface, pool, about(evidence, axis.group.frame[2]))
     # Turns that hold better than the largest group may have half turns across them which that has not.
     better = [h for h in pool.small if ALIKE * h.need < pool.largest.need]
@@ -133,15 +128,22 @@ def _with_vertices(surface: Surface, pool: Pool, known: Placed, *, proven: bool)
 
 def _of_part(surface: Surface, whole: Pool) -> Pool:
     pool, parts = Pool(nothing=whole.nothing, limit=whole.limit), list[Placed]()
-    for known in (whole.largest, *whole.small):
-        if known.elements:
-            # What holds without them asks nothing of openings, unless cameras tell how little of it was seen.
-            exact = known.need <= exact_need(surface.floor) and not surface.viewed
-            again = known if exact else fitted(surface, known.placed)
-            pool = _grown(surface, pool, again)
-            # Of what was not seen enough to tell the whole group, enough may have been seen of its elements.
-            parts += _holding(surface, again.placed, ALIKE * pool.limit) if _is_loose(surface, again) else []
+    known = [h for h in (whole.largest, *whole.small) if h.elements]
+    # What holds without them asks nothing of openings, unless cameras tell how little of it was seen.
+    exact = [] if surface.viewed else [h for h in known if h.need <= exact_need(surface.floor)]
+    for found in exact:
+        pool = _grown(surface, pool, found)
     voted = [*voted_mirrors(surface.cloud), *repeated(surface.cloud, surface.diagonal)]
+    if not surface.viewed:
+        # Votes find most of what was found of the whole, and better, as nothing that is missing biases them.
+        pool, voted = _with(surface, pool, voted), []
+    for h in known:
+        if h in exact or (not surface.viewed and pool.has(h.placed, h.need)):
+            continue
+        again = fitted(surface, h.placed)
+        pool = _grown(surface, pool, again)
+        # Of what was not seen enough to tell the whole group, enough may have been seen of its elements.
+        parts += _holding(surface, again.placed, ALIKE * pool.limit) if _is_loose(surface, again) else []
     return _with(surface, pool, [*parts, *voted])
 
 
@@ -154,17 +156,13 @@ def _with(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
     return pool
 
 
-def _hopeless(surface: Surface) -> float:
-    """What a candidate may seem to need at a glance, from how far it may be off."""
-    return HOPELESS_VOTES if surface.is_open else HOPELESS
-
-
 def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tuple[Placed, float]]:
     """The starts that are new with what they seem to need at a glance, large groups that look good first."""
     new = [s for s in starts if pool.wants(s)]
-    # The little that may be missing where hardly anything is does not make a glance hopeless.
-    at = surface if surface.lacks_much else surface.closed
-    seen = zip(new, glances(at, new, _hopeless(surface)), strict=True)
+    # What they carry to where nobody looked tells little of their order, and takes long to be told.
+    blind = surface.is_open and not surface.viewed
+    at, most = (surface.closed, surface.hopeless) if blind else (surface, hopeless(start_error(surface)))
+    seen = zip(new, glances(at, new, most), strict=True)
     best = sorted(seen, key=lambda k: max(k[1], pool.nothing) / math.log2(1.0 + _size(k[0])))
     return best[:LOOKED] if surface.is_open else best
 
@@ -184,10 +182,10 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
     for start, glance in _glanced(surface, pool, starts):
         if not pool.wants(start) or pool.shows(start, glance):
             continue
-        if glance >= _hopeless(surface):
+        if glance >= hopeless(start_error(surface)):
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
             continue
-        look = looked_at(surface, start, COARSE * pool.limit, pool.has, useful=ALIKE * pool.limit)
+        look = looked_at(surface, start, COARSE * pool.limit, pool.shown, useful=ALIKE * pool.limit)
         moved, needs = look.placed, look.needs
         pool = replace(pool, looks=(*pool.looks, (glance, moved)))
         if needs > ALIKE * pool.limit:

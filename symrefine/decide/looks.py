@@ -212,6 +212,11 @@ def mended(surface: Surface) -> float:
     return 2.0 * start_error(surface) / (LIMITS[1] * surface.diagonal)  # a mirror takes what it is off by twice
 
 
+def hopeless(error_rad: float) -> float:
+    """What a candidate so far off may seem to need at a glance: half a diagonal is the longest lever."""
+    return 0.5 * error_rad / LIMITS[0]
+
+
 def start_error(surface: Surface) -> float:
     """How far a start may be off: moments know no more where surface is missing than votes do."""
     return AGREE_RAD if surface.is_open else START_ERROR

@@ -1,5 +1,6 @@
 """What was found so far: groups fitted, joined, turned down, and which starts they make needless."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -57,6 +58,11 @@ class Pool:
         """Whether a group is in one that was fitted and needs no more than it does, or as good as nothing."""
         most = max(ALIKE * needs, self.nothing)
         return any(h.need <= most and h.holds(placed) for h in (self.largest, *self.small))
+
+    def shown(self, placed: Placed) -> bool:
+        """Whether a group is in one that was fitted and needs as good as nothing but belief in what was not seen."""
+        most = self.nothing
+        return any(h.need <= math.hypot(most, h.believed) and h.holds(placed) for h in (self.largest, *self.small))
 
     def wants(self, start: Placed) -> bool:
         """Whether a group is in none that is as good as exact, and something may hold both it and the largest.

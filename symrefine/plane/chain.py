@@ -7,8 +7,7 @@ from functools import reduce
 
 import numpy as np
 
-from symrefine.decide.chain import HOPELESS
-from symrefine.decide.looks import LOOK, START_ERROR, exact_need
+from symrefine.decide.looks import LOOK, START_ERROR, exact_need, hopeless
 from symrefine.decide.pool import ALIKE
 from symrefine.decide.posterior import NEAR
 from symrefine.fit.placed import DIRECTION_ERROR
@@ -53,7 +52,7 @@ def explore(outlines: Outlines, hint_rad: float | None, limit: float) -> tuple[H
         hint_rad: the line of the doublets, where they have one.
         limit: what starts that are worth a fit may need, as a fraction of the diagonal.
     """
-    limit += HOPELESS
+    limit += hopeless(START_ERROR)
     center = np.zeros(2)
     endless = _judged(outlines, Placed(fold=math.inf, mirrored=True, center=center))
     # So many directions that one is off by a quarter of what a start may be off by.

@@ -132,6 +132,11 @@ class Surface:
         """Misses from which on a point meets no surface, a fraction of the diagonal."""
         return LIMITS[1] * self.tolerance
 
+    @property
+    def hopeless(self) -> float:
+        """What is needed from which on nothing is told apart of an open surface."""
+        return HOPELESS * self.tolerance
+
     def stride(self, sources: int) -> int:
         """Stride that leaves about `sources` local planes; enough for the patches of an image to hang together."""
         return max(1, len(self.cloud.points) // max(sources, PATCHES if self.is_open else 1))
@@ -148,7 +153,7 @@ class Surface:
             discs: as of `disc_distances`.
         """
         stride = self.stride(sources)
-        bound = min(bound, HOPELESS * LIMITS[-1] * self.tolerance) if self.is_open else bound
+        bound = min(bound, LIMITS[-1] * self.hopeless) if self.is_open else bound
         bound *= self.diagonal
         return miss_distances(self.cloud, motions, stride=stride, bound=bound, discs=discs) / self.diagonal
 
