@@ -1,5 +1,6 @@
 """Chains of groups: one inside the next, needs ascending, exact elements first; more tolerance, more group."""
 
+import math
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -302,6 +303,18 @@ def test_a_start_that_looks_no_better_is_not_looked_at_where_a_look_has_been():
     assert not pool.shows(mirror(0.02), 0.019)
     assert not pool.shows(mirror(2.1 * START_ERROR), 0.02)
     assert not pool.shows(Placed(group=mirror(0.02).group, center=np.array([0.2, 0.0, 0.0])), 0.02)
+
+
+def test_what_needs_but_belief_shows_its_elements():
+    """Of what was seen nothing denies it: a look at one of them would end where it stands."""
+    frame = random_orthogonal(np.random.default_rng(3), det=1)
+    whole, turn = (Placed(group=point_group(name, frame), center=ORIGIN) for name in ("C4v", "C3"))
+    mirror = Placed(group=point_group("Cs", frame_with_z(frame[0])), center=ORIGIN)
+    for believed, shown in ((0.009, True), (0.008, False)):
+        known = Hypothesis(placed=whole, elements=NOTHING.elements, need=math.hypot(0.009, 0.001), believed=believed)
+        pool = Pool(small=(known,), nothing=0.0011)
+        assert [pool.shown(p) for p in (whole, mirror, turn)] == [shown, shown, False]
+        assert not pool.has(mirror)
 
 
 # What is explored

@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -30,13 +31,13 @@ from symrefine.detection.measure import HIDDEN, gather, measure
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.fit.placed import FREE_TURNS, Placed
-from symrefine.geometry import Isometry, frame_with_z, householder, line_angle_rad, random_orthogonal, rotation
+from symrefine.geometry import Isometry, frame_with_z, householder, line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.groups import PointGroup, is_subgroup, point_group
 from symrefine.load import load
 from symrefine.picture.words import scanned
 from symrefine.propose.candidates import repeated
 from symrefine.propose.maps import maps_onto_itself
-from symrefine.propose.votes import mirror_votes, revolution
+from symrefine.propose.votes import AGREE_RAD, FEET, _mirrored, mirror_votes, revolution
 from symrefine.shape import CAMERAS, Shape
 from symrefine.surface.cameras import cameras, outwards, unclosed
 from symrefine.surface.clumps import Clump, clump_among
@@ -679,6 +680,19 @@ def test_votes_know_no_centroid(seed):
         assert min(line_angle_rad(v.direction, normal) for v in found) < np.radians(8.0)
     again = mirror_votes(surface.cloud.points + 5.0, surface.cloud.normals, np.random.default_rng(0))
     assert len(again) > 0
+
+
+@pytest.mark.parametrize("outwards", [False, True])
+def test_pairs_vote_for_the_mirrors_that_exchange_their_normals(outwards):
+    rng = np.random.default_rng(17)
+    points, normals = rng.normal(size=(60, 3)), unit(rng.normal(size=(60, 3)))
+    told = set(zip(*(v.tolist() for v in _mirrored(points + 3.0, normals, outwards=outwards)), strict=True))
+    for i, j in combinations(range(60), 2):
+        across = unit(points[j] - points[i])
+        turned = float((householder(across) @ normals[i]) @ normals[j])
+        far = np.linalg.norm(points[j] - points[i]) > 1.0 / FEET
+        assert ((i, j) in told) == (far and (turned if outwards else abs(turned)) > np.cos(AGREE_RAD))
+    assert len(told) > 5
 
 
 @pytest.mark.parametrize(

@@ -49,9 +49,9 @@ def ends_too(surface: Surface, found: Hypothesis, limit: float) -> bool:
 
 
 def hides_there(surface: Surface, found: Hypothesis) -> bool:
-    """Whether one in so many of the places at open borders is where a group carries something that nobody saw.
+    """Whether a group carries something that nobody saw to one in `MOST` of the places at open borders.
 
-    A patch is unseen if it begins at a border; a border that hides nothing may be a whim of the sample.
+    As a patch is unseen only where it begins at a border, a border that hides nothing may be a whim of the sample.
     """
     if surface.openings is None or not (motions := few_motions(found.placed)):
         return False

@@ -55,7 +55,7 @@ def _mirrored(points: Array, normals: Array, *, outwards: bool) -> tuple[Index, 
     It takes n_i to n_i - 2 (u.n_i) u, of which the part along n_j is m_ij - 2 (u.n_i) (u.n_j): products of matrices, in
     single precision, which is finer than any normal.
     """
-    x, n = points.astype(np.float32), normals.astype(np.float32)
+    x, n = (v.astype(np.float32) for v in (points - points.mean(axis=0), normals))
     squares, high = (x**2).sum(axis=1), n @ x.T
     slopes = high - np.diag(high)[:, None]  # (x_j - x_i).n_i
     away = squares[:, None] + squares - 2.0 * (x @ x.T)
