@@ -666,6 +666,12 @@ def test_the_corner_of_a_cube_says_at_least():
     assert (found.point_group, found.at_least) == ("C3v", True)
 
 
+def test_what_is_no_clump_by_one_group_may_be_one_by_another():
+    """What most operations of a group carry to where nothing is holds more than the clump alone: each is asked."""
+    case = damaged.Case(family="shape", name="crate", kind="clump", strength=0.05, seed=3202)
+    assert damaged.run(case).right
+
+
 # Votes
 
 

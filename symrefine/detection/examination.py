@@ -229,17 +229,12 @@ def _strangers(found: Examined, points: Array, tolerance: float) -> tuple[Index,
     own = np.setdiff1d(np.arange(len(points)), np.concatenate(measured.apart), assume_unique=True)
     local = (points[own] - measured.moments.center) / measured.moments.scale
     some = MOVED // 4
-    planes = surface.cloud.points[:: surface.stride(some)]
-    nearest, asked = Tree(planes).nearest(local)[1], np.zeros(len(planes), dtype=bool)
+    nearest = Tree(surface.cloud.points[:: surface.stride(some)]).nearest(local)[1]
     for rival in rivals:
-        if not 0.0 < _unmet(surface, rival.placed, LOOK).mean() <= CLUMP:
-            continue
-        unmet = _unmet(surface, rival.placed, some)
-        if 2 * (unmet & asked).sum() > unmet.sum():
-            continue  # what is no clump is none, whichever group it speaks against
-        if (group := clump_among(local, unmet[nearest])).size:
-            return (own[group],)
-        asked |= unmet
+        if 0.0 < _unmet(surface, rival.placed, LOOK).mean() <= CLUMP:
+            unmet = _unmet(surface, rival.placed, some)
+            if (group := clump_among(local, unmet[nearest])).size:
+                return (own[group],)
     return ()
 
 
