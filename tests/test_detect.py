@@ -683,7 +683,9 @@ def test_steps_of_the_staircase_are_undetermined_where_noise_hides_them():
     assert found.staircase[0].undetermined
 
 
-@pytest.mark.parametrize(("name", "truth"), [("swivel_base7", "C1"), ("snub_balls", "C1")])
+@pytest.mark.parametrize(
+    ("name", "truth"), [("swivel_base7", "C1"), pytest.param("snub_balls", "C1", marks=pytest.mark.slow)]
+)
 def test_a_part_out_of_place_is_told_from_its_counterparts(name, truth):
     """One part of many, 3 % of the diagonal out of place, at the default tolerance."""
     cloud = sample(group_shapes.shape(name, True), 20000, 0.0, np.random.default_rng(0))
