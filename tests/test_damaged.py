@@ -334,7 +334,7 @@ def test_a_group_of_an_open_surface_that_a_strict_limit_turned_down_is_fitted_un
     assert len(again.elements) == 1
 
 
-@pytest.mark.parametrize("name", ["chair", "starfish", "swirl4", "plastic_cup"])
+@pytest.mark.parametrize("name", ["chair", "starfish", "swirl4", pytest.param("plastic_cup", marks=pytest.mark.slow)])
 def test_a_clump_of_few_points_that_touches_the_body_is_found_by_what_it_speaks_against(name):
     family = "catalogue" if name in damaged.REAL else "shape"
     if family == "catalogue" and name not in damaged.catalogue():
