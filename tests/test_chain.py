@@ -313,7 +313,7 @@ def test_what_needs_but_belief_shows_its_elements():
     for believed, shown in ((0.009, True), (0.008, False)):
         known = Hypothesis(placed=whole, elements=NOTHING.elements, need=math.hypot(0.009, 0.001), believed=believed)
         pool = Pool(small=(known,), nothing=0.0011)
-        assert [pool.shown(p) for p in (whole, mirror, turn)] == [shown, shown, False]
+        assert [pool.has_as_seen(p) for p in (whole, mirror, turn)] == [shown, shown, False]
         assert not pool.has(mirror)
 
 

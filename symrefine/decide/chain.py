@@ -70,7 +70,7 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     ends, evident = ends_there(surface, whole.largest), surface.openings.evident
     if not whole.largest.group.is_polar and (ends or not evident):
         return replace(whole, at_least=evident)  # no single hole leaves such a group, and there is hardly one
-    evident = evident or surface.openings.floor is not None  # nobody saw the bottom of what stands on one
+    evident = surface.openings.hide_much
     part = _of_part(surface, whole)
     more = _size(part.largest.placed) > _size(whole.largest.placed)
     # What may not be open at all is missing a part only where that explains more, and no more than so short a border
@@ -127,24 +127,25 @@ def _with_vertices(surface: Surface, pool: Pool, known: Placed, *, proven: bool)
 
 
 def _of_part(surface: Surface, whole: Pool) -> Pool:
-    pool, parts = Pool(nothing=whole.nothing, limit=whole.limit), list[Placed]()
+    pool = Pool(nothing=whole.nothing, limit=whole.limit)
     known = [h for h in (whole.largest, *whole.small) if h.elements]
-    # What holds without them asks nothing of openings, unless cameras tell how little of it was seen.
-    exact = [] if surface.viewed else [h for h in known if h.need <= exact_need(surface.floor)]
-    for found in exact:
-        pool = _grown(surface, pool, found)
     voted = [*voted_mirrors(surface.cloud), *repeated(surface.cloud, surface.diagonal)]
-    if not surface.viewed:
-        # Votes find most of what was found of the whole, and better, as nothing that is missing biases them.
-        pool, voted = _with(surface, pool, voted), []
+    if surface.viewed:
+        parts = list[Placed]()
+        for h in known:
+            again = fitted(surface, h.placed)
+            pool = _grown(surface, pool, again)
+            # Of what was not seen enough to tell the whole group, enough may have been seen of its elements.
+            parts += _holding(surface, again.placed, ALIKE * pool.limit) if _is_loose(surface, again) else []
+        return _with(surface, pool, [*parts, *voted])
+    # What holds without them asks nothing of openings.
+    for h in (h for h in known if h.need <= exact_need(surface.floor)):
+        pool = _grown(surface, pool, h)
+    # Votes find most of what was found of the whole, and better, as nothing that is missing biases them.
+    pool = _with(surface, pool, voted)
     for h in known:
-        if h in exact or (not surface.viewed and pool.has(h.placed, h.need)):
-            continue
-        again = fitted(surface, h.placed)
-        pool = _grown(surface, pool, again)
-        # Of what was not seen enough to tell the whole group, enough may have been seen of its elements.
-        parts += _holding(surface, again.placed, ALIKE * pool.limit) if _is_loose(surface, again) else []
-    return _with(surface, pool, [*parts, *voted])
+        pool = pool if pool.has(h.placed, h.need) else _grown(surface, pool, fitted(surface, h.placed))
+    return pool
 
 
 def _with(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
@@ -161,7 +162,7 @@ def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tup
     new = [s for s in starts if pool.wants(s)]
     # What they carry to where nobody looked tells little of their order, and takes long to be told.
     blind = surface.is_open and not surface.viewed
-    at, most = (surface.closed, surface.hopeless) if blind else (surface, hopeless(start_error(surface)))
+    at, most = (surface.closed, surface.ceiling) if blind else (surface, hopeless(start_error(surface)))
     seen = zip(new, glances(at, new, most), strict=True)
     best = sorted(seen, key=lambda k: max(k[1], pool.nothing) / math.log2(1.0 + _size(k[0])))
     return best[:LOOKED] if surface.is_open else best
@@ -185,7 +186,7 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
         if glance >= hopeless(start_error(surface)):
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
             continue
-        look = looked_at(surface, start, COARSE * pool.limit, pool.shown, useful=ALIKE * pool.limit)
+        look = looked_at(surface, start, COARSE * pool.limit, pool.has_as_seen, useful=ALIKE * pool.limit)
         moved, needs = look.placed, look.needs
         pool = replace(pool, looks=(*pool.looks, (glance, moved)))
         if needs > ALIKE * pool.limit:

@@ -53,9 +53,9 @@ def hides_there(surface: Surface, found: Hypothesis) -> bool:
 
     As a patch is unseen only where it begins at a border, a border that hides nothing may be a whim of the sample.
     """
-    if surface.openings is None or not (motions := few_motions(found.placed)):
+    if surface.openings is None:
         return False
-    cloud, line = surface.cloud, surface.openings.line
+    cloud, line, motions = surface.cloud, surface.openings.line, few_motions(found.placed)
     unseen = np.isnan(surface.seen(surface.misses(motions), motions, together=True))
     shares = [
         float(np.mean(Tree(m.apply(cloud.points[hidden])).nearest(cloud.points[line])[0] < cloud.beside))

@@ -234,8 +234,7 @@ def _told(surface: Surface, placed: Placed, sources: int, reach: float = 0.0) ->
     if not surface.is_open:
         return needs, 0.0, 0.0
     # Misses end early on open surfaces, so that a group may need more than it seems to.
-    nearer = np.maximum(seen - reach, 0.0)
-    least = float(surface.needed(nearer, motions, GLANCED).max())
+    least = float(surface.needed(np.maximum(seen - reach, 0.0), motions, GLANCED).max()) if reach else needs
     if surface.viewed:
         return needs, 0.0, least
     each = [surface.coverage(miss[None], [m], sources=sources).belief for miss, m in zip(seen, motions, strict=True)]

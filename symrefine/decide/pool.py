@@ -59,7 +59,7 @@ class Pool:
         most = max(ALIKE * needs, self.nothing)
         return any(h.need <= most and h.holds(placed) for h in (self.largest, *self.small))
 
-    def shown(self, placed: Placed) -> bool:
+    def has_as_seen(self, placed: Placed) -> bool:
         """Whether a group is in one that was fitted and needs as good as nothing but belief in what was not seen."""
         most = self.nothing
         return any(h.need <= math.hypot(most, h.believed) and h.holds(placed) for h in (self.largest, *self.small))

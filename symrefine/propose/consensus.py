@@ -71,18 +71,26 @@ def pair_invariants(points: Array, normals: Array) -> tuple[Single, ...]:
     they are compared with limits of a few hundredths.
     """
     x, n = (v.astype(np.float32) for v in (points - points.mean(axis=0), normals))
-    squares = (x**2).sum(axis=1)
-    distance = np.sqrt(np.maximum(squares[:, None] + squares - 2.0 * (x @ x.T), 0.0))
-    np.fill_diagonal(distance, 0.0)
-    shrink = np.divide(1.0, distance, out=np.zeros_like(distance), where=distance > 0.0)
-    high = n @ x.T
-    first = (high - np.diag(high)[:, None]) * shrink  # (x_j - x_i).n_i, over the distance
+    distance, shrink, first = pair_slopes(x, n)
     second = -first.T
     # (x_j - x_i) . (n_i cross n_j)
     leaves = np.cross(x, n)
     volume = -(n @ leaves.T + leaves @ n.T) * shrink
     between, leaning = n @ n.T, first * second
     return distance, first**2, second**2, between**2, leaning * between, leaning * volume
+
+
+def pair_slopes(x: Single, n: Single) -> tuple[Single, Single, Single]:
+    """Distances of all pairs of local planes, one over these, and (x_j - x_i).n_i over them, [N, N] each.
+
+    `x` and `n` [N, 3] are their points and normals. Of a local plane with itself all three are nothing.
+    """
+    squares = (x**2).sum(axis=1)
+    distance = np.sqrt(np.maximum(squares[:, None] + squares - 2.0 * (x @ x.T), 0.0))
+    np.fill_diagonal(distance, 0.0)
+    shrink = np.divide(1.0, distance, out=np.zeros_like(distance), where=distance > 0.0)
+    high = n @ x.T
+    return distance, shrink, (high - np.diag(high)[:, None]) * shrink
 
 
 def _grown(matches: Matches, common: Array, within: float, det: int) -> list[Proposal]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, rows
+from symrefine.propose.consensus import pair_slopes
 from symrefine.propose.folds import ROUNDING
 from symrefine.shape import Index
 
@@ -56,11 +57,9 @@ def _mirrored(points: Array, normals: Array, *, outwards: bool) -> tuple[Index, 
     single precision, which is finer than any normal.
     """
     x, n = (v.astype(np.float32) for v in (points - points.mean(axis=0), normals))
-    squares, high = (x**2).sum(axis=1), n @ x.T
-    slopes = high - np.diag(high)[:, None]  # (x_j - x_i).n_i
-    away = squares[:, None] + squares - 2.0 * (x @ x.T)
-    far = np.triu(away > FEET**-2.0, 1)
-    turned = n @ n.T + 2.0 * slopes * slopes.T / np.where(far, away, 1.0)
+    distance, _, slopes = pair_slopes(x, n)
+    far = np.triu(distance > 1.0 / FEET, 1)
+    turned = n @ n.T + 2.0 * slopes * slopes.T
     i, j = np.nonzero(far & ((turned if outwards else np.abs(turned)) > np.cos(AGREE_RAD)))
     return i, j
 

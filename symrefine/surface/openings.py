@@ -86,6 +86,11 @@ class Openings:
         return self.clumps if self.floor is None else (*self.clumps, self.floor)
 
     @property
+    def hide_much(self) -> bool:
+        """Whether they are too long to be a whim of the sample; nobody saw the bottom of what stands on a floor."""
+        return self.evident or self.floor is not None
+
+    @property
     def closed(self) -> "Openings | None":
         """What is left of it where the surface counts as closed: what hides it; None if nothing does."""
         if not self.covering:

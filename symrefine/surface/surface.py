@@ -112,9 +112,7 @@ class Surface:
     @property
     def lacks_much(self) -> bool:
         """Whether much of it may be missing: what it ends at is no whim of the sample, or it stands on something."""
-        if self.openings is None or not self.is_open:
-            return False
-        return self.openings.evident or self.openings.floor is not None
+        return self.is_open and self.openings is not None and self.openings.hide_much
 
     @cached_property
     def closed(self) -> "Surface":
@@ -133,7 +131,7 @@ class Surface:
         return LIMITS[1] * self.tolerance
 
     @property
-    def hopeless(self) -> float:
+    def ceiling(self) -> float:
         """What is needed from which on nothing is told apart of an open surface."""
         return HOPELESS * self.tolerance
 
@@ -153,7 +151,7 @@ class Surface:
             discs: as of `disc_distances`.
         """
         stride = self.stride(sources)
-        bound = min(bound, LIMITS[-1] * self.hopeless) if self.is_open else bound
+        bound = min(bound, LIMITS[-1] * self.ceiling) if self.is_open else bound
         bound *= self.diagonal
         return miss_distances(self.cloud, motions, stride=stride, bound=bound, discs=discs) / self.diagonal
 
