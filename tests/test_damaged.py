@@ -574,7 +574,8 @@ def test_a_border_that_hides_nothing_is_none():
 
 @pytest.mark.parametrize(("name", "kind", "group"), [("fan3", "hole", "C3"), ("rotor4", "hole", "C4h")])
 def test_a_border_that_hides_what_a_group_asks_for_is_one_however_short(name, kind, group):
-    found = detect(damaged.damaged(damaged.Case(family="shape", name=name, kind=kind, strength=0.05, seed=51))[0].points)
+    made, _ = damaged.damaged(damaged.Case(family="shape", name=name, kind=kind, strength=0.05, seed=51))
+    found = detect(made.points)
     assert not found.examined.surface.openings.evident
     assert (found.point_group, found.at_least) == (group, True)
 
