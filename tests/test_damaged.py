@@ -797,6 +797,28 @@ def test_a_third_of_a_goblet_is_seen_to_be_round():
     assert row.group == "at least Cinfv"
 
 
+def test_few_points_beside_an_outline_do_not_deny_what_nobody_saw():
+    """Of a cube with a corner to the camera some mirrors leave next to nothing to be seen, half of it rough rays."""
+    row = single_views.run(single_views.Case(family="shape", name="bossed_cube", clean=False, seed=3003))
+    assert row.occlusion > 0.6
+    assert row.group == "at least Oh"
+
+
+@pytest.mark.parametrize(("name", "part", "seed"), [("spool", "Cinfv", 4006), ("wheel5", "C5v", 4003)])
+def test_what_nobody_saw_may_break_a_mirror_across_and_leave_what_keeps_the_axis(name, part, seed):
+    """Both ends look alike as far as they are seen; that it turns about its axis is surer."""
+    mesh, truth = specimen("shape", name)
+    made = damage.views(mesh, 1.0, np.random.default_rng([seed, *name.encode()]), rough=True)
+    found = detect(made.points, viewpoint=made.viewpoint)
+    assert (found.point_group, found.at_least) == (truth.group.name, True)
+    assert {a.point_group: a.probability for a in found.alternatives}[part] > 0.03
+    main = max(found.axes, key=lambda a: (a.order, a.confidence))
+    across = [a for a in found.axes if line_angle_rad(a.axis.direction, main.axis.direction) > 0.1]
+    across += [p for p in found.planes if line_angle_rad(p.plane.normal, main.axis.direction) < 0.1]
+    assert across
+    assert all(a.confidence < main.confidence - 0.03 for a in across)
+
+
 @pytest.mark.parametrize("aside", [-0.08, 0.08])
 @pytest.mark.parametrize("seed", [5, 6, 7, 8])
 def test_a_mirror_put_aside_comes_back_to_where_edges_tell(aside, seed):

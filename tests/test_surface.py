@@ -233,6 +233,22 @@ def test_what_is_needed_is_the_smallest_tolerance_that_mean_and_shares_keep(seed
     assert not kept(needed * (1 - 1e-9))
 
 
+@pytest.mark.parametrize(("off", "seen", "told"), [(3, 9, False), (3, 1000, False), (30, 40, True), (30, 1000, True)])
+def test_few_points_of_all_are_no_detail_however_little_was_seen(off, seen, told):
+    """Of 1,000 points that an operation carries to where somebody looked so many miss by far."""
+    misses = np.full(1000, np.nan)
+    misses[:seen] = 0.0
+    misses[:off] = 0.04
+    assert (needs(misses, NO_NOISE) > TOLERANCE) == told
+
+
+@given(st.integers(0, 10**6), st.integers(2, 20))
+def test_what_nobody_saw_speaks_against_nothing(seed, times):
+    miss = np.where(drawn_misses(seed, 600) > 0.02, 0.05, 0.0)
+    hidden = np.append(miss, np.full((times - 1) * 600, np.nan))
+    assert needs(hidden, NO_NOISE) <= needs(miss, NO_NOISE)
+
+
 def test_another_sample_of_the_same_noise_needs_next_to_nothing():
     """Whatever the sample: what the shares are uncertain by is not taken for a miss."""
     draws = np.abs(np.random.default_rng(4).standard_normal((200, 3000)))

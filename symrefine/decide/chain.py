@@ -21,9 +21,10 @@ from symrefine.decide.hypotheses import (
     has_all,
     roughly_judged,
     single,
+    unbroken,
 )
 from symrefine.decide.looks import COARSE, exact_need, glances, hopeless, looked_at, start_error
-from symrefine.decide.place import SUPPORTED, least_elsewhere
+from symrefine.decide.place import SUPPORTED
 from symrefine.decide.pool import ALIKE, Pool, is_at
 from symrefine.decide.posterior import ALONE, EVEN, LEAST, Link, certain, meant
 from symrefine.fit.placed import Placed, elements, joined
@@ -375,7 +376,12 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
         if asks.need > limit:
             break
     links = [_excluded(link, links[i + 1 :], limit) for i, link in enumerate(links)]
-    return (NOTHING, *_one_mirror(surface, links[1:]), *links[1:])
+    told = [NOTHING]
+    for link in links[1:]:
+        part = unbroken(surface, link)
+        told += [part] if part and part.holds(told[-1].placed) and not told[-1].holds(part.placed) else []
+        told.append(link)
+    return tuple(told)
 
 
 def _excluded(link: Hypothesis, larger: Sequence[Hypothesis], limit: float) -> Hypothesis:
@@ -383,16 +389,3 @@ def _excluded(link: Hypothesis, larger: Sequence[Hypothesis], limit: float) -> H
     both = [h for h in larger if h.need <= limit]
     kept = [r for r in link.rivals if r.group.name == link.group.name or not any(h.holds(r) for h in both)]
     return replace(link, rivals=tuple(kept))
-
-
-def _one_mirror(surface: Surface, links: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Of the first group of a chain that has several unlike mirrors one alone, the one of which cameras saw most.
-
-    What they did not see may break any but one of them.
-    """
-    mirrors = [e for e in links[0].elements if e.operations.kind == "plane"] if surface.viewed and links else []
-    if len(mirrors) < 2 or len(links[0].group.lone_mirrors()) < len(mirrors):
-        return []
-    first, *others = sorted((single(e) for e in mirrors), key=lambda h: -h.supported)
-    elsewhere = least_elsewhere(surface, first.placed)
-    return [replace(first, rivals=tuple(h.placed for h in others), elsewhere=elsewhere)]

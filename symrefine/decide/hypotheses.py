@@ -14,7 +14,7 @@ import numpy as np
 from symrefine.decide.looks import COARSE, GLANCE, SHORT, START_ERROR, Look, exact_need, mended, seems, slid
 from symrefine.decide.place import is_told, least_elsewhere
 from symrefine.decide.posterior import EVEN, EVEN_MIRROR
-from symrefine.fit.placed import FITTED, Operations, Placed, elements
+from symrefine.fit.placed import FITTED, Operations, Placed, elements, joined
 from symrefine.fit.refine import Iterate, refine
 from symrefine.geometry import Array, Axis, Isometry, frame_with_z, rotation
 from symrefine.groups import PointGroup, is_subgroup
@@ -362,3 +362,26 @@ def _judged(surface: Surface, parts: _Parts, misses: Array, drifts: Array) -> tu
 def single(element: Element) -> Hypothesis:
     """An element of a group as a group of its own."""
     return Hypothesis(placed=element.operations.alone(element.center), elements=(element,), need=element.need)
+
+
+def unbroken(surface: Surface, found: Hypothesis) -> Hypothesis | None:
+    """What stays of a group where something that no camera saw breaks a mirror that is no image of others.
+
+    Beside turns by a third and less that is what keeps the direction of their axis; where all mirrors are such, the one
+    of which cameras saw most. None if there is no such mirror, or no more.
+    """
+    group, lone = found.group, found.group.lone_mirrors() if surface.viewed else ()
+    mirrors = [e for e in found.elements if e.operations.kind == "plane"]
+    if len(lone) == 1 and group.symbol.fold > 2:
+        axis = group.frame[2]
+        kept = tuple(e for e in found.elements if all(axis @ m @ axis > 0.0 for m in e.operations.matrices))
+        placed = joined([e.operations.alone(e.center) for e in kept]) if kept else None
+        if placed is None or not is_told(placed, [(e.operations, e.coverage.supported) for e in kept]):
+            return None
+        part = Hypothesis(placed=placed, elements=kept, need=max(e.need for e in kept))
+    elif 1 < len(mirrors) == len(lone):
+        part, *others = sorted((single(e) for e in mirrors), key=lambda h: -h.supported)
+        part = replace(part, rivals=tuple(h.placed for h in others))
+    else:
+        return None
+    return replace(part, elsewhere=least_elsewhere(surface, part.placed))

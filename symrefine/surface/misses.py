@@ -75,6 +75,8 @@ def needs(misses: Array, noise: Array, tests: int = 1, redundancy: float = 1.0) 
 
     What noise alone explains is taken away, with what samples leave uncertain: from the mean in squares, as noise and
     miss add up; from the share of the surface that misses by more than some distance, the share of noise that does.
+    Shares are of what was seen, but fewer points than the least detail of all are none: beside what nobody saw, where
+    rays are rough, some always seem to miss, which are many of the few that some operations leave to be seen.
 
     Args:
         misses: distances, fractions of the diagonal; NaN where nobody looked.
@@ -83,9 +85,12 @@ def needs(misses: Array, noise: Array, tests: int = 1, redundancy: float = 1.0) 
         redundancy: how many misses are as good as one, as points take part in so many planes.
     """
     farthest = -np.sort(-misses, axis=-1)  # what is unseen stands last
-    count = np.maximum(np.isfinite(misses).sum(axis=-1, keepdims=True), 1)
+    total, count = misses.shape[-1], np.maximum(np.isfinite(misses).sum(axis=-1, keepdims=True), 1)
     farthest = np.nan_to_num(farthest)
-    mean, beyond = farthest.sum(axis=-1) / count[..., 0], np.arange(1, misses.shape[-1] + 1) / count
+    mean, beyond = farthest.sum(axis=-1) / count[..., 0], np.arange(1, total + 1) / count
+    if (unseen := total - count).any():
+        beside = (_exceeded(SHARES[-1], total, tests) * unseen).astype(int)
+        mean = mean - (farthest * (np.arange(total) < beside)).sum(axis=-1) / count[..., 0]
     if noise.size:
         sampled = np.sqrt((SURE**2 + 2.0 * np.log(tests)) * redundancy * (1.0 / count + 1.0 / noise.size))
         chance = 1.0 - np.searchsorted(noise, farthest, side="right") / noise.size
@@ -95,10 +100,15 @@ def needs(misses: Array, noise: Array, tests: int = 1, redundancy: float = 1.0) 
     clear = noise[-1] if noise.size else 0.0
     details = [(share, limit, 0.0) for share, limit in zip(SHARES, LIMITS[1:], strict=True)]
     for share, limit, least in (*details, (SPECK, SPECK_LIMIT, clear)):
-        by_chance = np.sqrt(2.0 * np.log(tests) * share * (1.0 - share) / count)
-        told = (beyond > np.maximum(share + by_chance, (redundancy - 1.0) / count)) & (farthest > least)
-        found.append((farthest * told).max(axis=-1) / limit)
+        told = beyond > np.maximum(_exceeded(share, count, tests), (redundancy - 1.0) / count)
+        told &= beyond * count > _exceeded(min(share, SHARES[-1]), total, tests) * total
+        found.append((farthest * (told & (farthest > least))).max(axis=-1) / limit)
     return np.asarray(reduce(np.maximum, found))
+
+
+def _exceeded(share: float, count: Index | int, tests: int) -> Array:
+    """The share of so many points that the worst of some tests shows by chance of what is such a share."""
+    return np.asarray(share + np.sqrt(2.0 * np.log(tests) * share * (1.0 - share) / count))
 
 
 def needs_of_atoms(misses: Array) -> Array:
