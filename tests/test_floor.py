@@ -109,6 +109,16 @@ def test_the_bottom_of_an_object_is_no_floor(make):
     assert floor_of(sample(make(), 5000, 0.003, np.random.default_rng(1))) is None
 
 
+def test_what_a_camera_saw_from_below_is_no_floor():
+    """The face of a spool that it looks at reaches beyond the rest; of a table it sees what stands on it."""
+    points, stray, pose = standing(stool(3), 3)
+    up = pose.of(np.eye(3))[2] - pose.of(np.zeros((1, 3)))[0]
+    above, below = (points[~stray].mean(axis=0) + side * up for side in (5.0, -5.0))
+    assert floor_of(points, above[None]) is not None
+    assert floor_of(points, np.stack([above, below])) is None
+    assert floor_under(Shape(points=points, viewpoint=below), "floor") is None
+
+
 def test_a_plane_with_something_on_both_sides_is_no_floor():
     points, stray, _ = standing(BRICK, 0)
     middle = points[stray].mean(axis=0)

@@ -183,10 +183,10 @@ def floor_under(shape: Shape, outliers: Outliers) -> Floor | None:
             f"{shape.source}: outliers is 'floor', for a cloud of what stands on one, of more than {FEW} points; "
             f"this is {what}, leave it out"
         )
-    points = heavy(shape).points
-    # Strays lie on both sides of any plane, and beside what stands on it.
-    found = floor_of(points[sampling(points, np.random.default_rng(0), outliers=True, groups=False).kept])
-    return None if found is None or np.count_nonzero(~found.covers(points)) <= FEW else found
+    own = heavy(shape)  # of these without strays, which lie on both sides of any plane, and beside what stands on it
+    kept = sampling(own.points, np.random.default_rng(0), outliers=True, groups=False).kept
+    found = floor_of(own.points[kept], own.viewpoint)
+    return None if found is None or np.count_nonzero(~found.covers(own.points)) <= FEW else found
 
 
 def heavy(shape: Shape) -> Shape:

@@ -68,14 +68,16 @@ class Floor:
         return np.asarray(points @ self.normal < self.offset - self.thick - margin)
 
 
-def floor_of(points: Array) -> Floor | None:
+def floor_of(points: Array, seen_from: Array | None = None) -> Floor | None:
     """The plane that all other points [N, 3] stand on; None if there is no such plane.
+
+    A camera (places [M, 3]) that saw them does not stand below it: then it is the face of something.
 
     Of planes through three points each (RANSAC: Fischler and Bolles, 1981) the one that holds most points of those that
     have all others to one side, but for as many as details may be. It has to reach beyond what stands on it, as the
     flat bottom of an object does not.
     """
-    rng = np.random.default_rng(0)
+    rng, eyes = np.random.default_rng(0), points[:0] if seen_from is None else np.unique(seen_from, axis=0)
     some = points[rng.permutation(len(points))[:SOME]]
     corners = some[rng.integers(len(some), size=(TRIALS, 3))]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -90,7 +92,7 @@ def floor_of(points: Array) -> Floor | None:
             best = int(held.argmax())
             found = _about(some, places[best], across[best], thick)
             found = found and _about(points, found.offset * found.normal, found.normal, thick)
-            if found is not None and _reaches_beyond(points, found):
+            if found is not None and not found.bars(eyes, 0.0).any() and _reaches_beyond(points, found):
                 return found
             held[on[:, on[best]].mean(axis=1) > 0.5] = 0.0  # what holds most of the same ends the same
     return None
