@@ -83,9 +83,10 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     missing = missing or places(whole.largest, part.largest) >= PLACES
     if missing and not (more and ends_too(surface, part.largest, ALIKE * limit)):
         return replace(part, at_least=True)
-    # What a border hides may be why a larger group is in doubt.
+    # What a border hides may be why a larger group is in doubt, even if that is no more than a detail.
     doubted = (h for h in (part.largest, *part.small) if _size(h.placed) > _size(whole.largest.placed))
-    hides = not ends and any(meant(Link(need=h.need), surface.tolerance) > LEAST for h in doubted)
+    needs = (h.need if h.believed else h.seen for h in doubted)
+    hides = not ends and any(meant(Link(need=need), surface.tolerance) > LEAST for need in needs)
     whole = replace(whole, at_least=evident or hides)
     if not more:
         return whole
