@@ -7,7 +7,7 @@ Some minutes; `--full` (`make bench BENCH_ARGS=--full`) goes to the ends of ever
 import argparse
 import sys
 
-from benchmarks import alignment, detection, everyday, growth
+from benchmarks import alignment, damage, detection, everyday, growth
 from benchmarks.metric import regressions, report, store
 
 
@@ -20,8 +20,12 @@ def main() -> int:
     options = parser.parse_args()
     full = options.full
     found = [
-        *detection.metrics(), *everyday.metrics(full=full), *growth.metrics(full=full), *alignment.metrics(full=full)
-    ]  # fmt: skip
+        *detection.metrics(),
+        *damage.metrics(every=2 if full else 6),
+        *everyday.metrics(full=full),
+        *growth.metrics(full=full),
+        *alignment.metrics(full=full),
+    ]
     report(found)
     if options.store:
         store(found)

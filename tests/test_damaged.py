@@ -1,5 +1,6 @@
 """Damaged clouds: strays, clumps, density, open borders, cameras, completion, and the bench that measures them."""
 
+import itertools
 import json
 import re
 from dataclasses import replace
@@ -578,6 +579,23 @@ def test_a_border_that_hides_what_a_group_asks_for_is_one_however_short(name, ki
     found = detect(made.points)
     assert not found.examined.surface.openings.evident
     assert (found.point_group, found.at_least) == (group, True)
+
+
+def test_what_a_view_tells_of_a_plane_is_as_uncertain_as_it_says():
+    """Edges tell where it stands, on which hardly any point lies: its pairs alone seemed to tell it far better."""
+    ratios = []
+    for name, seed in itertools.product(("chair", "bracket", "table"), (1, 2, 3)):
+        made, truth = damaged.damaged(
+            damaged.Case(family="shape", name=name, kind="rough views", strength=1.0, seed=seed)
+        )
+        for p in detect(made.points, viewpoint=made.viewpoint).planes:
+            angle = min(line_angle_rad(p.plane.normal, n) for n in truth.group.mirrors())
+            ratios.append((angle / p.sigma_rad, abs(p.plane.signed_distance(truth.center)) / p.sigma))
+    angles, places = np.array(ratios).T
+    assert len(ratios) >= 8
+    for found in (angles, places):
+        assert 0.2 < np.median(found) < 2.5
+        assert np.quantile(found, 0.9) < 4.0
 
 
 @pytest.mark.parametrize(("name", "seed"), [("bracket", 2), ("stool3", 5), ("flat_bottle", 3), ("swirl4", 5)])

@@ -13,7 +13,7 @@ from experiments.objects.parts import assembled, extruded
 from experiments.objects.shapes import bottle, box, join, mug, revolve, sample, table
 from symrefine.decide.hypotheses import fitted, judged
 from symrefine.decide.looks import few_motions, looked_at
-from symrefine.decide.place import SUPPORTED, is_told, least_elsewhere
+from symrefine.decide.place import SUPPORTED, is_told, least_elsewhere, slack
 from symrefine.detection.measure import gather, measure
 from symrefine.detection.story import detect
 from symrefine.fit.freedom import freest
@@ -102,6 +102,18 @@ def test_what_is_narrow_is_turned_farther():
     surface, center = view("bar", (0.5, 0.4, 0.7))
     assert judged(surface, mirror(90.0, center)).need < 0.5 * surface.tolerance
     assert least_elsewhere(surface, mirror(90.0, center)) > 1.5 * surface.tolerance
+
+
+def test_the_place_of_a_mirror_is_as_loose_as_what_was_seen_leaves_it():
+    """From above a bottle may end anywhere below; where its axis is both sides of it tell."""
+    surface, center = view("bottle", ABOVE)
+    lying = Placed(group=PointGroup(name="Cs", frame=frame_with_z(np.array([0.0, 0.0, 1.0]))), center=center)
+    loose, tight = slack(surface, lying), slack(surface, mirror(0.0, center))
+    for found in (loose, tight):
+        np.testing.assert_allclose(found, found.T, atol=1e-12)
+        assert np.linalg.eigvalsh(found).min() > -1e-12
+    assert math.sqrt(loose[5, 5]) > 0.01 * surface.diagonal
+    assert math.sqrt(tight[3, 3]) < 0.003 * surface.diagonal
 
 
 @pytest.mark.parametrize("fold", [16, 20, 22])

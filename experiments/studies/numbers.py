@@ -85,6 +85,7 @@ KIND_OF = {
         "decide.ends": "HOLES RIMS",
         "decide.hypotheses": "MOVED MOVED_EACH",
         "decide.looks": "GLANCE LOOK COARSE SHORT GLANCED ASIDE START_ERROR",
+        "decide.place": "HALVED",
         "decide.posterior": "BEYOND",
         "detection.examination": "RIVALS",
         "detection.measure": "ORDER PARTS PLANES SAMPLES",

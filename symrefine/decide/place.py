@@ -9,15 +9,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from symrefine.decide.looks import GLANCED, LOOK, few_motions, start_error
+from symrefine.decide.looks import GLANCE, GLANCED, LOOK, exact_need, few_motions, start_error
 from symrefine.fit.freedom import freest
 from symrefine.fit.placed import Operations, Placed, joined
 from symrefine.fit.refine import Framed
+from symrefine.geometry import Array
 from symrefine.groups import is_subgroup
 from symrefine.surface.surface import Surface
 
 # Share of a surface that has to be carried onto itself for anything to be said of an operation.
 SUPPORTED = 0.15
+# Times that an interval is halved in which a group stands: to 3 % of how far starts are off.
+HALVED = 5
 
 
 def least_elsewhere(surface: Surface, placed: Placed) -> float:
@@ -27,18 +30,55 @@ def least_elsewhere(surface: Surface, placed: Placed) -> float:
     change what it is and that the surface tells least of, until its images lie as far aside as those of a mirror that
     is off so much. Turns go no farther than a quarter of a wedge.
     """
+    state, ways = _ways(surface, placed)
+    return float(_needs(surface, placed, state, np.concatenate([-ways, ways])).min())
+
+
+def slack(surface: Surface, placed: Placed) -> Array:
+    """Covariance [6, 6] of turn and shift, along the axes of space, of a group where nothing that was seen says where.
+
+    To either side, in each of the same ways, it may be moved until it needs more than noise explains; in between it
+    stands anywhere.
+    """
+    state, ways = _ways(surface, placed)
+    every = np.concatenate([-ways, ways])
+    most = max(float(_needs(surface, placed, state, np.zeros((1, 6)), rough=True)[0]), exact_need(surface.floor))
+    step = 0.5**HALVED
+    low, high = np.zeros(len(every)), np.ones(len(every))
+    free = _needs(surface, placed, state, step * every, rough=True) <= most
+    low[free] = step
+    for _ in range(HALVED if free.any() else 0):
+        middle = 0.5 * (low + high)
+        holds = free.copy()
+        holds[free] = _needs(surface, placed, state, middle[free, None] * every[free], rough=True) <= most
+        low, high = np.where(holds, middle, low), np.where(holds | ~free, high, middle)
+    # Evenly spread over an interval, about where it was put: its second moment there.
+    down, up = np.split(low, 2)
+    space = np.kron(np.eye(2), state.frame)
+    along = ways @ space
+    return np.einsum("w,wi,wj->ij", (down**2 - down * up + up**2) / 3.0, along, along)
+
+
+def _ways(surface: Surface, placed: Placed) -> tuple[Framed, Array]:
+    """The frame of a group, and motions [p, 6] of it as far as starts may be off, the least told ones first."""
     frame, fold = placed.group.frame, placed.group.symbol.fold
     standard = np.stack([frame @ m.matrix @ frame.T for m in few_motions(placed)])
     state = Framed(standard=standard, frame=frame, center=placed.center)
     wedge = 2.0 * math.pi / (fold if 0 < fold < math.inf else 1)
-    moved = []
-    for way in freest(surface.cloud, state, stride=surface.stride(LOOK)):
-        size = min(2.0 * start_error(surface), 0.25 * wedge / max(float(np.linalg.norm(way[:3])), 1e-300))
-        moved += [placed.moved(state.moved(side * size * way)) for side in (-1.0, 1.0)]
-    motions = [few_motions(m) for m in moved]
-    needs = surface.needs([m for part in motions for m in part], sources=LOOK, tests=GLANCED)
-    each = np.split(needs, np.cumsum([len(part) for part in motions])[:-1])
-    return float(min(part.max() for part in each))
+    ways = freest(surface.cloud, state, stride=surface.stride(LOOK))
+    turns = np.maximum(np.linalg.norm(ways[:, :3], axis=1), 1e-300)
+    return state, ways * np.minimum(2.0 * start_error(surface), 0.25 * wedge / turns)[:, None]
+
+
+def _needs(surface: Surface, placed: Placed, state: Framed, ways: Array, *, rough: bool = False) -> Array:
+    """What a group needs [W] where it is moved by each of some ways [W, 6]; `rough`ly, if that is little or much."""
+    motions = [few_motions(placed.moved(state.moved(way))) for way in ways]
+    every = [m for part in motions for m in part]
+    if rough:
+        needs = surface.needs(every, sources=GLANCE, bound=2.0 * surface.far, tests=GLANCED)
+    else:
+        needs = surface.needs(every, sources=LOOK, tests=GLANCED)
+    return needs.reshape(len(ways), -1).max(axis=1)
 
 
 def is_told(placed: Placed, parts: Sequence[tuple[Operations, float]]) -> bool:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from symrefine.clock import Clock
 from symrefine.decide.hypotheses import Element, Hypothesis, fitted, judged
 from symrefine.decide.looks import COARSE
+from symrefine.decide.place import slack
 from symrefine.decide.posterior import NEAR, Decision, alternatives
 from symrefine.detection.examination import Examined, examined
 from symrefine.detection.measure import Measured, Outliers
@@ -161,6 +162,7 @@ def _report(
     names, needs = [h.group.name for h in links], [h.need for h in links]
     told = alternatives(names, needs, decision, -1 if reason else index)
     history = chosen.history
+    loose = slack(surface, chosen.placed) if surface.viewed and chosen.elements else np.zeros((6, 6))
     on = None if measured.shape.faces is None else found.vertices_of(chosen)
     chosen = chosen if on is None else _polished(chosen, on, measured)
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
@@ -183,7 +185,7 @@ def _report(
                 plane=_plane(e, origin, scale),
                 residual=e.deviation,
                 confidence=sure[id(e)],
-                sigma_rad=(known := _uncertainty(history, e))[0],
+                sigma_rad=(known := _uncertainty(history, e, loose))[0],
                 sigma=known[1] * scale,
                 coverage=e.coverage,
             )
@@ -196,7 +198,7 @@ def _report(
                 improper=e.operations.kind == "improper",
                 residual=e.deviation,
                 confidence=sure[id(e)],
-                sigma_rad=(known := _uncertainty(history, e))[0],
+                sigma_rad=(known := _uncertainty(history, e, loose))[0],
                 sigma=known[1] * scale,
                 coverage=e.coverage,
             )
@@ -306,16 +308,20 @@ def _near_miss(element: Element, origin: Array, scale: float, tolerance: float) 
     )
 
 
-def _uncertainty(history: tuple[Iterate, ...], element: Element) -> tuple[float, float]:
+def _uncertainty(history: tuple[Iterate, ...], element: Element, slack: Array) -> tuple[float, float]:
     """Standard deviations of an element's direction (radians) and place (RMS radii), each where it is least certain.
 
     The covariance of the joint refinement is that of a small turn w and a shift of the common frame: a direction u
-    moves by w x u, a plane along its normal, an axis across itself.
+    moves by w x u, a plane along its normal, an axis across itself. To it comes what nobody saw, along the axes of
+    space [6, 6].
     """
-    if len(history) < 2:
+    if len(history) < 2 and not slack.any():
         return math.nan, math.nan
-    frame, covariance = history[-1].state.frame, history[-1].covariance
-    u = frame @ element.operations.direction
+    covariance = slack
+    if history:
+        axes = np.kron(np.eye(2), history[-1].state.frame)
+        covariance = axes.T @ history[-1].covariance @ axes + slack
+    u = element.operations.direction
     cross = cross_matrix(u)
     along = np.outer(u, u)
     moves = along if element.operations.kind == "plane" else np.eye(3) - along
