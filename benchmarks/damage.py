@@ -1,4 +1,4 @@
-"""What `detect` costs on damaged clouds, over as many points of the same objects without damage.
+"""What `detect` costs on damaged clouds, over as many points of the same objects without damage, in another pose.
 
     python -m benchmarks.damage [--every N] [--seed N]
 
@@ -39,20 +39,20 @@ def _seconds(shape: Shape) -> float:
 
 def _over_clean(case: Case, whole: Case) -> float:
     made, clean = damaged(case)[0], damaged(whole)[0].points
-    some = np.random.default_rng(case.seed).permutation(len(clean))[: len(made.points)]
+    chosen = np.random.default_rng(case.seed).permutation(len(clean))[: len(made.points)]
     before, cost, after = (
         _seconds(s)
         for s in (
-            Shape(points=clean[some]),
+            Shape(points=clean[chosen]),
             Shape(points=made.points, viewpoint=made.viewpoint),
-            Shape(points=clean[some]),
+            Shape(points=clean[chosen]),
         )
     )
     return 2.0 * cost / (before + after)
 
 
 def metrics(*, every: int = 6, seed: int = 5150) -> Iterator[Metric]:
-    """Two figures for each damage."""
+    """The median over the objects for each damage, and the worst."""
     whole = {c.name: c for c in list(cases(["clean"], [], seed))[::every]}
     for (kind, strength), target in TARGETS.items():
         some = [c for c in cases([kind], list(whole), seed) if c.strength == strength]

@@ -844,6 +844,8 @@ def test_what_nobody_saw_may_break_a_mirror_across_and_leave_what_keeps_the_axis
     across += [p for p in found.planes if line_angle_rad(p.plane.normal, main.axis.direction) < 0.1]
     assert across
     assert all(a.confidence < main.confidence - 0.03 for a in across)
+    needs = [link.need for link in found.examined.links]
+    assert needs == sorted(needs)
 
 
 @pytest.mark.parametrize("aside", [-0.08, 0.08])

@@ -114,8 +114,10 @@ def test_what_a_camera_saw_from_below_is_no_floor():
     points, stray, pose = standing(stool(3), 3)
     up = pose.of(np.eye(3))[2] - pose.of(np.zeros((1, 3)))[0]
     above, below = (points[~stray].mean(axis=0) + side * up for side in (5.0, -5.0))
-    assert floor_of(points, above[None]) is not None
-    assert floor_of(points, np.stack([above, below])) is None
+    assert floor_of(points, np.broadcast_to(above, points.shape)) is not None
+    assert floor_of(points, np.broadcast_to(below, points.shape)) is None
+    # A view of what stands on it, from beside the table and below, shows nothing of it.
+    assert floor_of(points, np.where(stray[:, None], above, below)) is not None
     assert floor_under(Shape(points=points, viewpoint=below), "floor") is None
 
 

@@ -233,12 +233,23 @@ def test_what_is_needed_is_the_smallest_tolerance_that_mean_and_shares_keep(seed
     assert not kept(needed * (1 - 1e-9))
 
 
-@pytest.mark.parametrize(("off", "seen", "told"), [(3, 9, False), (3, 1000, False), (30, 40, True), (30, 1000, True)])
-def test_few_points_of_all_are_no_detail_however_little_was_seen(off, seen, told):
+@pytest.mark.parametrize(
+    ("off", "seen", "by", "told"),
+    [
+        (3, 9, 0.04, False),
+        (5, 9, 0.04, False),
+        (7, 9, 0.04, True),
+        (3, 9, 0.06, False),
+        (4, 9, 0.06, True),
+        (3, 1000, 0.06, False),
+        (30, 1000, 0.04, True),
+    ],
+)
+def test_few_points_of_all_are_no_detail_however_little_was_seen(off, seen, by, told):
     """Of 1,000 points that an operation carries to where somebody looked so many miss by far."""
     misses = np.full(1000, np.nan)
     misses[:seen] = 0.0
-    misses[:off] = 0.04
+    misses[:off] = by
     assert (needs(misses, NO_NOISE) > TOLERANCE) == told
 
 

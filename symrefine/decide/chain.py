@@ -380,7 +380,8 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     told = [NOTHING]
     for link in links[1:]:
         part = unbroken(surface, link)
-        told += [part] if part and part.holds(told[-1].placed) and not told[-1].holds(part.placed) else []
+        if part and part.holds(told[-1].placed) and not told[-1].holds(part.placed):
+            told.append(replace(part, need=min(max(part.need, told[-1].need), link.need)))
         told.append(link)
     return tuple(told)
 

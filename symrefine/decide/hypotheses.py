@@ -214,7 +214,8 @@ def _placed(
             found, need, believed = partly, math.hypot(seen, belief), belief
     if least == MOVED_EACH:
         found, closely = _closely_judged(surface, found, need)
-        need, believed = closely, believed if closely == need else 0.0
+        if closely > need:  # a wedge shows what was seen, too
+            need, seen, believed = closely, max(seen, closely), 0.0
     return Hypothesis(
         placed=placed, elements=found, need=need, history=history, before=before, seen=seen, believed=believed
     )
@@ -367,8 +368,9 @@ def single(element: Element) -> Hypothesis:
 def unbroken(surface: Surface, found: Hypothesis) -> Hypothesis | None:
     """What stays of a group where something that no camera saw breaks a mirror that is no image of others.
 
-    Beside turns by a third and less that is what keeps the direction of their axis; where all mirrors are such, the one
-    of which cameras saw most. None if there is no such mirror, or no more.
+    Of a mirror across an axis of order 3 or more that leaves what keeps the direction of the axis; of several mirrors
+    that are all such, the one of which cameras saw most. Otherwise None, as of Cs and C2h, and where too little was
+    seen to tell what is left.
     """
     group, lone = found.group, found.group.lone_mirrors() if surface.viewed else ()
     mirrors = [e for e in found.elements if e.operations.kind == "plane"]

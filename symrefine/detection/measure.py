@@ -185,7 +185,7 @@ def floor_under(shape: Shape, outliers: Outliers) -> Floor | None:
         )
     own = heavy(shape)  # of these without strays, which lie on both sides of any plane, and beside what stands on it
     kept = sampling(own.points, np.random.default_rng(0), outliers=True, groups=False).kept
-    found = floor_of(own.points[kept], own.viewpoint)
+    found = floor_of(own.points[kept], None if own.viewpoint is None else own.viewpoint[kept])
     return None if found is None or np.count_nonzero(~found.covers(own.points)) <= FEW else found
 
 

@@ -71,13 +71,13 @@ class Floor:
 def floor_of(points: Array, seen_from: Array | None = None) -> Floor | None:
     """The plane that all other points [N, 3] stand on; None if there is no such plane.
 
-    A camera (places [M, 3]) that saw them does not stand below it: then it is the face of something.
+    A camera (places [N, 3]) that saw some of it does not stand below it: then it is the face of something.
 
     Of planes through three points each (RANSAC: Fischler and Bolles, 1981) the one that holds most points of those that
     have all others to one side, but for as many as details may be. It has to reach beyond what stands on it, as the
     flat bottom of an object does not.
     """
-    rng, eyes = np.random.default_rng(0), points[:0] if seen_from is None else np.unique(seen_from, axis=0)
+    rng = np.random.default_rng(0)
     some = points[rng.permutation(len(points))[:SOME]]
     corners = some[rng.integers(len(some), size=(TRIALS, 3))]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -92,7 +92,7 @@ def floor_of(points: Array, seen_from: Array | None = None) -> Floor | None:
             best = int(held.argmax())
             found = _about(some, places[best], across[best], thick)
             found = found and _about(points, found.offset * found.normal, found.normal, thick)
-            if found is not None and not found.bars(eyes, 0.0).any() and _reaches_beyond(points, found):
+            if found is not None and _seen_from_above(points, found, seen_from) and _reaches_beyond(points, found):
                 return found
             held[on[:, on[best]].mean(axis=1) > 0.5] = 0.0  # what holds most of the same ends the same
     return None
@@ -122,6 +122,13 @@ def _has_sides(offsets: Array, thick: float) -> Mask:
     """Whether what lies off a plane lies to one side of it [T], by signed distances from it [T, N]."""
     above, below = (offsets > thick).sum(axis=1), (offsets < -thick).sum(axis=1)
     return np.asarray(np.minimum(above, below) <= SHARES[0] * (above + below))
+
+
+def _seen_from_above(points: Array, found: Floor, seen_from: Array | None) -> bool:
+    """Whether no more of a floor than a detail was seen from below, where that is known."""
+    if seen_from is None:
+        return True
+    return bool(found.bars(seen_from[found.covers(points)], 0.0).mean() <= SHARES[0])
 
 
 def _reaches_beyond(points: Array, found: Floor) -> bool:

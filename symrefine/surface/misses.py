@@ -75,8 +75,9 @@ def needs(misses: Array, noise: Array, tests: int = 1, redundancy: float = 1.0) 
 
     What noise alone explains is taken away, with what samples leave uncertain: from the mean in squares, as noise and
     miss add up; from the share of the surface that misses by more than some distance, the share of noise that does.
-    Shares are of what was seen, but fewer points than the least detail of all are none: beside what nobody saw, where
-    rays are rough, some always seem to miss, which are many of the few that some operations leave to be seen.
+    Shares are of what was seen, but count only from the least share of all points on (of the farthest, a speck), and
+    the mean is without so many of the farthest of what was not seen: beside that, where rays are rough, some points
+    always seem to miss, which are many of the few that some operations leave to be seen.
 
     Args:
         misses: distances, fractions of the diagonal; NaN where nobody looked.
