@@ -38,16 +38,10 @@ def _seconds(shape: Shape) -> float:
 
 
 def _over_clean(case: Case, whole: Case) -> float:
-    made, clean = damaged(case)[0], damaged(whole)[0].points
-    chosen = np.random.default_rng(case.seed).permutation(len(clean))[: len(made.points)]
-    before, cost, after = (
-        _seconds(s)
-        for s in (
-            Shape(points=clean[chosen]),
-            Shape(points=made.points, viewpoint=made.viewpoint),
-            Shape(points=clean[chosen]),
-        )
-    )
+    made, points = damaged(case)[0], damaged(whole)[0].points
+    some = np.random.default_rng(case.seed).permutation(len(points))[: len(made.points)]
+    clean = Shape(points=points[some])
+    before, cost, after = map(_seconds, (clean, Shape(points=made.points, viewpoint=made.viewpoint), clean))
     return 2.0 * cost / (before + after)
 
 

@@ -24,7 +24,7 @@ from symrefine.decide.hypotheses import (
     unbroken,
 )
 from symrefine.decide.looks import COARSE, exact_need, glances, hopeless, looked_at, start_error
-from symrefine.decide.place import SUPPORTED
+from symrefine.decide.place import SUPPORTED, least_elsewhere
 from symrefine.decide.pool import ALIKE, Pool, is_at
 from symrefine.decide.posterior import ALONE, EVEN, LEAST, Link, certain, meant
 from symrefine.fit.placed import Placed, elements, joined
@@ -381,7 +381,8 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     for link in links[1:]:
         part = unbroken(surface, link)
         if part and part.holds(told[-1].placed) and not told[-1].holds(part.placed):
-            told.append(replace(part, need=min(max(part.need, told[-1].need), link.need)))
+            need, elsewhere = min(max(part.need, told[-1].need), link.need), least_elsewhere(surface, part.placed)
+            told.append(replace(part, need=need, elsewhere=elsewhere))
         told.append(link)
     return tuple(told)
 

@@ -380,10 +380,8 @@ def unbroken(surface: Surface, found: Hypothesis) -> Hypothesis | None:
         placed = joined([e.operations.alone(e.center) for e in kept]) if kept else None
         if placed is None or not is_told(placed, [(e.operations, e.coverage.supported) for e in kept]):
             return None
-        part = Hypothesis(placed=placed, elements=kept, need=max(e.need for e in kept))
-    elif 1 < len(mirrors) == len(lone):
-        part, *others = sorted((single(e) for e in mirrors), key=lambda h: -h.supported)
-        part = replace(part, rivals=tuple(h.placed for h in others))
-    else:
-        return None
-    return replace(part, elsewhere=least_elsewhere(surface, part.placed))
+        return Hypothesis(placed=placed, elements=kept, need=max(e.need for e in kept))
+    if 1 < len(mirrors) == len(lone):
+        first, *others = sorted((single(e) for e in mirrors), key=lambda h: -h.supported)
+        return replace(first, rivals=tuple(h.placed for h in others))
+    return None

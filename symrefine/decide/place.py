@@ -51,7 +51,7 @@ def slack(surface: Surface, placed: Placed) -> Array:
         middle = 0.5 * (low + high)
         holds = free.copy()
         holds[free] = _needs(surface, placed, state, middle[free, None] * every[free], rough=True) <= most
-        low, high = np.where(holds, middle, low), np.where(holds | ~free, high, middle)
+        low, high = np.where(holds, middle, low), np.where(holds, high, middle)
     # Evenly spread over an interval, about where it was put: its second moment there.
     down, up = np.split(low, 2)
     space = np.kron(np.eye(2), state.frame)
