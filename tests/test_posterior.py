@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from symrefine.decide.posterior import LEAST, Link, certain, decide, meant
-from symrefine.groups import PointGroup
+from symrefine.groups import PointGroup, point_group
 
 NEED = st.floats(0.0, 0.5)
 TOLERANCE = st.floats(1e-3, 0.2)
@@ -201,3 +201,11 @@ def test_what_is_certain_leaves_little_more_doubt_than_noise_does(tolerance, noi
     alone, with_need = (meant(Link(need=n), tolerance, noise * tolerance) for n in (0.0, need))
     assert need <= certain(tolerance)
     assert alone - with_need < 0.25
+
+
+@pytest.mark.parametrize(
+    ("name", "like"), [("Cinfv", "Cs"), ("Dinfh", "C2v"), ("D5h", "Cs"), ("D2h", "C2v"), ("Kh", "Cs"), ("Oh", "C5v")]
+)
+def test_what_nobody_saw_breaks_as_many_as_stand_alone_and_roundness_is_one(name, like):
+    one, other = (Link.of(point_group(n), 0.0, 1.0, believed=0.0, placed=1.0).broken for n in (name, like))
+    assert one == other
