@@ -14,6 +14,7 @@ from matplotlib.path import Path as MatplotlibPath
 from scipy.spatial import cKDTree
 
 from experiments.objects import damage, household, tangles
+from experiments.objects.boundary import instance
 from experiments.objects.built_symmetry import Truth, specimen
 from experiments.objects.constructions import polygon
 from experiments.objects.parts import extruded
@@ -599,12 +600,30 @@ def test_what_a_view_tells_of_a_plane_is_as_uncertain_as_it_says():
 
 
 @pytest.mark.parametrize(("name", "seed"), [("bracket", 2), ("stool3", 5), ("flat_bottle", 3), ("swirl4", 5)])
-def test_a_border_may_hide_a_detail_that_a_group_lacks(name, seed):
+def test_beyond_a_short_border_a_detail_may_be_missing(name, seed):
     """Of a closed object a detail on one side denies a mirror; beside a border the other one may have been lost."""
-    made, _ = damaged.damaged(damaged.Case(family="shape", name=name, kind="hole", strength=0.03, seed=seed))
+    case = damaged.Case(family="shape", name=name, kind="hole", strength=0.03, seed=seed)
+    made, truth = damaged.damaged(case)
     found = detect(made.points)
     assert not found.examined.surface.openings.evident
-    assert (found.point_group, found.at_least) == ("C1", True)
+    assert (found.point_group, found.at_least) == (truth.group.name, True)
+
+
+@pytest.mark.parametrize(("kind", "strength", "seed"), [("hole", 0.15, 11), ("hole", 0.15, 12), ("cut", 0.1, 11)])
+def test_what_comes_to_lie_where_nothing_was_seen_tells_not_where_an_object_ends(kind, strength, seed):
+    """Most of a foot is missing, so that turns take its border to where nothing is, next to that border."""
+    made, _ = damaged.damaged(damaged.Case(family="shape", name="goblet", kind=kind, strength=strength, seed=seed))
+    found = detect(made.points)
+    assert (found.point_group, found.at_least) == ("Cinfv", True)
+
+
+@pytest.mark.parametrize(("name", "noise"), [("propeller", 0.003), ("radiator", 0), ("rocket", 0.005), ("tray", 0.003)])
+def test_where_one_of_several_thin_parts_ends_nothing_is_missing(name, noise):
+    """Among 32 neighbours its end is a border, and the others tell what would be hidden beyond; among 16 it is none."""
+    for state in ("whole", "short"):
+        made = instance("vanes", f"{name} {state}", seed=4)
+        found = detect(sample(made.shape, 20000, noise, np.random.default_rng(4)))
+        assert found.point_group == made.truth.group.name
 
 
 def test_a_surface_that_is_whole_is_judged_as_that_to_the_end():

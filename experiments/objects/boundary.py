@@ -4,8 +4,8 @@
 
 prints them. Families: rotors without mirrors and gears, surfaces of revolution with something to them, meshes of uneven
 area, scans with defects and their siblings, prisms for sparse clouds, objects without symmetry, clouds with something
-extreme, molecules for a ladder of tolerances, thin-walled open vessels, furniture of thin boards and rods. Names are
-keys; a seed varies all dimensions.
+extreme, molecules for a ladder of tolerances, thin-walled open vessels, furniture of thin boards and rods, thin
+blades of which one is shorter. Names are keys; a seed varies all dimensions.
 """
 
 import zlib
@@ -22,6 +22,7 @@ from experiments.objects.prisms import SPARSE
 from experiments.objects.scans import SCANS
 from experiments.objects.turning import GEARS, ROTORS
 from experiments.objects.uneven import UNEVEN
+from experiments.objects.vanes import VANES
 from experiments.objects.vessels import VESSELS
 
 FAMILIES: dict[str, dict[str, Build]] = {
@@ -36,6 +37,7 @@ FAMILIES: dict[str, dict[str, Build]] = {
     "tolerances": LADDERS,
     "vessels": VESSELS,
     "furniture": FURNITURE,
+    "vanes": VANES,
 }
 
 

@@ -70,6 +70,7 @@ TURNING = (
     View(form="cloud", points=20000, tolerance=STRICT),
     NOISY,
 )
+THIN = (MESH, NOISY, *(View(form="cloud", points=20000, noise_rel=s) for s in (0.003, 0.005, 0.008)))
 VIEWS: dict[str, tuple[View, ...]] = {
     "rotors": TURNING,
     "gears": TURNING,
@@ -88,11 +89,8 @@ VIEWS: dict[str, tuple[View, ...]] = {
         View(form="cloud", points=20000, noise_rel=0.003),
         View(form="cloud", points=20000, noise_rel=0.01),
     ),
-    "furniture": (
-        MESH,
-        NOISY,
-        *(View(form="cloud", points=20000, noise_rel=s) for s in (0.003, 0.005, 0.008)),
-    ),
+    "furniture": THIN,
+    "vanes": (*THIN, CLEAN),
 }
 
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 from operator import attrgetter
 
-from symrefine.decide.ends import PLACES, ends_there, ends_too, hides_there, often_kept, places
+from symrefine.decide.ends import PLACES, ends_there, ends_too, hides_surely, hides_there, often_kept, places
 from symrefine.decide.hypotheses import (
     NOTHING,
     SAME_RAD,
@@ -81,13 +81,13 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     ends = ends and not (more and often_kept(surface, whole.largest, hidden))
     missing = (evident or (more and hidden <= ENCLOSED and hides_there(surface, part.largest))) and not ends
     missing = missing or places(whole.largest, part.largest) >= PLACES
-    if missing and not (more and ends_too(surface, part.largest, ALIKE * limit)):
+    missing = missing and not (more and ends_too(surface, part.largest, ALIKE * limit))
+    if missing and (not more or hides_surely(surface, part.largest, limit)):
         return replace(part, at_least=True)
-    # What a border hides may be why a larger group is in doubt, even if that is no more than a detail.
+    # What a border hides may be why a larger group is in doubt.
     doubted = (h for h in (part.largest, *part.small) if _size(h.placed) > _size(whole.largest.placed))
-    needs = (h.need if h.believed else h.seen for h in doubted)
-    hides = not ends and any(meant(Link(need=need), surface.tolerance) > LEAST for need in needs)
-    whole = replace(whole, at_least=evident or hides)
+    hides = not ends and any(meant(Link(need=h.need), surface.tolerance) > LEAST for h in doubted)
+    whole = replace(whole, at_least=evident or hides or missing)
     if not more:
         return whole
     # To believe that what ends so evenly is missing a part takes as much as to believe in as much as was seen.

@@ -1,10 +1,11 @@
 """Where an object ends: an open border that a group carries onto itself is its own, and no hole in it."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
-from symrefine.decide.hypotheses import Hypothesis, seen_to_end
+from symrefine.decide.hypotheses import Hypothesis, judged, seen_to_end
 from symrefine.decide.looks import few_motions
 from symrefine.geometry import Array, Isometry
 from symrefine.surface.openings import MOST, TELLING
@@ -46,6 +47,23 @@ def ends_too(surface: Surface, found: Hypothesis, limit: float) -> bool:
         return False  # what cameras see to be free says it
     few = len(found.placed.motions()) < TELLING
     return ends_there(surface, found) if few else seen_to_end(surface, found) > limit
+
+
+def hides_surely(surface: Surface, found: Hypothesis, limit: float) -> bool:
+    """Whether a group that asks for what nobody saw asks for nothing beyond where thin parts may just end.
+
+    They have borders all along, to neighbourhoods as wide as they are thick; what ends before the others of its kind
+    does so at a border, too, which narrower ones deny. Where a group keeps most borders the object ends there: if
+    narrower ones do not tell that, neither do they tell any other end.
+    """
+    openings = surface.openings
+    if openings is None or surface.viewed or openings.ends is None:
+        return True
+    line = np.flatnonzero(openings.line)
+    kept = openings.kept(surface.cloud, line, found.placed.motions())[0] > KEPT
+    if kept.mean() > KEPT and openings.ends[line][kept].mean() <= KEPT:
+        return False
+    return judged(replace(surface, openings=replace(openings, doubted=True)), found.placed).need <= limit
 
 
 def hides_there(surface: Surface, found: Hypothesis) -> bool:

@@ -19,7 +19,7 @@ from symrefine.fit.refine import Iterate, refine
 from symrefine.geometry import Array, Axis, Isometry, frame_with_z, rotation
 from symrefine.groups import PointGroup, is_subgroup
 from symrefine.propose.folds import fold_candidates
-from symrefine.surface.misses import SHARES, Deviation
+from symrefine.surface.misses import Deviation
 from symrefine.surface.skin import Skin
 from symrefine.surface.surface import Coverage, Surface
 from symrefine.surface.wedge import Wedge
@@ -210,7 +210,7 @@ def _placed(
     # What holds without it asks for no belief in anything unseen.
     if surface.openings is not None and not surface.viewed and need > exact_need(surface.floor):
         partly, seen, belief = _seen_judged(surface, parts, misses, drifts)
-        if math.hypot(seen, belief) < need and _counts_unseen(surface, max(e.coverage.unseen for e in partly)):
+        if math.hypot(seen, belief) < need:
             found, need, believed = partly, math.hypot(seen, belief), belief
     if least == MOVED_EACH:
         found, closely = _closely_judged(surface, found, need)
@@ -219,15 +219,6 @@ def _placed(
     return Hypothesis(
         placed=placed, elements=found, need=need, history=history, before=before, seen=seen, believed=believed
     )
-
-
-def _counts_unseen(surface: Surface, most: float) -> bool:
-    """Whether what nobody saw of operations counts as that, if it is such a share of the surface at most.
-
-    What is no more than a detail is rather missing: a flag, on one side.
-    """
-    openings = surface.openings
-    return openings is not None and (bool(openings.covering) or most > SHARES[1])
 
 
 def _closely_judged(surface: Surface, found: tuple[Element, ...], need: float) -> tuple[tuple[Element, ...], float]:

@@ -66,6 +66,8 @@ class Openings:
         line: [M] which local planes make one up.
         border: [M] which lie at one.
         evident: whether they are too long to be a whim of the sample.
+        ends: [M] which of these may lie at the end of a thin part; None if none do.
+        doubted: whether nothing is hidden beyond what may be such an end.
         cameras: what saw it, in the frame of the surface; none if nothing is known of them.
         clumps: what hides parts of it, in the frame of the surface.
         floor: what it stands on, likewise, if that was set apart: it hides the bottom, and bars all below.
@@ -75,6 +77,8 @@ class Openings:
     line: Mask
     border: Mask
     evident: bool
+    ends: Mask | None = None
+    doubted: bool = False
     cameras: tuple[Camera, ...] = ()
     clumps: tuple[Clump, ...] = ()
     floor: Floor | None = None
@@ -97,9 +101,8 @@ class Openings:
             return None
         if not (self.cameras or self.line.any()):
             return self
-        return replace(
-            self, line=np.zeros_like(self.line), border=np.zeros_like(self.border), evident=False, cameras=()
-        )
+        none = np.zeros_like(self.line)
+        return replace(self, line=none, border=none, evident=False, cameras=())
 
     def linked(self, cloud: LocalPlanes, stride: int) -> Index:
         """Pairs [2, E] of every `stride`-th local planes that are neighbours, both ways, by the first of each."""
@@ -180,10 +183,14 @@ class Openings:
         every = np.bincount(own, minlength=whole)
         begins = np.bincount(own, at_border, whole)
         free = (most * begins >= every - both) & (every > 0)
+        if there_openings.doubted and there_openings.ends is not None:
+            sure = at_border & ~there_openings.ends[target][back]
+            free &= most * np.bincount(own, sure, whole) >= begins
         if len(group) >= TELLING and there.any():
             # What says nothing is asked where nothing else of a patch is at a border.
             asked = at_border | (there & (begins[own] == 0))
-            kept = np.bincount(own[asked], self._kept(cloud, target[back[asked]], group), whole)
+            onto, met_by = self.kept(cloud, target[back[asked]], group)
+            kept = np.bincount(own[asked], onto / np.maximum(met_by, 1.0 / len(group)), whole)
             ends = (kept > 0.0) & (kept >= 0.5 * np.bincount(own[asked], minlength=whole))
             # A sliver counts for nothing in either way.
             free &= ~(ends & (np.bincount(patch[away.ravel()], minlength=whole) >= SHARES[-1] * count))
@@ -192,18 +199,21 @@ class Openings:
         found.reshape(-1)[rim_of[free[own] & at_border]] = True
         return covered | (found & ~barred)
 
-    def _kept(self, cloud: LocalPlanes, at: Index, group: Sequence[Isometry]) -> Array:
-        """Share of the operations of a group that carry the border next to local planes [N] onto a border.
+    def kept(self, cloud: LocalPlanes, at: Index, group: Sequence[Isometry]) -> tuple[Array, Array]:
+        """Shares of the operations of a group that carry the border next to local planes [N] onto one, or anything.
 
-        Where a surface goes on unseen few do, as they take its border where nothing is missing; where the object ends
-        most do, all but those that take it to where something adjoins.
+        Where a surface goes on unseen few keep it, as they take its border where nothing is missing; where the object
+        ends most do, all but those that take it to where something adjoins. What they take to where nothing was seen,
+        near a border as that may lie, tells nothing of that.
         """
         line = np.flatnonzero(self.line)
         which, back = np.unique(line[Tree(cloud.points[line]).nearest(cloud.points[at])[1]], return_inverse=True)
         images = np.concatenate([m.apply(cloud.points[which]) for m in group])
         classes = cloud.classes(which)
-        near = cloud.nearest(images, None if classes is None else np.tile(classes, len(group)))[1]
-        return np.asarray(self.border[near].reshape(len(group), -1).mean(axis=0)[back])
+        away, near = cloud.nearest(images, None if classes is None else np.tile(classes, len(group)))
+        met = away < cloud.beside
+        kept, every = ((met & some).reshape(len(group), -1).mean(axis=0)[back] for some in (self.border[near], met))
+        return kept, every
 
 
 def agreed(places: Array, unseen: Mask) -> Mask:
@@ -256,8 +266,12 @@ def openings(
         closed = Openings(line=none, border=none, evident=False, clumps=clumps, floor=floor)
         return closed if closed.covering else None
     line = (aside > ASIDE) & _beside(cloud, far)
-    evident = bool(far.mean() > EVIDENT * width)
-    return Openings(line=line, border=_beside(cloud, line), evident=evident, clumps=clumps, floor=floor)
+    border, evident = _beside(cloud, line), bool(far.mean() > EVIDENT * width)
+    far[far] = ~_thin(cloud.points[far], points, tree)
+    ends = border & ~_beside(cloud, line & _beside(cloud, far)) if far.any() else border
+    return Openings(
+        line=line, border=border, evident=evident, ends=ends if ends.any() else None, clumps=clumps, floor=floor
+    )
 
 
 def _covered(covering: tuple[Clump | Floor, ...], points: Array) -> Mask:
@@ -275,19 +289,41 @@ def _aside(cloud: LocalPlanes, points: Array, tree: Tree, near: Index | None) ->
 
     Nothing in wires. And how wide neighbourhoods are.
     """
-    sums = Neighbourhoods.of(points, tree, NEIGHBOURS).around(cloud.points, near)
-    mean, spread = spreads_of(sums)
+    mean, spread = spreads_of(Neighbourhoods.of(points, tree, NEIGHBOURS).around(cloud.points, near))
     variances, _ = smallest_eigenvectors(spread)
-    size = variances.sum(axis=1)
-    aside = mean - cloud.points
     # The normals of as wide a neighbourhood.
     count = min(max(LINKS, round(NEIGHBOURS * len(cloud.points) / len(points))), len(cloud.points))
     normals = rows(cloud.normals, cloud.around(cloud.points, cloud.labels, count)[1])
-    bends = BENDS / count * size[:, None, None] * (normals.transpose(0, 2, 1) @ normals)
-    along = np.linalg.solve(spread + ROUNDING * np.eye(3) + bends, aside[:, :, None])[:, :, 0]
     sheet = variances[:, 1] > WIRE**2 * variances[:, 2]
-    across = np.where(sheet, np.clip(np.einsum("ni,ni->n", aside, along), 0.0, None), 0.0)
-    return np.sqrt(across), float(np.median(np.sqrt(size)))
+    aside = np.where(sheet, _off(mean - cloud.points, spread, normals), 0.0)
+    return aside, float(np.median(np.sqrt(variances.sum(axis=1))))
+
+
+def _off(aside: Array, spread: Array, normals: Array) -> Array:
+    """How far off middles lie that are aside [M, 3], in standard deviations along the surface.
+
+    By the covariances [M, 3, 3] of what they are the middles of, and its normals [M, k, 3].
+    """
+    size = np.trace(spread, axis1=1, axis2=2)[:, None, None]
+    bends = BENDS / normals.shape[1] * size * (normals.transpose(0, 2, 1) @ normals)
+    along = np.linalg.solve(spread + ROUNDING * np.eye(3) + bends, aside[:, :, None])[:, :, 0]
+    return np.sqrt(np.clip(np.einsum("ni,ni->n", aside, along), 0.0, None))
+
+
+def _thin(at: Array, points: Array, tree: Tree) -> Mask:
+    """Which of some places [M, 3] at a border lie at none among half as many neighbours.
+
+    Where a surface ends it does at any scale; where a thin part does, only at those that are wider than it is thick. At
+    the corners of its end normals turn, by fits as narrow.
+    """
+    count = NEIGHBOURS // 2
+    near = tree.query(at, count)[1]
+    mean, spread = spreads_of(Neighbourhoods.of(points, tree, count).around(at, near))
+    those, own = renumbered(near, len(points))
+    normals = planes_of(points, tree.query(points[those], count)[1])[1][own]
+    # By chance so few lie aside themselves, so that those of several places at a border are taken together.
+    beside = Tree(at).query(at, min(count, len(at)))[1]
+    return np.asarray(_off(mean - at, spread, normals)[beside].mean(axis=1) <= FAR_ASIDE)
 
 
 def _folded(at: Array, points: Array, tree: Tree, near: Index | None) -> Mask:
