@@ -5,6 +5,7 @@ tangles of random parts and, where they are, the catalogued meshes.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from experiments.objects import group_shapes, household, tangles
 from experiments.objects.catalogue import catalogue, catalogued
-from experiments.objects.parts import assembled, placed_group
+from experiments.objects.parts import Part, assembled, placed_group
 from experiments.objects.poses import Pose
 from symrefine.fit.placed import FREE_TURNS
 from symrefine.geometry import Array, frame_with_z, householder, rotation, rotoreflection
@@ -29,6 +30,12 @@ class Truth:
 
     group: PointGroup
     center: Array
+
+    @classmethod
+    def of_parts(cls, parts: Sequence[Part]) -> "Truth":
+        """That of what is put together from parts, as their marks tell it."""
+        group, center = placed_group(parts)
+        return cls(group=group, center=center)
 
     def posed(self, pose: Pose) -> "Truth":
         """The same of the object in another pose."""
@@ -98,11 +105,9 @@ def specimen(family: str, name: str) -> tuple[Shape, Truth]:
         return catalogued(name), _entered(catalogue()[name])
     if family == "tangle":
         made = tangles.parts(name)
-        group, center = placed_group(made)
-        return assembled(made), Truth(group=group, center=center)
+        return assembled(made), Truth.of_parts(made)
     sibling = family == "sibling"
-    group, center = placed_group(group_shapes.DESIGNS[name].parts(sibling))
-    return group_shapes.shape(name, sibling), Truth(group=group, center=center)
+    return group_shapes.shape(name, sibling), Truth.of_parts(group_shapes.DESIGNS[name].parts(sibling))
 
 
 def _upright(entry: household.Object) -> PointGroup:

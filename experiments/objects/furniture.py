@@ -8,10 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from experiments.objects.built_symmetry import Truth
-from experiments.objects.instances import Build, Instance
+from experiments.objects.instances import Build, Instance, as_built
 from experiments.objects.lathe import Rng
-from experiments.objects.parts import Part, assembled, ball, block, placed_group, ring_of, rod, spun
+from experiments.objects.parts import Part, ball, block, ring_of, rod, spun
 from symrefine.geometry import rotation
 
 # What stays, and what is repeated: of these the first is out of place, or lacks.
@@ -89,10 +88,7 @@ def furnished(make: Callable[[Rng], Parts], state: str, rng: Rng) -> Instance:
     body, (first, *others) = make(rng)
     turn = rotation([0, 0, 1], rng.uniform(0.45, 0.6))
     own = {"whole": [first], "broken": [first.turned(turn, (0.0, 0.0, 0.05))], "lacking": []}[state]
-    parts = [*body, *own, *others]
-    group, center = placed_group(parts)
-    shape = assembled(parts)
-    return Instance(shape=shape, truth=Truth(group=group, center=center), diagonal=shape.diagonal)
+    return as_built([*body, *own, *others])
 
 
 def _apart(distance: float) -> tuple[float, float]:

@@ -66,6 +66,12 @@ def of_parts(parts: Sequence[Part], name: str, *also: str, also_from: float = 0.
     return Instance(shape=shape, truth=centred(name), also=groups, also_from=also_from, diagonal=shape.diagonal)
 
 
+def as_built(parts: Sequence[Part]) -> Instance:
+    """An instance that has, where it stands, the symmetry that its parts have together."""
+    shape = assembled(parts)
+    return Instance(shape=shape, truth=Truth.of_parts(parts), diagonal=shape.diagonal)
+
+
 def free_place(shape: Shape, rng: np.random.Generator, room: float, apart: Array | None = None) -> tuple[Array, Array]:
     """A point [3] on the outside of a mesh and the normal [3] there, with free space of `room` in front of it.
 

@@ -13,7 +13,7 @@ import numpy as np
 from experiments.objects.built_symmetry import Truth
 from experiments.objects.group_shapes import MISS_REL
 from experiments.objects.instances import Build, Instance, free_place
-from experiments.objects.parts import Part, assembled, block, cylinder, placed_group, ring_of, rod
+from experiments.objects.parts import Part, assembled, block, cylinder, ring_of, rod
 from experiments.objects.uneven import areas, fine, mesh_of
 from symrefine.geometry import Array, frame_with_z, unit
 from symrefine.shape import Shape
@@ -115,18 +115,13 @@ def rack(rng: Rng) -> Scanned:
     return Scanned(parts=[*boards, *posts], screw=screw, moving=3, along=(1, 0, 0))
 
 
-def _truth(parts: list[Part]) -> Truth:
-    group, center = placed_group(parts)
-    return Truth(group=group, center=center)
-
-
 def _with(made: Scanned, shape: Shape, differs: float) -> Instance:
-    return Instance(shape=shape, truth=_truth(made.parts), differs=differs, diagonal=shape.diagonal)
+    return Instance(shape=shape, truth=Truth.of_parts(made.parts), differs=differs, diagonal=shape.diagonal)
 
 
 def _place(made: Scanned, room: float, rng: Rng) -> tuple[Shape, Array, Array]:
     """The object about its centre, and a place for a detail of that size, in diagonals, away from all mirrors."""
-    truth, shape = _truth(made.parts), assembled(made.parts)
+    truth, shape = Truth.of_parts(made.parts), assembled(made.parts)
     centred = Shape(points=shape.points - truth.center, faces=shape.faces, measure=shape.measure)
     point, normal = free_place(centred, rng, room * shape.diagonal, truth.group.mirrors())
     return shape, point + truth.center, normal
@@ -170,7 +165,7 @@ def dent(made: Scanned, rng: Rng) -> Instance:
 
 def missing(made: Scanned, rng: Rng) -> Instance:
     """Screws all over, but for one."""
-    truth = _truth(made.parts)
+    truth = Truth.of_parts(made.parts)
     screws: list[Part] = []
     for operation in truth.group.operations():
         image = made.screw.turned(operation, truth.center - operation @ truth.center)

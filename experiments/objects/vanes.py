@@ -7,12 +7,9 @@ nobody looked, and the others tell what might have been there.
 from collections.abc import Callable
 from functools import partial
 
-import numpy as np
-
-from experiments.objects.built_symmetry import Truth
-from experiments.objects.instances import Build, Instance
+from experiments.objects.instances import Build, Instance, as_built
 from experiments.objects.lathe import Rng
-from experiments.objects.parts import Part, assembled, block, cylinder, hull, placed_group, spun
+from experiments.objects.parts import Part, block, cylinder, hull, ring_of, spun
 from symrefine.geometry import rotation
 
 # What they stand around, and one of them by how long it is of the full length.
@@ -79,11 +76,7 @@ def vane(make: Callable[[Rng], Vanes], state: str, rng: Rng) -> Instance:
     """Vanes around something, the first one shorter by a fifth to two thirds if it is so."""
     body, one, count = make(rng)
     length = rng.uniform(1 / 3, 0.8) if state == "short" else 1.0
-    turns = (rotation([0, 0, 1], 2.0 * np.pi * k / count) for k in range(count))
-    parts = [*body, *(one(1.0 if k else length).turned(turn) for k, turn in enumerate(turns))]
-    group, center = placed_group(parts)
-    shape = assembled(parts)
-    return Instance(shape=shape, truth=Truth(group=group, center=center), diagonal=shape.diagonal)
+    return as_built([*body, one(length), *ring_of(one(1.0), count)[1:]])
 
 
 VANES: dict[str, Build] = {

@@ -21,6 +21,7 @@ from symrefine.surface.neighbourhoods import (
     WIDEST,
     Neighbourhoods,
     connected_parts,
+    fit_planes,
     planes_of,
     renumbered,
     smallest_eigenvectors,
@@ -102,7 +103,7 @@ class Openings:
         if not (self.cameras or self.line.any()):
             return self
         none = np.zeros_like(self.line)
-        return replace(self, line=none, border=none, evident=False, cameras=())
+        return replace(self, line=none, border=none, evident=False, ends=None, cameras=())
 
     def linked(self, cloud: LocalPlanes, stride: int) -> Index:
         """Pairs [2, E] of every `stride`-th local planes that are neighbours, both ways, by the first of each."""
@@ -317,13 +318,17 @@ def _thin(at: Array, points: Array, tree: Tree) -> Mask:
     the corners of its end normals turn, by fits as narrow.
     """
     count = NEIGHBOURS // 2
-    near = tree.query(at, count)[1]
-    mean, spread = spreads_of(Neighbourhoods.of(points, tree, count).around(at, near))
+    near, neighbourhoods = tree.query(at, count)[1], Neighbourhoods.of(points, tree, count)
+    mean, spread = spreads_of(neighbourhoods.around(at, near))
     those, own = renumbered(near, len(points))
-    normals = planes_of(points, tree.query(points[those], count)[1])[1][own]
-    # By chance so few lie aside themselves, so that those of several places at a border are taken together.
-    beside = Tree(at).query(at, min(count, len(at)))[1]
-    return np.asarray(_off(mean - at, spread, normals)[beside].mean(axis=1) <= FAR_ASIDE)
+    normals = fit_planes(neighbourhoods.around(points[those]))[1][own]
+    # By chance so few lie aside themselves.
+    return _together(at, _off(mean - at, spread, normals), count) <= FAR_ASIDE
+
+
+def _together(at: Array, values: Array, count: int) -> Array:
+    """Means [M] of values [M] at so many places that stand together, as at one edge, around each of places [M, 3]."""
+    return np.asarray(values[Tree(at).query(at, min(count, len(at)))[1]].mean(axis=1))
 
 
 def _folded(at: Array, points: Array, tree: Tree, near: Index | None) -> Mask:
@@ -346,8 +351,7 @@ def _folded(at: Array, points: Array, tree: Tree, near: Index | None) -> Mask:
     off, depth = (v - v.mean(axis=1, keepdims=True) for v in (off, depth))
     size = np.linalg.norm(off, axis=1) * np.linalg.norm(depth, axis=1)
     parted = np.einsum("nk,nk->n", off, depth) / np.maximum(size, ROUNDING)
-    beside = Tree(at).query(at, LINKS + 1)[1]
-    return np.asarray(parted[beside].mean(axis=1) > PARTED)
+    return _together(at, parted, LINKS + 1) > PARTED
 
 
 def _lines(cloud: LocalPlanes, chosen: Mask) -> Mask:
