@@ -13,7 +13,7 @@ import numpy as np
 
 from symrefine.decide.looks import COARSE, GLANCE, SHORT, START_ERROR, Look, exact_need, mended, seems, slid
 from symrefine.decide.place import is_told, least_elsewhere
-from symrefine.decide.posterior import EVEN, EVEN_MIRROR
+from symrefine.decide.posterior import EVEN, EVEN_MIRROR, certain
 from symrefine.fit.placed import FITTED, Operations, Placed, elements, joined
 from symrefine.fit.refine import Iterate, refine
 from symrefine.geometry import Array, Axis, Isometry, frame_with_z, rotation
@@ -129,7 +129,7 @@ def fitted(
     it may stand seems to need more than `close` is judged by few points, one that needs far more than `most` in one
     place only; where no start leads to as little, no elements are told, and the fit ends after `SHORT` steps.
     """
-    state, hopeless, exact = start.framed(), max(most, mended(surface)), exact_need(surface.floor)
+    state, hopeless = start.framed(), max(most, mended(surface))
     # As many of all operations together as of a lone one: more of them tell of the same points again.
     stride = max(1, len(surface.cloud.points) // max(GLANCE, MOVED_ALONE // len(state.standard)))
     asked, steps = seems(surface, start) if surface.is_open else 0.0, list[Iterate]()
@@ -151,8 +151,9 @@ def fitted(
         found = _placed(surface, best, history, before, GLANCE)
     else:
         found = _placed(surface, best, history, before)
-        # What needs nothing by what was seen needs no less elsewhere.
-        if exact < found.seen and found.need <= COARSE * most:
+        # What leaves no doubt by what was seen leaves no less elsewhere.
+        clear = max(exact_need(surface.floor), certain(surface.tolerance, surface.floor / surface.tolerance))
+        if clear < found.seen and found.need <= COARSE * most:
             found = _moved(surface, found, every, was_slid=best is not first)
     if not surface.viewed or not found.elements:
         return found

@@ -9,7 +9,7 @@ import numpy as np
 
 from symrefine.clock import Clock
 from symrefine.decide.chain import chain, explore
-from symrefine.decide.hypotheses import MOVED, SAME_RAD, Hypothesis
+from symrefine.decide.hypotheses import MOVED_ALONE, SAME_RAD, Hypothesis
 from symrefine.decide.looks import LOOK, few_motions
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, meant, odd
@@ -226,15 +226,16 @@ def _strangers(found: Examined, points: Array, tolerance: float) -> tuple[Index,
         return ()
     if not (rivals := found.rivals(tolerance)[:RIVALS]):
         return ()
+    few = [r for r in rivals if 0.0 < _unmet(surface, r.placed, LOOK).mean() <= CLUMP]
+    if not few:
+        return ()
     own = np.setdiff1d(np.arange(len(points)), np.concatenate(measured.apart), assume_unique=True)
     local = (points[own] - measured.moments.center) / measured.moments.scale
-    some = MOVED // 4
-    nearest = Tree(surface.cloud.points[:: surface.stride(some)]).nearest(local)[1]
-    for rival in rivals:
-        if 0.0 < _unmet(surface, rival.placed, LOOK).mean() <= CLUMP:
-            unmet = _unmet(surface, rival.placed, some)
-            if (group := clump_among(local, unmet[nearest])).size:
-                return (own[group],)
+    nearest = Tree(surface.cloud.points[:: surface.stride(MOVED_ALONE)]).nearest(local)[1]
+    for rival in few:
+        unmet = _unmet(surface, rival.placed, MOVED_ALONE)
+        if (group := clump_among(local, unmet[nearest])).size:
+            return (own[group],)
     return ()
 
 
