@@ -24,9 +24,9 @@ from symrefine.surface.skin import Skin
 from symrefine.surface.surface import Coverage, Surface
 from symrefine.surface.wedge import Wedge
 
-# Local planes that are moved to judge a group: by all operations together, by each of them at most, as in a fit by all
-# together, and by each at least: 0.6 % of fewer are no sample.
-MOVED, MOVED_ALONE, MOVED_EACH = 12000, 3000, 1200
+# Local planes that are moved in a fit and when judged by all together (a quarter of that by each at most), and when
+# judged by each at least: 0.6 % of fewer are no sample.
+MOVED, MOVED_EACH = 12000, 1200
 # Elements nearer than this (radians) are the same.
 SAME_RAD = np.radians(4.0)
 
@@ -130,8 +130,7 @@ def fitted(
     place only; where no start leads to as little, no elements are told, and the fit ends after `SHORT` steps.
     """
     state, hopeless = start.framed(), max(most, mended(surface))
-    # As many of all operations together as of a lone one: more of them tell of the same points again.
-    stride = max(1, len(surface.cloud.points) // max(GLANCE, MOVED_ALONE // len(state.standard)))
+    stride = surface.stride(_moved_each(len(state.standard), GLANCE), matched=True)
     asked, steps = seems(surface, start) if surface.is_open else 0.0, list[Iterate]()
     for iterate in refine(surface.cloud, state, start_error_rad=error_rad, stride=stride):
         steps.append(iterate)
@@ -331,7 +330,7 @@ def belief_in_as_much(surface: Surface, placed: Placed) -> float:
 
 
 def _moved_each(operations: int, least: int) -> int:
-    return min(max(least, MOVED // operations), MOVED_ALONE)
+    return min(max(least, MOVED // operations), MOVED // 4)
 
 
 def _judged(surface: Surface, parts: _Parts, misses: Array, drifts: Array) -> tuple[tuple[Element, ...], float]:

@@ -85,7 +85,7 @@ def looked_at(
     sideways, stays where the fit put it.
     """
     state, error, history = start.roughly_framed(), start_error(surface), []
-    stride = max(1, len(surface.cloud.points) // max(GLANCE, LOOK // len(state.standard)))
+    stride = surface.stride(max(GLANCE, LOOK // len(state.standard)), matched=True)
     for iterate in refine(surface.cloud, state, start_error_rad=error, stride=stride):
         history.append(iterate)
         if iterate.converged or iterate.index < SHORT:

@@ -9,7 +9,7 @@ import numpy as np
 
 from symrefine.clock import Clock
 from symrefine.decide.chain import chain, explore
-from symrefine.decide.hypotheses import MOVED_ALONE, SAME_RAD, Hypothesis
+from symrefine.decide.hypotheses import MOVED, SAME_RAD, Hypothesis
 from symrefine.decide.looks import LOOK, few_motions
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, meant, odd
@@ -231,9 +231,10 @@ def _strangers(found: Examined, points: Array, tolerance: float) -> tuple[Index,
         return ()
     own = np.setdiff1d(np.arange(len(points)), np.concatenate(measured.apart), assume_unique=True)
     local = (points[own] - measured.moments.center) / measured.moments.scale
-    nearest = Tree(surface.cloud.points[:: surface.stride(MOVED_ALONE)]).nearest(local)[1]
+    some = MOVED // 4
+    nearest = Tree(surface.cloud.points[:: surface.stride(some)]).nearest(local)[1]
     for rival in few:
-        unmet = _unmet(surface, rival.placed, MOVED_ALONE)
+        unmet = _unmet(surface, rival.placed, some)
         if (group := clump_among(local, unmet[nearest])).size:
             return (own[group],)
     return ()

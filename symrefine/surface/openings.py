@@ -248,7 +248,7 @@ def openings(
         points: [N, 3] all that is known of it.
         tree: kd-tree over them.
         cameras: what saw it, where that is known.
-        near: [M, NEIGHBOURS] of the points near each local plane, or more, if they are known already.
+        near: [M, NEIGHBOURS] of the points near each local plane, if they are known already.
         clumps: what hides parts of it.
         floor: what it stands on, if that was set apart.
         strays: whether there were any: then what is lonely may be one more, which has all that is near to one side,
@@ -262,7 +262,7 @@ def openings(
     if floor is not None:
         aside[floor.meets(cloud.points, cloud.beside)] = 0.0
     far = _lines(cloud, (aside > FAR_ASIDE) & ~(cloud.lonely & strays))
-    far[far] = ~_folded(cloud.points[far], points, tree, None if near is None else near[far, :NEIGHBOURS])
+    far[far] = ~_folded(cloud.points[far], points, tree, None if near is None else near[far])
     if width > WIDEST or far.mean() < least * width or not far.any():
         closed = Openings(line=none, border=none, evident=False, clumps=clumps, floor=floor)
         return closed if closed.covering else None

@@ -282,15 +282,14 @@ class Skin:
         across = np.einsum("ij,ij->i", fitted.normals, points - fitted.points)
         return replace(fitted, points=points - fitted.normals * across[:, None])
 
-    def near(self, pick: Index, least: int, *, scattered: bool = False) -> Index | None:
-        """The neighbours [M, .] of some of the points, `least` or as many as planes need; None where points make none.
+    def near(self, pick: Index, most: int, *, scattered: bool = False) -> Index | None:
+        """The neighbours [M, most] of some of the points, or None where planes are made of other things or more.
 
         `scattered` as of `Tree.query`.
         """
-        if self.neighbours == 1 or self._neighbourhoods.tree is not self.tree:
+        if not 1 < self.neighbours <= most:
             return None
-        count = max(least, self._neighbourhoods.count)
-        return self.tree.query(rows(self.points, pick), count, scattered=scattered)[1]
+        return self.tree.query(rows(self.points, pick), most, scattered=scattered)[1]
 
     def _planes(self, queries: Array, nearest: Index, near: Index | None = None) -> Planes:
         normals = None if self.normals is None else rows(self.normals, nearest)

@@ -135,9 +135,13 @@ class Surface:
         """What is needed from which on nothing is told apart of an open surface."""
         return HOPELESS * self.tolerance
 
-    def stride(self, sources: int) -> int:
-        """Stride that leaves about `sources` local planes; enough for the patches of an image to hang together."""
-        return max(1, len(self.cloud.points) // max(sources, PATCHES if self.is_open else 1))
+    def stride(self, sources: int, *, matched: bool = False) -> int:
+        """Stride that leaves about `sources` local planes; enough for the patches of an image to hang together.
+
+        Those that are only to be `matched` need not hang together, but of a view few have a counterpart.
+        """
+        least = PATCHES if self.viewed or (self.is_open and not matched) else 1
+        return max(1, len(self.cloud.points) // max(sources, least))
 
     def misses(
         self, motions: Sequence[Isometry], *, sources: int = 10**9, bound: float = math.inf, discs: int = DISCS
