@@ -150,8 +150,10 @@ def fitted(
         found = _placed(surface, best, history, before, GLANCE)
     else:
         found = _placed(surface, best, history, before)
-        # What leaves no doubt by what was seen leaves no less elsewhere.
-        clear = max(exact_need(surface.floor), certain(surface.tolerance, surface.floor / surface.tolerance))
+        # What leaves no doubt by what was seen leaves no less elsewhere; of a view it tells where it stands.
+        clear = exact_need(surface.floor)
+        if not surface.viewed:
+            clear = max(clear, certain(surface.tolerance, surface.floor / surface.tolerance))
         if clear < found.seen and found.need <= COARSE * most:
             found = _moved(surface, found, every, was_slid=best is not first)
     if not surface.viewed or not found.elements:
