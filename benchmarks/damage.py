@@ -62,7 +62,7 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=6, help="each so many-th object (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=5150, help="of damage and poses (default: %(default)s)")
     options = parser.parse_args()
-    report(list(metrics(every=options.every, seed=options.seed)))
+    report(metrics(every=options.every, seed=options.seed))
 
 
 if __name__ == "__main__":

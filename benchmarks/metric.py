@@ -1,7 +1,7 @@
 """A benchmark figure, and its comparison with the stored one."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,14 +19,17 @@ class Metric:
     rel_tol: float = 0.4
 
 
-def report(metrics: Sequence[Metric]) -> None:
-    """Print each figure beside its target and the stored value."""
+def report(metrics: Iterable[Metric]) -> list[Metric]:
+    """Print each figure beside its target and the stored value as soon as it is known; all of them."""
     stored = json.loads(STORED.read_text()) if STORED.exists() else {}
-    print(f"{'figure':44s} {'value':>9s} {'target':>9s} {'stored':>9s}  unit")
+    print(f"{'figure':44s} {'value':>9s} {'target':>9s} {'stored':>9s}  unit", flush=True)
+    found = []
     for m in metrics:
         before = f"{stored[m.key]:9.2f}" if m.key in stored else f"{'-':>9s}"
         verdict = "" if m.value <= m.target else "  over target"
-        print(f"{m.key:44s} {m.value:9.2f} {m.target:9.2f} {before}  {m.unit}{verdict}")
+        print(f"{m.key:44s} {m.value:9.2f} {m.target:9.2f} {before}  {m.unit}{verdict}", flush=True)
+        found.append(m)
+    return found
 
 
 def regressions(metrics: Sequence[Metric]) -> list[str]:

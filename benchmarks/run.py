@@ -6,6 +6,7 @@ Some minutes; `--full` (`make bench BENCH_ARGS=--full`) goes to the ends of ever
 
 import argparse
 import sys
+from itertools import chain
 
 from benchmarks import alignment, damage, detection, everyday, growth
 from benchmarks.metric import regressions, report, store
@@ -19,14 +20,14 @@ def main() -> int:
     parser.add_argument("--gate", action="store_true", help="fail where a figure is worse than the stored one")
     options = parser.parse_args()
     full = options.full
-    found = [
-        *detection.metrics(),
-        *damage.metrics(every=2 if full else 6),
-        *everyday.metrics(full=full),
-        *growth.metrics(full=full),
-        *alignment.metrics(full=full),
-    ]
-    report(found)
+    parts = (
+        detection.metrics(),
+        damage.metrics(every=2 if full else 6),
+        everyday.metrics(full=full),
+        growth.metrics(full=full),
+        alignment.metrics(full=full),
+    )
+    found = report(chain.from_iterable(parts))
     if options.store:
         store(found)
     worse = regressions(found) if options.gate else []
