@@ -17,7 +17,7 @@ from symrefine.moments.moments import central_moments
 from symrefine.propose.spectrum import mirror_candidates
 
 POINTS = 20000
-# Passes at most that are asked for: of a whole object without noise, with it, and where much of the object is missing.
+# What the project set itself, in passes: of a whole object without noise, with it, and where much of one is missing.
 CLEAN, NOISY, MISSING = 5.0, 7.0, 10.0
 REPEATS = 7
 
@@ -34,7 +34,7 @@ def best_of(work: Callable[[], object], repeats: int = REPEATS) -> float:
 
 
 def clouds() -> Iterator[tuple[str, Array, float]]:
-    """Clouds in a random pose, and the passes that are asked for.
+    """Clouds in a random pose, and the passes that they may cost.
 
     They have a b-plane, a plane, a revolution or none, and there is a cube, on which every n-tuple vanishes. Surfaces
     that are open follow, or that noise makes look so.

@@ -144,8 +144,8 @@ def test_shapes_of_the_first_groups(name, noise):
 @pytest.mark.parametrize("noise", [0.0, 0.005, 0.01])
 @pytest.mark.parametrize("name", SHAPES)
 def test_shapes_of_the_first_groups_in_more_poses(name, noise):
-    groups = [detect(posed(made(name), seed, count=20000, noise=noise)[0]).point_group for seed in range(2, 5)]
-    assert groups == [SHAPES[name][1]] * 3
+    groups = [detect(posed(made(name), seed, count=20000, noise=noise)[0]).point_group for seed in range(2, 8)]
+    assert groups == [SHAPES[name][1]] * 6
 
 
 @pytest.mark.parametrize("name", [name for name in CLEAN if name not in ("square box", "cone", "prism6", "pyramid5")])
@@ -170,8 +170,8 @@ def test_clean_meshes(name):
 @pytest.mark.parametrize("form", ["mesh", "sample"])
 @pytest.mark.parametrize("name", CLEAN)
 def test_clean_solids_in_more_poses(name, form):
-    groups = [detect(posed(CLEAN[name][0](), seed, form=form)[0]).point_group for seed in (4, 5)]
-    assert groups == [CLEAN[name][1]] * 2
+    groups = [detect(posed(CLEAN[name][0](), seed, form=form)[0]).point_group for seed in range(4, 8)]
+    assert groups == [CLEAN[name][1]] * 4
 
 
 @pytest.mark.parametrize("name", ["Ci", "C3", "S4", "D2d", "Th", "O"])
@@ -185,7 +185,8 @@ def test_surfaces_of_every_kind_of_group(name):
 @pytest.mark.parametrize("form", ["mesh", "sample"])
 @pytest.mark.parametrize("name", [g for g in GROUPS if g != "I"])  # its sixty tetrahedra miss Ih by the tolerance only
 def test_surfaces_of_every_group(name, form):
-    assert detect(posed(tetrahedra(name), 6, form=form)[0]).point_group == name
+    groups = [detect(posed(tetrahedra(name), seed, form=form)[0]).point_group for seed in (6, 7)]
+    assert groups == [name] * 2
 
 
 def test_independent_samples_of_a_cube():

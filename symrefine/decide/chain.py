@@ -17,6 +17,7 @@ from symrefine.decide.hypotheses import (
     SAME_RAD,
     Hypothesis,
     belief_in_as_much,
+    doubtless,
     fitted,
     has_all,
     roughly_judged,
@@ -98,7 +99,7 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
 
 def _hidden(surface: Surface) -> float:
     """The need up to which noise tells no two groups apart, and none is doubted for it."""
-    return min(exact_need(surface.floor), certain(surface.tolerance, surface.floor / surface.tolerance))
+    return min(exact_need(surface.floor), doubtless(surface))
 
 
 def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float) -> Pool:

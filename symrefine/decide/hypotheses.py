@@ -153,13 +153,18 @@ def fitted(
         # What leaves no doubt by what was seen leaves no less elsewhere; of a view it tells where it stands.
         clear = exact_need(surface.floor)
         if not surface.viewed:
-            clear = max(clear, certain(surface.tolerance, surface.floor / surface.tolerance))
+            clear = max(clear, doubtless(surface))
         if clear < found.seen and found.need <= COARSE * most:
             found = _moved(surface, found, every, was_slid=best is not first)
     if not surface.viewed or not found.elements:
         return found
     told = is_told(found.placed, [(e.operations, e.coverage.supported) for e in found.elements])
     return replace(found, told=told, elsewhere=least_elsewhere(surface, found.placed))
+
+
+def doubtless(surface: Surface) -> float:
+    """The need that leaves no doubt worth telling at the tolerance asked for, in the noise that there is."""
+    return certain(surface.tolerance, surface.floor / surface.tolerance)
 
 
 def _moved(
