@@ -234,6 +234,19 @@ def test_what_breaks_a_symmetry_is_no_clump(mesh, group, noise_rel):
     assert found.undetermined or found.point_group == group
 
 
+def test_a_clump_by_the_axis_may_hide_what_it_breaks():
+    """What lies about an axis is carried onto itself, or nearly: a part of the object, or a clump that stands there."""
+    mesh, truth = specimen("shape", "bottle")
+    rng = np.random.default_rng(40)
+    body, size = sample(mesh, 19600, 0.003, rng), mesh.diagonal
+    above, aside = truth.center + 0.2 * size * truth.group.frame[2], truth.group.frame[0]
+    blob = 0.03 * size * rng.normal(size=(400, 3))
+    on_it, near_it = (detect(np.concatenate([body, above + off * size * aside + blob])) for off in (0.0, 0.03))
+    assert (on_it.point_group, on_it.clumps, on_it.strewn) == ("Cinfv", 0, False)
+    assert (near_it.point_group, near_it.clumps, near_it.strewn, near_it.at_least) == ("Cs", 0, True, True)
+    assert "Strays that are left near the surface may hide more." in scanned(near_it)
+
+
 def test_a_piece_that_a_hole_cut_off_is_no_clump():
     """A piece of surface is none; as many points that fill a volume in its place are."""
     rng = np.random.default_rng(18)
@@ -259,6 +272,10 @@ def test_a_clump_apart_is_told_and_a_part_apart_is_not():
     on_axis = sample(join([box((1.0, 0, 0), (0.1, 0.1, 0.1))]), 500, 0.001, np.random.default_rng(10))
     lone = detect(np.concatenate([points, on_axis]))
     assert (lone.point_group, lone.clumps) == ("C2v", 0)
+    # Each is judged by itself.
+    larger = np.array([0.2, 0.9, 0.5]) + 0.04 * np.random.default_rng(11).normal(size=(1200, 3))
+    one = detect(np.concatenate([points, on_axis, larger]))
+    assert (one.point_group, one.clumps, one.outliers.min()) == ("C2v", 1, 12500)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 """Clouds as sensors give them: strays, uneven density, missing parts, views from a camera.
 
-    python -m experiments.studies.damaged [--only KIND ...] [--shapes NAME ... | --tangles N] [--every N] [--seed N]
-                                          [--jobs N] [--figure PATH]
+    python -m experiments.studies.damaged [--only KIND ...] [--strength X ...] [--shapes NAME ... | --tangles N]
+                                          [--every N] [--seed N ...] [--jobs N] [--figure PATH]
 
 Shapes of many groups, 20,000 points with 0.3 % noise in random poses and units, damaged by kind and strength (see
 `experiments.objects.damage`). A plane is asked for where at least 15 % of the points that are left move under it and
@@ -26,6 +26,7 @@ from experiments.objects.damage import FLOORS, KINDS, Damaged, can_show
 from experiments.objects.poses import Pose
 from experiments.studies.answers import SURE, claims
 from experiments.studies.jobs import add_jobs, in_order
+from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
 from symrefine.geometry import line_angle_rad, tight_diagonal
 from symrefine.groups import PointGroup
@@ -75,7 +76,8 @@ class Row:
         found: of these.
         false: planes and axes of confidence .5 and more that the object has not.
         claimed: planes and axes of confidence .5 and more.
-        worst_deg: largest angle error of those found.
+        worst_deg: largest angle error of those found; NaN without any.
+        worst_rel: the same of how far they are from where they should be, as a fraction of the diagonal.
         strays: precision and recall of the points that were taken as strays; NaN without any.
         seconds: of the detection.
     """
@@ -91,20 +93,29 @@ class Row:
     false: int
     claimed: int
     worst_deg: float
+    worst_rel: float
     strays: tuple[float, float]
     seconds: float
 
 
-def cases(kinds: Sequence[str], shapes: Sequence[str], seed: int, tangled: int | None = None) -> Iterator[Case]:
-    """Every shape with every damage, or every tangle of a seed."""
+def cases(
+    kinds: Sequence[str],
+    shapes: Sequence[str],
+    seed: int,
+    tangled: int | None = None,
+    strengths: Sequence[float] = (),
+) -> Iterator[Case]:
+    """Every shape with every damage, or every tangle of a seed; kinds, shapes and strengths are all where none is."""
     if tangled is not None:
         named = [("tangle", n) for n in tangles.names(tangled)]
     else:
         named = [("shape", n) for n in OWN] + [("catalogue", n) for n in REAL if n in catalogue()]
-    for kind, (_, strengths) in KINDS.items():
-        for strength in strengths:
+    for kind, (_, known) in KINDS.items():
+        if kinds and kind not in kinds:
+            continue
+        for strength in (k for k in known if not strengths or k in strengths):
             for family, name in named:
-                if (not kinds or kind in kinds) and (not shapes or name in shapes):
+                if not shapes or name in shapes:
                     yield Case(family=family, name=name, kind=kind, strength=strength, seed=seed)
 
 
@@ -131,6 +142,7 @@ def run(case: Case) -> Row:
     own = made.points[made.strays == 0]
     diagonal = tight_diagonal(own)
     errors = [_error(found, truth, n, diagonal) for n in _normals(truth.group) if _shown(own, truth, n)]
+    known = [e for e in errors if e is not None]
     there = [holds(truth, claim, diagonal) for claim, _ in claims(found)]
     sure = [confidence for _, confidence in claims(found)]
     true = all(there) and not (found.inversion and not truth.group.has_inversion)
@@ -147,10 +159,11 @@ def run(case: Case) -> Row:
         right=not found.undetermined and true and (at_least or found.point_group == truth.group.name),
         contradicted=not true,
         shown=len(errors),
-        found=sum(e < math.inf for e in errors),
+        found=len(known),
         false=sum(not t and c >= CLAIMED for t, c in zip(there, sure, strict=True)),
         claimed=sum(c >= CLAIMED for c in sure),
-        worst_deg=max((e for e in errors if e < math.inf), default=math.nan),
+        worst_deg=max((angle for angle, _ in known), default=math.nan),
+        worst_rel=max((away for _, away in known), default=math.nan),
         strays=(both / flagged.sum() if flagged.any() else math.nan, both / stray.sum() if stray.any() else math.nan),
         seconds=seconds,
     )
@@ -169,22 +182,18 @@ def _shown(points: np.ndarray, truth: Truth, direction: np.ndarray) -> bool:
     return can_show(points, direction, float(direction @ truth.center))
 
 
-def _error(found: object, truth: Truth, direction: np.ndarray, diagonal: float) -> float:
-    """Angle to the nearest element of the kind that lies close enough, in degrees; infinite if none is there."""
-    best = math.inf
+def _error(found: Detection, truth: Truth, direction: np.ndarray, diagonal: float) -> tuple[float, float] | None:
+    """Angle (degrees) and distance (of the diagonal) of the nearest element of the kind; None if none is close."""
     if truth.group.is_finite:
-        near = [(p.plane.normal, abs(p.plane.signed_distance(truth.center))) for p in found.planes]  # type: ignore[attr-defined]
+        near = [(p.plane.normal, float(abs(p.plane.signed_distance(truth.center)))) for p in found.planes]
     else:
         near = [
-            (a.axis.direction, np.linalg.norm(np.cross(truth.center - a.axis.point, a.axis.direction)))
-            for a in found.axes  # type: ignore[attr-defined]
+            (a.axis.direction, float(np.linalg.norm(np.cross(truth.center - a.axis.point, a.axis.direction))))
+            for a in found.axes
             if math.isinf(a.order)
         ]
-    for other, away in near:
-        angle = math.degrees(line_angle_rad(other, direction))
-        if angle <= FOUND_DEG and away <= FOUND_REL * diagonal:
-            best = min(best, angle)
-    return best
+    every = ((math.degrees(line_angle_rad(other, direction)), away / diagonal) for other, away in near)
+    return min((e for e in every if e[0] <= FOUND_DEG and e[1] <= FOUND_REL), default=None)
 
 
 def line(rows: Sequence[Row]) -> str:
@@ -193,13 +202,14 @@ def line(rows: Sequence[Row]) -> str:
     claimed, false = sum(r.claimed for r in rows), sum(r.false for r in rows)
     each = [r.found / r.shown for r in rows if r.shown]
     sure = [r for r in rows if r.confidence >= SURE]
-    errors = [r.worst_deg for r in rows if not math.isnan(r.worst_deg)]
+    off = [(r.worst_deg, 100.0 * r.worst_rel) for r in rows if not math.isnan(r.worst_deg)]
+    angle, away = np.median(off, axis=0) if off else (math.nan, math.nan)
     undecided = sum(math.isnan(r.confidence) for r in rows)
     bad = sum(not (r.right or (not r.contradicted and r.group.startswith("at least"))) for r in sure)
     return (
         f"recall {found / max(shown, 1):5.2f} of {shown:3d}, by object {np.mean(each) if each else math.nan:5.2f}  "
         f"false {false:3d} of {claimed:3d}  right {sum(r.right for r in rows):3d}, undetermined {undecided:2d} "
-        f"of {len(rows):3d}  sure and wrong {bad:2d} of {len(sure):3d}  error {np.median(errors or [math.nan]):.2f} deg"
+        f"of {len(rows):3d}  sure and wrong {bad:2d} of {len(sure):3d}  error {angle:.2f} deg, {away:.2f} %"
         f"  {np.median([r.seconds for r in rows]):.2f} s, worst {max(r.seconds for r in rows):.1f}"
     )
 
@@ -240,12 +250,18 @@ def main() -> None:
     parser.add_argument("--shapes", nargs="*", default=[], metavar="NAME")
     parser.add_argument("--tangles", type=int, metavar="N", help="tangles of this seed (`experiments.objects.tangles`)")
     parser.add_argument("--every", type=int, default=1, help="each so many-th case (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of damage, noise and poses (default: %(default)s)")
+    parser.add_argument("--strength", nargs="*", default=[], type=float, metavar="X", help="of damage (default: all)")
+    parser.add_argument("--seed", nargs="+", type=int, default=[0], help="of damage, noise and poses (default: 0)")
     parser.add_argument("--figure", type=Path, help="where a heat map of shapes by damage goes")
     add_jobs(parser)
     options = parser.parse_args()
     rows = []
-    every = list(cases(options.only, options.shapes, options.seed, options.tangles))[:: options.every]
+    given = (options.only, options.shapes)
+    every = [
+        case
+        for seed in options.seed
+        for case in list(cases(*given, seed, options.tangles, options.strength))[:: options.every]
+    ]
     for row in in_order(run, every, options.jobs):
         rows.append(row)
         if not row.right or row.false or row.found < row.shown:

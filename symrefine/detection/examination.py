@@ -46,6 +46,7 @@ class Examined:
         exact: the group that maps the vertices of a mesh onto one another, where they put it, if that can be told.
         no_floor: whether it was told that it stands on one, and none was found.
         denied: if points were taken for a clump because they alone speak against it, the group that they leave.
+        hides: whether points that were not, as they seem to be a part of the object, alone speak against a larger group.
     """
 
     measured: Measured
@@ -58,6 +59,7 @@ class Examined:
     exact: OnVertices | None
     no_floor: bool = False
     denied: Hypothesis | None = None
+    hides: bool = False
 
     def among(self, left: Mask) -> "Examined":
         """The same of all points, of which those of the floor, that others are left of [N], are outliers, too."""
@@ -197,19 +199,31 @@ def _without_floor(shape: Shape | Sketch, outliers: Outliers) -> tuple[Shape | S
 def _likeliest(
     shape: Shape | Sketch, examine: Callable[..., Examined], tolerance: float, *, outliers: bool
 ) -> Examined:
-    """What is found where that is set apart which alone hides a symmetry, and where no part of the object is."""
+    """What is found where that is set apart which alone hides a symmetry, and where no part of the object is.
+
+    What seems to be a part may be a clump by the axis of a larger group all the same, and then hides that.
+    """
     found = examine(apart=True)
-    apart = not _has_parts_apart(found, tolerance)
-    if not apart:
-        found = examine(apart=False)
+    own, others = _told_apart(found, tolerance)
+    apart, hides = not own, False
+    if own:
+        without, found = found, examine(apart=False, foreign=others)
+        hides = without.size(tolerance) > found.size(tolerance)
     points = (shape.sample if isinstance(shape, Sketch) else shape).points
     for suspects in (_suspects, _strangers) if outliers else ():
         # What fills a volume beside a surface is taken for a clump only where it alone hides a symmetry.
-        if foreign := suspects(found, points, tolerance):
-            without = examine(apart=apart, foreign=foreign)
-            if without.size(tolerance) > found.size(tolerance) and not _has_parts_apart(without, tolerance):
-                return replace(without, denied=found.links[found.decided(tolerance).index])
-    return found
+        if not (foreign := suspects(found, points, tolerance)):
+            continue
+        without = examine(apart=apart, foreign=foreign)
+        own, others = _told_apart(without, tolerance)
+        if own and without.size(tolerance) > found.size(tolerance):
+            hides = True
+            if others:
+                without = examine(apart=False, foreign=others)
+                own, _ = _told_apart(without, tolerance)
+        if not own and without.size(tolerance) > found.size(tolerance):
+            return replace(without, denied=found.links[found.decided(tolerance).index])
+    return replace(found, hides=hides)
 
 
 def _suspects(found: Examined, _: Array, tolerance: float) -> tuple[Index, ...]:
@@ -247,10 +261,13 @@ def _unmet(surface: Surface, placed: Placed, sources: int) -> Mask:
     return np.asarray((np.nan_to_num(misses) > surface.far).mean(axis=0) > 0.5)
 
 
-def _has_parts_apart(found: Examined, tolerance: float) -> bool:
-    """Whether something that was set apart is a part of the object."""
-    clumps = [points for _, points in found.measured.clumps]
-    return any(_belongs(found, c, tolerance) or _replaces(found, c, tolerance) for c in clumps)
+def _told_apart(found: Examined, tolerance: float) -> tuple[list[Index], list[Index]]:
+    """Of what was set apart the indices of each group that seems to be a part of the object, and of each that does not."""
+    own, others = list[Index](), list[Index]()
+    for indices, points in found.measured.clumps:
+        is_part = _belongs(found, points, tolerance) or _replaces(found, points, tolerance)
+        (own if is_part else others).append(indices)
+    return own, others
 
 
 def _examined(

@@ -149,7 +149,8 @@ class Detection(ReadOnly):
             its sample.
         at_least: whether the surface has open borders beyond which nobody looked, or is `strewn`: the object may have
             more symmetry.
-        strewn: whether so many strays are left beside the surface that they may hide some, and all of it was seen.
+        strewn: whether so many strays are left beside the surface that they may hide some, and all of it was seen, or
+            a group of points that may be a clump, or a part of it, alone speaks against a larger group.
         floor: what the object stands on, in input units, where that was told and found: outliers, too.
         no_floor: whether that was told and none found.
         clumps: how many groups of them stand apart from the body, the others being single strays.

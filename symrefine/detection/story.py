@@ -171,7 +171,7 @@ def _report(
     turned_down = [] if reason else _turned_down(found, chosen, COARSE * tolerance)
     inversion = next((e for e in chosen.elements if e.operations.kind == "inversion"), None)
     more = not reason and chosen.group.name != "Kh"  # of which there is none
-    strewn = found.has_strays_left and not any(e.coverage.unseen for e in chosen.elements)
+    strewn = found.hides or (found.has_strays_left and not any(e.coverage.unseen for e in chosen.elements))
     # Nobody saw the bottom of what stands on a floor.
     hidden = measured.floor is not None and chosen.group.is_polar
     return Detection(
