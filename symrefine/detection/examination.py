@@ -46,7 +46,7 @@ class Examined:
         exact: the group that maps the vertices of a mesh onto one another, where they put it, if that can be told.
         no_floor: whether it was told that it stands on one, and none was found.
         denied: if points were taken for a clump because they alone speak against it, the group that they leave.
-        hides: whether points that were not, as they seem to be a part of the object, alone speak against a larger group.
+        hides: whether points that were not, as they seem to be a part of it, alone speak against a larger group.
     """
 
     measured: Measured
@@ -262,7 +262,7 @@ def _unmet(surface: Surface, placed: Placed, sources: int) -> Mask:
 
 
 def _told_apart(found: Examined, tolerance: float) -> tuple[list[Index], list[Index]]:
-    """Of what was set apart the indices of each group that seems to be a part of the object, and of each that does not."""
+    """Indices of each group of what was set apart that seems to be a part of the object, and of each that does not."""
     own, others = list[Index](), list[Index]()
     for indices, points in found.measured.clumps:
         is_part = _belongs(found, points, tolerance) or _replaces(found, points, tolerance)
