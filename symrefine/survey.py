@@ -6,7 +6,6 @@ from typing import Literal
 
 import numpy as np
 
-from symrefine.decide.doubts import FLAT
 from symrefine.detection.measure import floor_under, heavy, is_few
 from symrefine.detection.sketch import is_large, sampled
 from symrefine.errors import DegenerateShapeError
@@ -14,6 +13,7 @@ from symrefine.geometry import Array, ReadOnly
 from symrefine.lengths import object_diagonal
 from symrefine.moments.moments import shape_moments
 from symrefine.moments.quadrature import triangle_areas_and_normals
+from symrefine.rounding import SINGLE
 from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import count_parts
 from symrefine.surface.neighbourhoods import connected_parts, fills_volume
@@ -206,7 +206,7 @@ def doubts(found: Survey) -> Iterator[str]:
         yield f"{found.repeated:,} points stand where others do: these places weigh more"
     if found.kind == "points" and len(found.spread) == 3:
         yield "so few points stand for themselves, as atoms do; of a surface give more than 250"
-    flat = int((found.spread**2 < FLAT * found.spread[0] ** 2).sum())
+    flat = int((found.spread**2 < SINGLE**2 * found.spread[0] ** 2).sum())
     if flat:
         left = {1: "a line", 2: "a plane"}.get(len(found.spread) - flat, f"{len(found.spread) - flat} dimensions")
         yield f"all points lie in {left}" if left != "a line" else "all points lie on a line"

@@ -5,11 +5,11 @@ import numpy as np
 from symrefine.align.alignment import OK
 from symrefine.align.moment_fit import ROUNDING
 from symrefine.align.pair import Side, shares
-from symrefine.decide.doubts import FLAT
 from symrefine.detection.measure import SAMPLES, class_moments
 from symrefine.geometry import Array
 from symrefine.moments.moments import Moments, central_moments, deviations, tensor_index
 from symrefine.moments.quadrature import mesh_nodes
+from symrefine.rounding import SINGLE
 from symrefine.shape import Shape
 from symrefine.surface.skin import drawn
 
@@ -40,7 +40,7 @@ def thinned(source: Shape, target: Shape, seed: int) -> tuple[Shape, Shape]:
         return source, target
     spreads = [_spread(s) for s in (source, target) if s.faces is None]
     alike = len(spreads) == 2 and np.abs(spreads[0] - spreads[1]).max() < ROUNDING
-    if (alike and len(source.points) == len(target.points)) or min((s[0] for s in spreads), default=0.0) <= FLAT:
+    if (alike and len(source.points) == len(target.points)) or min((s[0] for s in spreads), default=0.0) <= SINGLE**2:
         return source, target
     return _some(source, seed), _some(target, seed)
 
@@ -68,7 +68,7 @@ def _is_large(shape: Shape) -> bool:
 
 def rank_of(moments: Moments) -> int:
     """Dimension of the subspace that the points spread in."""
-    return int((np.linalg.eigvalsh(moments.covariance) > FLAT).sum())
+    return int((np.linalg.eigvalsh(moments.covariance) > SINGLE**2).sum())
 
 
 def differ_in_size(source: Side, target: Side) -> bool:

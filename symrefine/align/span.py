@@ -13,11 +13,11 @@ import numpy as np
 
 from symrefine.align.moment_fit import LONGEST, Fits, MomentPair, as_good, best_fits, covariance, exact, misfit
 from symrefine.align.procrustes import Procrustes, procrustes
-from symrefine.decide.doubts import FLAT
 from symrefine.geometry import Array
 from symrefine.moments.action import FLOOR, Monomials, skew
 from symrefine.moments.moments import Moments, deviations, exponents, occurrences
 from symrefine.ntuples.contract import NTuples
+from symrefine.rounding import DOUBLE
 
 # A turn is not determined if its information is mostly noise: where the moments of the two, with their independent
 # errors, share less than this part of it.
@@ -77,7 +77,7 @@ def monomial_pair(source: Moments, target: Moments) -> MomentPair:
     a, b = (np.concatenate([m.values[None], m.replicates]) for m in (source, target))
     b = action.turned(axes.T[None], b)[0]
     widths = [np.linalg.eigvalsh(m.covariance) for m in (source, target)]
-    size = np.prod(np.maximum(0.5 * (widths[0] + widths[1]), FLAT) ** table, axis=1)
+    size = np.prod(np.maximum(0.5 * (widths[0] + widths[1]), DOUBLE) ** table, axis=1)
     own = action.turned(np.linalg.eigh(source.covariance)[1].T[None], a)[0]
     noise = _relative_variance(own[1:], size, dim, order) + _relative_variance(b[1:], size, dim, order)
     # Each moment counts as often as it stands in its tensor, and all of them as many as they are.

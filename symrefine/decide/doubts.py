@@ -3,9 +3,8 @@
 import numpy as np
 
 from symrefine.geometry import Array
+from symrefine.rounding import SINGLE
 
-# Variance across, as a fraction of that along, below which points lie on a line: rounding of float32.
-FLAT = 1e-12
 # Points so many times as far out as 99 % of all set the scale: 2 % of their diagonal is 10 % of the object.
 STRAY = 5.0
 
@@ -13,7 +12,7 @@ STRAY = 5.0
 def on_a_line(covariance: Array) -> str:
     """Why points of a covariance [n, n] say nothing, or nothing: on a line they look the same from all sides."""
     *_, middle, largest = np.linalg.eigvalsh(covariance)
-    if middle > FLAT * largest:
+    if middle > SINGLE**2 * largest:
         return ""
     return "all points lie on a line, which says nothing of the rest"
 

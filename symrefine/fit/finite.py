@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from symrefine.errors import InputError
 from symrefine.geometry import Array, rotation, unit
 from symrefine.groups import MAX_FOLD, PointGroup, is_subgroup, point_group
+from symrefine.rounding import SINGLE
 from symrefine.shape import Index
 
 # Turns that stand for a continuous axis where the points themselves show no fold, and the fewest of them.
@@ -18,8 +19,6 @@ SECTOR = 30
 # Folds tried on the rings of a lathed mesh, on so many of its points; how near they must come, in spacings, and a
 # larger fold is taken although it misses by more, up to ALIKE times more, or LAX times where that is next to nothing.
 PROBES, NEAR, ALIKE, LAX, CLEAN = 200, 0.25, 1.3, 3.0, 0.2
-# What rounding leaves of a length that is none, as a fraction of the whole.
-_ALONG = 1e-6
 
 
 def placed_subgroup(group: PointGroup, name: str) -> PointGroup:
@@ -42,9 +41,9 @@ def _frames(group: PointGroup) -> Iterator[Array]:
     axes = [u for u, _ in (*group.rotation_axes(), *group.improper_axes())]
     directions = np.array([*axes, *group.mirrors(), *group.frame])
     crosses = np.cross(directions[:, None], directions[None]).reshape(-1, 3)
-    every = np.concatenate([directions, unit(crosses[np.linalg.norm(crosses, axis=1) > _ALONG])])
+    every = np.concatenate([directions, unit(crosses[np.linalg.norm(crosses, axis=1) > SINGLE])])
     for z in directions:
-        for x in every[np.abs(every @ z) < _ALONG]:
+        for x in every[np.abs(every @ z) < SINGLE]:
             yield np.stack([x, np.cross(z, x), z])
 
 
@@ -70,7 +69,7 @@ def finite_group(group: PointGroup, points: Array, *, copied: bool) -> PointGrou
 
 def _ring_fold(points: Array, axis: Array) -> int:
     """Largest k for which turns by 2 pi / k about the axis map points on other points; 0 if there is none."""
-    off = points[np.linalg.norm(np.cross(points, axis), axis=1) > _ALONG * np.abs(points).max()]
+    off = points[np.linalg.norm(np.cross(points, axis), axis=1) > SINGLE * np.abs(points).max()]
     if len(off) < 3:
         return 0
     tree = cKDTree(off)
@@ -84,7 +83,7 @@ def _ring_fold(points: Array, axis: Array) -> int:
         if not folds.size:
             return 0
     best = float(misses.min())
-    limit = max(ALIKE * best, min(CLEAN * near, LAX * best)) + _ALONG * near
+    limit = max(ALIKE * best, min(CLEAN * near, LAX * best)) + SINGLE * near
     return int(folds[misses <= limit].max())
 
 

@@ -16,17 +16,15 @@ from symrefine.fit.placed import Placed
 from symrefine.geometry import Array, orthogonal_factor, tight_diagonal
 from symrefine.groups import PointGroup
 from symrefine.groups.standard import GOLDEN
+from symrefine.rounding import DOUBLE, SINGLE
 from symrefine.shape import Index, Shape
 
-# Rounds that fit a group's place to points that correspond, the step that counts as none, and that from which on steps
-# which no longer shrink are rounding.
-ROUNDS, STILL, ROUNDING = 30, 1e-15, 1e-12
+# Rounds that fit a group's place to points that correspond, at most.
+ROUNDS = 30
 # An exact shape misses the place that detection found by no more than this.
 NEAR = 2e-3
 # A shape is exact where no vertex misses its counterpart by more than what rounding to five digits leaves.
 ROUNDED = 1e-5
-# Vertices of parts that touch are one where they are nearer than single precision tells.
-WELD = 1e-6
 # Vertices that are asked first, and rounds of these: where they have no counterparts the others are not asked.
 ASKED, GLANCES = 200, 6
 
@@ -88,7 +86,7 @@ def exact_symmetry(shape: Shape, diagonal: float) -> OnVertices | None:
     `permuting_group`).
     """
     origin = shape.points.mean(axis=0)
-    own = Distinct.of(shape, origin, diagonal, weld=WELD)
+    own = Distinct.of(shape, origin, diagonal, weld=SINGLE)
     middle = own.points.mean(axis=0)
     # What some of the points seem to have a few others may break: then all are asked.
     for every in (False, True):
@@ -121,7 +119,7 @@ def on_vertices(
     if group.name == "C1" or group.symbol.family in ("K", "Kh"):
         return None
     diagonal = diagonal or tight_diagonal(shape.points)
-    own = Distinct.of(shape, center, diagonal, weld=WELD)
+    own = Distinct.of(shape, center, diagonal, weld=SINGLE)
     place = Placed(group=finite_group(group, own.points, copied=False), center=np.zeros(3))
     if place.group.order * len(own.rows) > LARGEST:
         return None
@@ -156,7 +154,7 @@ def settled(points: Array, images: Index, place: Placed) -> Placed:
         local = points - place.center
         wanted = place.center + mean_back((local[image] for image in images), place.group.operations())
         nearer, step = towards(place, points, wanted)
-        if step < STILL or last <= step < ROUNDING:
+        if last <= step < DOUBLE:
             break
         place, last = nearer, step
     return place

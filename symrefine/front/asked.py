@@ -6,13 +6,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symrefine.errors import InputError
+from symrefine.rounding import SINGLE
 
 if TYPE_CHECKING:
     from symrefine.front.space import Detection
     from symrefine.shape import Shape
-
-# Of the diagonal: what coordinates may differ by that were written in single precision.
-_SINGLE = 1e-6
 
 
 def told(tolerance: float | str, units: str | None) -> dict[str, Any]:
@@ -61,7 +59,7 @@ def found_in(found: Any, shape: "Shape") -> "Detection":
     if known.points.shape != shape.points.shape:
         raise InputError(_other(known, shape, f"it has {len(known.points):,} points, this has {len(shape.points):,}"))
     away = float(np.abs(known.points - shape.points).max())
-    if not away <= _SINGLE * found.diagonal:
+    if not away <= SINGLE * found.diagonal:
         raise InputError(_other(known, shape, f"a coordinate of its points differs by {away:.3g}"))
     triangles, those = (() if given.faces is None else given.faces for given in (known, shape))
     if not np.array_equal(triangles, those):

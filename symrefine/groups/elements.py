@@ -12,9 +12,10 @@ from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, frame_with_z, rotation, rotoreflection, unit
 from symrefine.groups.closure import close
 from symrefine.groups.names import MAX_FOLD, Symbol
-from symrefine.groups.orthogonal import EXACT, axes_and_angles, fit_frame, half_turns, nearest_operations
+from symrefine.groups.orthogonal import axes_and_angles, fit_frame, half_turns, nearest_operations
 from symrefine.groups.point_group import PointGroup
 from symrefine.groups.standard import standard_operations
+from symrefine.rounding import SINGLE
 
 # By how much directions of elements that somebody found may be off: several times what a fit leaves at 1 % noise.
 DEFAULT_TOLERANCE_RAD = math.radians(2.0)
@@ -97,7 +98,7 @@ def _refined(group: PointGroup, found: _Found, tolerance_rad: float) -> PointGro
     """Fit the frame to directions, all of the same weight, instead of operations (a C36 hardly turns anything)."""
     operations, standard = found.operations(), standard_operations(group.symbol)
     targets = axes_and_angles(standard)[0][nearest_operations(operations, standard, group.frame)[0]]
-    axial = axes_and_angles(operations)[1] > EXACT
+    axial = axes_and_angles(operations)[1] > SINGLE
     if not axial.any():
         return group
     frame = fit_frame(half_turns(found.directions[axial]), half_turns(targets[axial]), group.frame)

@@ -9,10 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array, batches
+from symrefine.rounding import SINGLE
 
 Index = NDArray[np.intp]
-# What rounding may leave of a direction, of an angle [rad], or of what vanishes.
-EXACT = 1e-6
 # What is farther than this from an operation is none: angles of the classes of a polyhedral group differ by 0.6 and
 # more.
 ROUGH = 0.3
@@ -66,7 +65,7 @@ def axes_and_angles(operations: Array) -> tuple[Array, Array]:
     """
     q = quaternions(operations)
     sine = np.linalg.norm(q[:, 1:], axis=1)
-    still = sine < EXACT
+    still = sine < SINGLE
     axes = np.where(still[:, None], [0.0, 0.0, 1.0], q[:, 1:] / np.where(still, 1.0, sine)[:, None])
     return axes, 2.0 * np.arctan2(sine, q[:, 0])
 
@@ -147,7 +146,7 @@ def fit_frame(sources: Array, targets: Array, start: Array) -> Array:
     sign = np.where(np.sum((right @ q_start) * (left @ q_start), axis=1) < 0.0, -1.0, 1.0)
     overlap = np.einsum("k,kji,kjl->il", sign, right, left)
     values, vectors = np.linalg.eigh(overlap + overlap.T)
-    top = vectors[:, values > values[-1] - EXACT * (1.0 + abs(values[-1]))]
+    top = vectors[:, values > values[-1] - SINGLE * (1.0 + abs(values[-1]))]
     q = nearest_in_span(top, q_start)[None]
     return np.asarray((_left(q)[0] @ _right(q * [1.0, -1.0, -1.0, -1.0])[0])[1:, 1:])
 
@@ -156,7 +155,7 @@ def nearest_in_span(basis: Array, vector: Array) -> Array:
     """Unit vector [n] nearest to `vector` in the span of orthonormal columns [n, m]; the first if none is nearest."""
     shadow = basis @ (basis.T @ vector)
     size = float(np.linalg.norm(shadow))
-    return np.asarray(shadow / size if size > EXACT else basis[:, 0])
+    return np.asarray(shadow / size if size > SINGLE else basis[:, 0])
 
 
 def register(operations: Array, group: Array, start: Array) -> tuple[Array, Array]:

@@ -16,7 +16,6 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array, frame_with_z, orthogonal_factor, read_only, unit
 from symrefine.groups.names import Symbol, parse
 from symrefine.groups.orthogonal import (
-    EXACT,
     about_z,
     angles_about_z,
     chord_angles,
@@ -25,6 +24,7 @@ from symrefine.groups.orthogonal import (
     nearest_orthogonal,
 )
 from symrefine.groups.standard import Elements, OrderedAxis, standard_elements, standard_operations
+from symrefine.rounding import SINGLE
 
 _POINT_SET = {"C": "Cv", "Cv": "Cv", "Ch": "Dh", "D": "Dh", "Dh": "Dh", "K": "Kh", "Kh": "Kh"}
 
@@ -40,7 +40,7 @@ class PointGroup:
         object.__setattr__(self, "name", parse(self.name).name)
         frame = np.asarray(self.frame, dtype=np.float64)
         nearest = orthogonal_factor(frame) if frame.shape == (3, 3) and np.isfinite(frame).all() else np.zeros((3, 3))
-        if np.linalg.det(nearest) <= 0.0 or np.abs(nearest - frame).max() > EXACT:
+        if np.linalg.det(nearest) <= 0.0 or np.abs(nearest - frame).max() > SINGLE:
             raise InputError(f"the frame of {self.name} must be a rotation matrix [3, 3], determinant +1")
         object.__setattr__(self, "frame", read_only(nearest))
 
@@ -108,7 +108,7 @@ class PointGroup:
         """Unit normals [m, 3] of the mirror planes that no operation carries onto another one."""
         normals, operations = self.mirrors(), self.sampled(3).operations()
         cosines = np.abs(np.einsum("mi,kij,mj->km", normals, operations, normals))
-        return normals[(cosines > 1.0 - EXACT).all(axis=0)]
+        return normals[(cosines > 1.0 - SINGLE).all(axis=0)]
 
     def rotation_axes(self) -> list[OrderedAxis]:
         """(direction, highest order) of every rotation axis, by falling order; `math.inf` for a continuous axis.
@@ -170,7 +170,7 @@ class PointGroup:
         images = np.einsum("kij,mj->mki", self.operations(), np.atleast_2d(unit(directions))).reshape(-1, 3)
         keep: list[Array] = []
         for image in images:
-            if not keep or np.min(np.linalg.norm(np.array(keep) - image, axis=1)) > EXACT:
+            if not keep or np.min(np.linalg.norm(np.array(keep) - image, axis=1)) > SINGLE:
                 keep.append(image)
         return np.array(keep)
 
@@ -202,7 +202,7 @@ def point_group(name: str, frame: ArrayLike | None = None) -> PointGroup:
     return PointGroup(name=name, frame=np.eye(3) if frame is None else np.asarray(frame, dtype=np.float64))
 
 
-def is_subgroup(a: PointGroup, b: PointGroup, tolerance_rad: float = EXACT) -> bool:
+def is_subgroup(a: PointGroup, b: PointGroup, tolerance_rad: float = SINGLE) -> bool:
     """Whether every operation of `a` is, within `tolerance_rad`, an operation of `b`, both where they stand."""
     if b.is_finite and not a.is_finite:
         return False

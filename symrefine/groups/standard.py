@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from symrefine.geometry import Array, read_only, rotation
 from symrefine.groups.names import Symbol
-from symrefine.groups.orthogonal import EXACT, Index, about_z, axes_and_angles, determinants, unique_lines
+from symrefine.groups.orthogonal import Index, about_z, axes_and_angles, determinants, unique_lines
+from symrefine.rounding import SINGLE
 
 OrderedAxis = tuple[Array, float]
 # The golden section, in which icosahedra are cut.
@@ -82,9 +83,9 @@ def standard_elements(symbol: Symbol) -> Elements:
     operations = standard_operations(symbol)
     det = determinants(operations)
     axes, angles = axes_and_angles(operations)
-    turns = angles > EXACT
+    turns = angles > SINGLE
     lines, counts = unique_lines(axes[turns & (det > 0)])
-    mirrors, _ = unique_lines(axes[(det < 0) & (angles > np.pi - EXACT)])
+    mirrors, _ = unique_lines(axes[(det < 0) & (angles > np.pi - SINGLE)])
     improper, _ = unique_lines(axes[turns & (det < 0)])
     folds = 1 + _same_line(improper, lines) @ counts
     orders = np.where(_same_line(improper, mirrors).any(axis=1), folds, 2 * folds)

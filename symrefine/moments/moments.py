@@ -16,15 +16,13 @@ from numpy.typing import NDArray
 from symrefine.errors import DegenerateShapeError
 from symrefine.geometry import Array, ReadOnly, rows
 from symrefine.moments.quadrature import mesh_nodes, triangle_areas_and_normals
+from symrefine.rounding import DOUBLE, SINGLE
 from symrefine.shape import Shape
 
 # Points per block: the monomials of a block stay in the L2 cache (method.md, section 1: a factor of ten).
 BLOCK = 2048
-# Waves, about a radian to a diagonal, that the edges of a solid's surface are tested with, and the share of the area
-# that may be missing or turned round: what single precision leaves where triangles meet without sharing vertices.
-WAVES, LOOSE = 6, 1e-6
-# What all points but one must weigh of the whole: less is lost in the rounding of sums.
-ALONE = 1e-12
+# Waves, about a radian to a diagonal, that the edges of a solid's surface are tested with.
+WAVES = 6
 
 
 def exponents_of(dim: int, degree: int) -> list[tuple[int, ...]]:
@@ -189,9 +187,9 @@ def central_moments(points: Array, weights: Array, order: int, *, parts: int = 0
         raise DegenerateShapeError(
             "the points do not spread about their mean; a shape needs at least two distinct points"
         )
-    if mass - weights.max() < ALONE * mass:
+    if mass - weights.max() < DOUBLE * mass:
         raise DegenerateShapeError(
-            f"point {weights.argmax()} weighs more than {1.0 / ALONE:g} times as much as all others together; a shape "
+            f"point {weights.argmax()} weighs more than {1.0 / DOUBLE:g} times as much as all others together; a shape "
             "needs at least two points that count"
         )
     local /= scale
@@ -271,7 +269,7 @@ def _closed(shape: Shape) -> bool:
     along = edges @ fields.T * np.sinc(edges @ waves.T / (2.0 * np.pi))
     left = np.abs(np.einsum("fek,fek->k", along, np.exp(1j * (middles @ waves.T))))
     most = np.linalg.norm(waves, axis=1) * np.linalg.norm(fields, axis=1) * areas.sum() / shape.diagonal**2
-    return bool(np.all(left <= LOOSE * most))
+    return bool(np.all(left <= SINGLE * most))
 
 
 def _jackknife(points: Array, weights: Array, order: int, parts: int) -> tuple[Array, Array]:

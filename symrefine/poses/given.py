@@ -12,14 +12,13 @@ from symrefine.groups import MAX_FOLD, PointGroup, identify, point_group
 from symrefine.groups.elements import DEFAULT_TOLERANCE_RAD as TILT_RAD
 from symrefine.groups.orthogonal import chord_angles, determinants
 from symrefine.poses.symmetry import Symmetry, checked_poses
+from symrefine.rounding import SINGLE
 
 # What is nearer to the identity is it: a tenth of the smallest turn that a group here has.
 _IDENTITY_RAD = 0.1 * 2.0 * np.pi / MAX_FOLD
 # By how much operations may disagree where they meet: of how far they shift the origin, or of the diameter. As
 # coarse as `bop_toolkit` samples a continuous symmetry.
 _MEET_REL = 0.01
-# What is shorter is rounding, in any unit in which things that one can hold have poses.
-_ROUNDING = 1e-6
 _BOP = ("symmetries_discrete", "symmetries_continuous")
 
 
@@ -113,7 +112,7 @@ def _check_meet(operations: Array, center: Array, diameter: float) -> None:
     shifts = operations[:, :3, 3]
     misses = np.linalg.norm(operations[:, :3, :3] @ center + shifts - center, axis=1)
     size = max(diameter, float(np.linalg.norm(shifts, axis=1).max()))
-    if misses.max() > max(_MEET_REL * size, _ROUNDING):
+    if misses.max() > max(_MEET_REL * size, SINGLE):
         raise InputError(
             f"operation {int(misses.argmax())} moves the point that all should leave in place by {misses.max():.3g}; "
             "the operations of a body have a point in common"
@@ -132,7 +131,7 @@ def _of_bop(entry: Mapping[str, Any]) -> Symmetry:
     alike = all(abs(axis.direction @ axes[0].direction) > np.cos(TILT_RAD) for axis in axes)
     group, center = _of_revolution(axes[0], discrete) if alike else _of_sphere(axes)
     away = max(float(np.linalg.norm(np.cross(center - axis.point, axis.direction))) for axis in axes)
-    if away > max(_MEET_REL * diameter, _ROUNDING):
+    if away > max(_MEET_REL * diameter, SINGLE):
         raise InputError(f"{_BOP[1]} holds axes that do not meet in a point: they pass it by {away:.3g}")
     if len(discrete):
         _check_meet(discrete, center, diameter)

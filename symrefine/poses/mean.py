@@ -9,15 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, ReadOnly, frame_with_z, orthogonal_factor, unit
-from symrefine.groups.orthogonal import EXACT, chord_angles, half_turns
+from symrefine.groups.orthogonal import chord_angles, half_turns
 from symrefine.poses.symmetry import Symmetry
+from symrefine.rounding import DOUBLE, SINGLE
 
 # Poses that the alternation starts from. Of poses that lie together any one leads to their mean.
 _STARTS = 16
 # Far more than was ever needed: choices of operations do not come back.
 _MOST_STEPS = 100
-# Turns [rad] and costs that differ by less are the same.
-_SETTLED = 1e-12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,7 +44,7 @@ def mean_pose(symmetry: Symmetry, poses: Array, weights: Array) -> MeanPose:
     others = np.unique(np.linspace(0, len(poses) - 1, min(_STARTS, len(poses))).astype(int))[1:]
     for start in poses[others]:
         rival = _around(symmetry, poses, weights, _settled(symmetry, poses, weights, start))
-        if _cost(rival, weights) < _cost(best, weights) - _SETTLED:
+        if _cost(rival, weights) < _cost(best, weights) - DOUBLE:
             best = rival
     return best
 
@@ -66,7 +65,7 @@ def _settled(symmetry: Symmetry, poses: Array, weights: Array, start: Array) -> 
     for _ in range(_MOST_STEPS):
         before = rotation
         rotation = _mean_of(symmetry, symmetry.toward(poses, before)[:, :3, :3], weights, before)
-        if chord_angles(rotation, before) < _SETTLED:
+        if chord_angles(rotation, before) < DOUBLE:
             break
     return rotation
 
@@ -85,12 +84,12 @@ def _mean_of(symmetry: Symmetry, rotations: Array, weights: Array, before: Array
 def _least_turn(a: Array, b: Array) -> Array:
     """The smallest rotation [3, 3] that turns the unit vector a into the direction of b; none where b vanishes."""
     length = float(np.linalg.norm(b))
-    if length < _SETTLED:
+    if length < DOUBLE:
         return np.eye(3)
     # Two half turns, about a and about the direction halfway, are one turn by twice the angle between those.
     halfway = a + b / length
     size = float(np.linalg.norm(halfway))
-    first, second = half_turns(np.stack([a, halfway / size if size > _SETTLED else frame_with_z(a)[0]]))
+    first, second = half_turns(np.stack([a, halfway / size if size > DOUBLE else frame_with_z(a)[0]]))
     return np.asarray(second @ first)
 
 
@@ -106,7 +105,7 @@ def _doubt(symmetry: Symmetry, farthest_rad: float) -> str:
     to any other equivalent, and within a right angle the mean of rotations is unique.
     """
     sure = 0.25 * symmetry.smallest_turn_rad
-    if farthest_rad < sure - EXACT:
+    if farthest_rad < sure - SINGLE:
         return ""
     return (
         f"a pose is {np.degrees(farthest_rad):.3g} degrees from the mean; from {np.degrees(sure):.3g} on, a quarter of "

@@ -19,10 +19,11 @@ from symrefine.groups.identify import POLYHEDRAL
 from symrefine.moments.harmonics import harmonic_moments
 from symrefine.moments.moments import Moments
 from symrefine.ntuples.rank import FixedSubspace
-from symrefine.propose.folds import MAX_FOLD, ROUNDING, fold_candidates, frames_across
+from symrefine.propose.folds import MAX_FOLD, fold_candidates, frames_across
 from symrefine.propose.maps import WITHIN, maps_onto_itself
 from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candidates, whitened
 from symrefine.propose.votes import AGREE_RAD, mirror_votes, revolution
+from symrefine.rounding import DOUBLE
 from symrefine.surface.skin import LocalPlanes
 
 # Directions nearer than this to an earlier one are the same start: half of what order 8 resolves is 5.6 degrees.
@@ -84,7 +85,7 @@ def repeated(cloud: LocalPlanes, diagonal: float) -> list[Placed]:
     found = []
     for m in maps_onto_itself(cloud, diagonal, np.random.default_rng(0)):
         still = np.eye(3) - m.matrix
-        center = np.linalg.pinv(still, rcond=ROUNDING) @ m.shift
+        center = np.linalg.pinv(still, rcond=DOUBLE) @ m.shift
         if np.linalg.norm(m.shift - still @ center) > WITHIN * diagonal or np.linalg.norm(center) > diagonal:
             continue
         group = close(m.matrix[None], 0.5 * AGREE_RAD, max_fold=MAX_FOLD).group

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, ReadOnly, frame_with_z, rotation
+from symrefine.rounding import DOUBLE
 
 # Folds up to half of this are told: a fundamental and its octave.
 MAX_FOLD = 128
@@ -12,8 +13,6 @@ MAX_FOLD = 128
 BINS_PER_ORDER = 16
 # Share of surfaces of revolution that may show a fold by chance: the squares are exponential, so their largest is told.
 CHANCE = 0.01
-# Of coordinates of size 1: what differences of them are known to.
-ROUNDING = 1e-12
 
 
 def azimuthal_spectrum(points: Array, weights: Array, axis: Array, max_fold: int = MAX_FOLD) -> tuple[Array, Array]:
@@ -40,7 +39,7 @@ def _around(points: Array, weights: Array, axis: Array) -> tuple[Array, Array, A
     radial = weights * rho * np.stack([np.ones_like(h), h, h * h, rho])
     norms = np.sqrt((radial**2).sum(axis=1))
     # A flat object has no height to weigh azimuths with, but for what rounding leaves of it.
-    return radial, np.arctan2(y, x), np.where(norms > ROUNDING * norms.max(), norms, 0.0)
+    return radial, np.arctan2(y, x), np.where(norms > DOUBLE * norms.max(), norms, 0.0)
 
 
 def _over(c: Array, sigma: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 
 from symrefine.geometry import Array, rows
 from symrefine.propose.consensus import pair_slopes
-from symrefine.propose.folds import ROUNDING
+from symrefine.rounding import DOUBLE
 from symrefine.shape import Index
 
 # Local planes whose pairs vote, the largest angle between the normals of a pair, and the candidates that are told: of 9
@@ -133,7 +133,7 @@ def revolution(points: Array, normals: Array) -> tuple[Array, Array]:
     kept = rows
     for _ in range(3):
         matrix = kept.T @ kept
-        aside = -np.linalg.pinv(matrix[3:, 3:], rcond=ROUNDING, hermitian=True) @ matrix[3:, :3]
+        aside = -np.linalg.pinv(matrix[3:, 3:], rcond=DOUBLE, hermitian=True) @ matrix[3:, :3]
         u = np.linalg.eigh(matrix[:3, :3] + matrix[:3, 3:] @ aside)[1][:, 0]
         off = np.abs(rows @ np.concatenate([u, aside @ u]))
         kept = rows[off <= np.median(off)]

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from symrefine.geometry import Array, Mask, frame_with_z, tight_diagonal
+from symrefine.rounding import SINGLE
 from symrefine.surface.clumps import RIM
 from symrefine.surface.misses import SHARES
-from symrefine.surface.neighbourhoods import ROUNDING
 from symrefine.surface.tree import Tree
 
 # Planes that are tried, and points that they are tried on: of floors that hold a tenth of all, one in 150 is missed.
@@ -111,7 +111,7 @@ def _about(points: Array, place: Array, normal: Array, thick: float) -> Floor | 
         # Below it there is nothing else. Two thirds of what has noise lie within one standard deviation; a cut through
         # a body is filled evenly.
         below = np.maximum(-offset[on], 0.0)
-        within = max(RIM * float(np.quantile(below[below > 0.0], 2.0 / 3.0)) if below.any() else 0.0, ROUNDING * thick)
+        within = max(RIM * float(np.quantile(below[below > 0.0], 2.0 / 3.0)) if below.any() else 0.0, SINGLE * thick)
     if within > thick or not _has_sides(offset[None], thick)[0]:
         return None
     on = np.abs(offset) <= within

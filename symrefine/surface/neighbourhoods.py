@@ -8,6 +8,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from symrefine.geometry import Array, rows
+from symrefine.rounding import SINGLE
 from symrefine.shape import Index
 from symrefine.surface.tree import Tree
 
@@ -23,8 +24,6 @@ VOLUME = 0.8
 PROBES = 60
 UNCERTAIN = 0.08
 WIDEST_BLOB = 0.5
-# Height of an equilateral triangle of unit side, and what rounding leaves of the length of a cross product.
-HALF_ROOT_3, ROUNDING = 0.5 * math.sqrt(3.0), 1e-6
 # Cells that larger neighbourhoods are put together from: with half as many, the rims alone add a tenth to the noise.
 CELLS = 48
 
@@ -47,7 +46,7 @@ def smallest_eigenvectors(covariance: Array) -> tuple[Array, Array]:
     determinant = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz)
     cosine = determinant / np.maximum(2.0 * variance * radius, 1e-300)
     turned = np.arccos(np.clip(cosine, -1.0, 1.0)) / 3.0
-    along, across = radius * np.cos(turned), HALF_ROOT_3 * radius * np.sin(turned)
+    along, across = radius * np.cos(turned), math.sqrt(0.75) * radius * np.sin(turned)
     values = np.array([middle - along - 2.0 * across, middle - along + 2.0 * across, middle + 2.0 * along])
     a, b, c = xx - values[0], yy - values[0], zz - values[0]
     # What is left is of rank two: its adjugate is v v' but for a factor, and the longest of its rows the surest.
@@ -57,7 +56,7 @@ def smallest_eigenvectors(covariance: Array) -> tuple[Array, Array]:
     best = np.abs(own).argmax(axis=0)
     vectors = np.take_along_axis(adjugate, best[None, None], axis=0)[0].T
     length = np.linalg.norm(vectors, axis=1)
-    double = length <= ROUNDING * variance
+    double = length <= SINGLE * variance
     vectors /= np.maximum(length, 1e-300)[:, None]
     if double.any():
         vectors[double] = np.linalg.eigh(covariance[double])[1][:, :, 0]

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from symrefine.geometry import Array, Isometry, Mask, rows, unit
+from symrefine.rounding import DOUBLE
 from symrefine.shape import Index
 from symrefine.surface.cameras import Camera
 from symrefine.surface.clumps import Clump
@@ -39,8 +40,6 @@ NEIGHBOURS, FAR_ASIDE, ASIDE = 32, 0.7, 0.5
 # as spread there, by the size of the neighbourhood. Of 1, 2 and 4 this one finds most of the borders of 14 damaged
 # objects where as few others pass for one.
 BENDS = 2.0
-# Variances (RMS radius 1) that rounding leaves of points on a plane, a line or one another.
-ROUNDING = 1e-12
 # A surface counts as open from this share of local planes far aside on, for each RMS radius that neighbourhoods are
 # wide: what lies that near a border is as much more as they are wider. Of 21 closed objects of 20,000 points all stay
 # below 0.016; where 5 % of the surface are missing, 22 of 24 are above 0.022. Neighbourhoods so much narrower than long
@@ -307,7 +306,7 @@ def _off(aside: Array, spread: Array, normals: Array) -> Array:
     """
     size = np.trace(spread, axis1=1, axis2=2)[:, None, None]
     bends = BENDS / normals.shape[1] * size * (normals.transpose(0, 2, 1) @ normals)
-    along = np.linalg.solve(spread + ROUNDING * np.eye(3) + bends, aside[:, :, None])[:, :, 0]
+    along = np.linalg.solve(spread + DOUBLE * np.eye(3) + bends, aside[:, :, None])[:, :, 0]
     return np.sqrt(np.clip(np.einsum("ni,ni->n", aside, along), 0.0, None))
 
 
@@ -350,7 +349,7 @@ def _folded(at: Array, points: Array, tree: Tree, near: Index | None) -> Mask:
     off = np.abs(height - np.einsum("nkp,np->nk", sheet, np.einsum("nkp,nk->np", sheet, height)))
     off, depth = (v - v.mean(axis=1, keepdims=True) for v in (off, depth))
     size = np.linalg.norm(off, axis=1) * np.linalg.norm(depth, axis=1)
-    parted = np.einsum("nk,nk->n", off, depth) / np.maximum(size, ROUNDING)
+    parted = np.einsum("nk,nk->n", off, depth) / np.maximum(size, DOUBLE)
     return _together(at, parted, LINKS + 1) > PARTED
 
 
