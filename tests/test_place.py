@@ -19,9 +19,9 @@ from symrefine.detection.story import detect
 from symrefine.fit.freedom import freest
 from symrefine.fit.placed import FITTED, Placed, elements
 from symrefine.fit.refine import Framed
-from symrefine.geometry import Isometry, frame_with_z, line_angle_rad, rotation
+from symrefine.geometry import Isometry, frame_with_z, line_angle_rad, rotation, unit
 from symrefine.groups import PointGroup
-from symrefine.propose.votes import revolution
+from symrefine.propose.votes import meeting, revolution
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.skin import local_planes
@@ -239,6 +239,29 @@ def test_the_axis_of_a_cone_that_is_nearly_a_cylinder_is_a_line_all_the_same():
     direction, through = revolution(points - [0.0, 0.6, 0.0], normals)
     assert line_angle_rad(direction, [0.0, 0.0, 1.0]) < math.radians(2.0)
     assert np.linalg.norm(np.cross(np.array([0.0, -0.6, 0.0]) - through, direction)) < 0.05
+
+
+@pytest.mark.parametrize("eye", [(0.0, 0.0, 5.0), (0.4, -0.2, 3.0)])
+def test_a_ball_that_one_camera_saw_is_one_turned_as_one_likes(eye):
+    """Of its mirrors and axes each holds as well elsewhere; its own group does where it is turned, and not moved."""
+    x = np.random.default_rng(6).normal(size=(20000, 3))
+    ball = 0.2 * x / np.linalg.norm(x, axis=1)[:, None]
+    seen = ball[ball @ np.array(eye) > 0.04]
+    found = detect(seen, viewpoint=eye)
+    assert (found.point_group, found.confidence > 0.9) == ("Kh", True)
+    assert np.linalg.norm(found.center) < 0.002
+
+
+def test_normals_of_a_part_of_a_ball_meet_in_its_middle_whatever_stands_on_it():
+    rng = np.random.default_rng(8)
+    across = unit(rng.normal(size=(4000, 3)) + [0.0, 0.0, 2.0])
+    middle = np.array([0.3, -0.2, 0.5])
+    foot = rng.random((1000, 3)) * [1.0, 1.0, 0.0]
+    points, normals = (
+        np.concatenate([middle + across, foot]),
+        np.concatenate([across, np.tile([0.0, 0.0, 1.0], (1000, 1))]),
+    )
+    assert np.linalg.norm(meeting(points, normals) - middle) < 1e-9
 
 
 def test_whole_objects_ask_nothing_of_the_sort():

@@ -65,7 +65,8 @@ def _ways(surface: Surface, placed: Placed) -> tuple[Framed, Array]:
     standard = np.stack([frame @ m.matrix @ frame.T for m in few_motions(placed)])
     state = Framed(standard=standard, frame=frame, center=placed.center)
     wedge = 2.0 * math.pi / (fold if 0 < fold < math.inf else 1)
-    ways = freest(surface.cloud, state, stride=surface.stride(LOOK))
+    # Turned about its centre, the group of a ball is the same.
+    ways = freest(surface.cloud, state, turns=placed.group.name != "Kh", stride=surface.stride(LOOK))
     turns = np.maximum(np.linalg.norm(ways[:, :3], axis=1), 1e-300)
     return state, ways * np.minimum(2.0 * start_error(surface), 0.25 * wedge / turns)[:, None]
 

@@ -10,21 +10,24 @@ from symrefine.geometry import Array
 from symrefine.surface.skin import LocalPlanes
 
 
-def freest(cloud: LocalPlanes, state: Framed, *, stride: int = 1) -> Array:
+def freest(cloud: LocalPlanes, state: Framed, *, turns: bool = True, stride: int = 1) -> Array:
     """Motions [p, 6] of a frame (rotation about and shift along its axes), the least told ones first.
 
-    Those that change no operation are not among them, as a turn about the normal of a lone mirror. What the pairs of
-    each changes is weighed against how far images move, which is 1 in the mean square over all operations.
+    Those that change no operation are not among them, as a turn about the normal of a lone mirror; without `turns`, none
+    is. What the pairs of each changes is weighed against how far images move, which is 1 in the mean square over all
+    operations.
     """
+    first = 0 if turns else 3
     points = cloud.points[::stride]
     every, none, ones = np.ones(len(points)) / len(points), np.zeros_like(points), np.ones((len(points), 1))
     moves = sum((gram(design_rows(points, none, ones * axis), every) for axis in np.eye(3)), np.zeros((SIZE, SIZE)))
     grams = np.stack([pair_gram(cloud, p) for p in match(cloud, state.motions, 0.0, stride=stride)])
     told, moved = (
-        frame_model(g, state.standard, state.frame, state.center, np.zeros(6)).hessian
+        frame_model(g, state.standard, state.frame, state.center, np.zeros(6)).hessian[first:, first:]
         for g in (grams, np.broadcast_to(moves / len(grams), grams.shape))
     )
     lengths, ways = np.linalg.eigh(moved)
     some = lengths > ROUNDED * lengths[-1]
     ways = ways[:, some] / np.sqrt(lengths[some])
-    return np.asarray((ways @ np.linalg.eigh(ways.T @ told @ ways)[1]).T)
+    found = (ways @ np.linalg.eigh(ways.T @ told @ ways)[1]).T
+    return np.pad(found, ((0, 0), (first, 0)))

@@ -22,7 +22,7 @@ from symrefine.ntuples.rank import FixedSubspace
 from symrefine.propose.folds import MAX_FOLD, fold_candidates, frames_across
 from symrefine.propose.maps import WITHIN, maps_onto_itself
 from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candidates, whitened
-from symrefine.propose.votes import AGREE_RAD, mirror_votes, revolution
+from symrefine.propose.votes import AGREE_RAD, meeting, mirror_votes, revolution
 from symrefine.rounding import DOUBLE
 from symrefine.surface.skin import LocalPlanes
 
@@ -69,11 +69,12 @@ def proposals(evidence: Evidence) -> list[Placed]:
 
 
 def voted_mirrors(planes: LocalPlanes) -> list[Placed]:
-    """Mirrors and a revolution that the local planes of a surface with parts missing vote for."""
+    """Mirrors, a revolution and a sphere that the local planes of a surface with parts missing vote for."""
     direction, point = revolution(planes.points, planes.normals)
+    ball = placed("Kh", np.eye(3), meeting(planes.points, planes.normals))
     mirrors = mirror_votes(planes.points, planes.normals, np.random.default_rng(0), outwards=planes.eyes is not None)
     found = placed("Cinfv", frame_with_z(direction), point)
-    return [found, *(placed("Cs", frame_with_z(v.direction), v.foot) for v in mirrors)]
+    return [ball, found, *(placed("Cs", frame_with_z(v.direction), v.foot) for v in mirrors)]
 
 
 def repeated(cloud: LocalPlanes, diagonal: float) -> list[Placed]:

@@ -138,3 +138,21 @@ def revolution(points: Array, normals: Array) -> tuple[Array, Array]:
         off = np.abs(rows @ np.concatenate([u, aside @ u]))
         kept = rows[off <= np.median(off)]
     return u, np.cross(u, aside @ u)
+
+
+def meeting(points: Array, normals: Array) -> Array:
+    """The point [3] that the normals [N, 3] of a surface at points [N, 3] come closest to, as those of a sphere do.
+
+    Least squares of distances, then again without the half that is farthest off.
+    """
+    across = np.eye(3) - normals[:, :, None] * normals[:, None]
+    kept = np.ones(len(points), dtype=bool)
+    for _ in range(3):
+        matrix = across[kept].sum(axis=0)
+        middle = np.linalg.pinv(matrix, rcond=DOUBLE, hermitian=True) @ np.einsum(
+            "nij,nj->i", across[kept], points[kept]
+        )
+        off = np.einsum("nij,nj->ni", across, points - middle)
+        squares = np.einsum("ni,ni->n", off, off)
+        kept = squares <= np.median(squares)
+    return np.asarray(middle)
