@@ -39,8 +39,9 @@ def check_target(path: Path) -> None:
         raise InputError(f"{str(path)[:60]!a}: is no name of a file: {error}") from None
     if is_folder:
         raise InputError(f"{path}: is a directory; expected a file to write")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: cannot be written: there is no directory {path.parent}")
+    folders = (path.parent, path.resolve().parent)  # a link may lead to where nothing is
+    if missing := next((folder for folder in folders if not folder.is_dir()), None):
+        raise InputError(f"{path}: cannot be written: there is no directory {missing}")
     if path.exists() and not os.access(path, os.W_OK):
         raise InputError(f"{path}: cannot be written: the file is write-protected")
     if _is_replaceable(path) and not os.access(path.resolve().parent, os.W_OK | os.X_OK):

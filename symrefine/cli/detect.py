@@ -1,7 +1,7 @@
 """`symrefine detect`: files in, the symmetries of the objects in them out."""
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -26,6 +26,7 @@ from symrefine.cli.rows import ROW_HEAD, row_line
 from symrefine.cli.several import UNDETERMINED, Many, check_alone
 from symrefine.cli.signs import counting
 from symrefine.cli.values import (
+    NUMBERED,
     add_class_options,
     add_depth_options,
     add_detection_options,
@@ -41,6 +42,7 @@ from symrefine.errors import InputError
 from symrefine.files import Writer, asked_for, text_writer
 
 if TYPE_CHECKING:
+    from symrefine.export.bop import Entry
     from symrefine.shape import Shape
     from symrefine.stream import Stream
 
@@ -67,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--picture", metavar="FILE.png", help="write a picture of the shape and what was found")
     parser.add_argument("--bop", metavar="FILE", help="put the symmetries into this models_info.json of BOP")
-    parser.add_argument("--bop-id", type=natural, metavar="N", help="number of the object there (default: 1)")
+    parser.add_argument("--bop-id", type=natural, metavar="N", help=f"number of the object there {NUMBERED}")
     parser.add_argument(
         "--bop-scale",
         type=millimetres,
@@ -117,13 +119,16 @@ def run(args: argparse.Namespace) -> int:
             records = list(many.told(chain([first], given), doing))
         else:
             shape, detection, record = _examined(args, first)
-            writers = json_writer(args.json, record) | _writers(args, shape, detection)
+            entries = _entries(args, shape, detection)
+            # What was there is known before it is replaced.
+            notes = list(_notes(args, shape, detection, record, entries))
+            writers = json_writer(args.json, record) | _writers(args, shape, detection, entries)
             write_all(writers)
     if several:
         for text in _floorless(records):
             note(text)
         return many.end(records, undetermined=args.strict and any(r.get("undetermined") for r in records))
-    for text in _notes(args, shape, detection, record):
+    for text in notes:
         note(text)
     tell(args.json, record, None, writers)
     return UNDETERMINED if args.strict and record["undetermined"] else 0
@@ -166,14 +171,38 @@ def _examined(args: argparse.Namespace, given: Object) -> tuple["Shape", Any, di
     return shape, detection, record
 
 
-def _notes(args: argparse.Namespace, shape: "Shape", detection: Any, record: dict[str, Any]) -> Iterator[str]:
+def _entries(args: argparse.Namespace, shape: "Shape", detection: Any) -> "dict[int, Entry]":
+    """What goes into a `models_info.json`, by the number of the object.
+
+    Raises:
+        InputError: the points have two coordinates, or four and more, or nothing is decided.
+    """
+    if args.bop is None:
+        return {}
+    from symrefine.export.bop import bop_entry, number_for
+
+    _check_in_space("--bop", args.bop, shape)
+    number = number_for(shape.source, args.bop_id)
+    return {number: bop_entry(detection, detection.own(shape), scale=args.bop_scale or 1.0)}
+
+
+def _check_in_space(option: str, name: str, shape: "Shape") -> None:
+    """Refuse what is for objects in space only."""
+    if shape.dim != 3:
+        where = "lies in the plane" if shape.dim == 2 else f"has {shape.dim} coordinates"
+        raise InputError(f"{option} {name}: is for objects in space; {shape.source} {where}; use --report")
+
+
+def _notes(
+    args: argparse.Namespace, shape: "Shape", detection: Any, record: dict[str, Any], entries: "Mapping[int, Entry]"
+) -> Iterator[str]:
     """What else there is to say, on stderr."""
     if args.bop is not None:
-        from symrefine.export.bop import bop_limits, diameter, metres_doubt
+        from symrefine.export.bop import bop_limits, diameter, metres_doubt, replaced
 
         size = diameter(detection.own(shape).points)
         doubt = "" if args.bop_scale else metres_doubt(shape.source, size, "--bop-scale")
-        yield from filter(None, (bop_limits(detection), doubt))
+        yield from filter(None, (bop_limits(detection), doubt, replaced(Path(args.bop), entries)))
     is_grey = shape.dim == 2 and "threshold" in record["options"] and args.threshold is None
     if is_grey and (record["undetermined"] or record["point_group"] == "C1"):
         yield f"{shape.source}: if object and background are of different grey, try --threshold otsu"
@@ -231,21 +260,19 @@ def detected(
     return replace(found, options=options)
 
 
-def _writers(args: argparse.Namespace, shape: "Shape", detection: Any) -> dict[str, Writer]:
+def _writers(
+    args: argparse.Namespace, shape: "Shape", detection: Any, entries: "Mapping[int, Entry]"
+) -> dict[str, Writer]:
     """Writers of the files that are of one object.
 
     Raises:
         InputError: one is for objects in space only, and the points have two coordinates, or four and more.
     """
     writers: dict[str, Writer] = {}
-    for option, name in {"--bop": args.bop, "--recording": args.recording}.items():
-        if name is not None and shape.dim != 3:
-            where = "lies in the plane" if shape.dim == 2 else f"has {shape.dim} coordinates"
-            raise InputError(f"{option} {name}: is for objects in space; {shape.source} {where}; use --report")
+    if args.recording is not None:
+        _check_in_space("--recording", args.recording, shape)
     if args.bop is not None:
-        from symrefine.export.bop import bop_entry, bop_text
+        from symrefine.export.bop import bop_text
 
-        entry = bop_entry(detection, detection.own(shape), scale=args.bop_scale or 1.0)
-        number = 1 if args.bop_id is None else args.bop_id
-        writers[args.bop] = text_writer(bop_text(Path(args.bop), {number: entry}))
+        writers[args.bop] = text_writer(bop_text(Path(args.bop), entries))
     return writers | shown_writers(args, detection)

@@ -1,6 +1,7 @@
 """`symrefine export`: the symmetries of a file as other programs read them."""
 
 import argparse
+import os
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,6 +10,7 @@ from symrefine.cli.inputs import loaded
 from symrefine.cli.outputs import check_outputs, note, tell
 from symrefine.cli.signs import waiting
 from symrefine.cli.values import (
+    NUMBERED,
     add_detection_options,
     add_frame_option,
     add_outliers,
@@ -50,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_path(parser, "mesh or point cloud")
     parser.add_argument("--to", required=True, choices=tuple(_OPTIONS), help="what to write")
     parser.add_argument("--out", required=True, metavar="OUT", help="file, or folder for " + ", ".join(_FOLDERS))
-    parser.add_argument("--id", type=natural, metavar="N", help="number of the object in models_info.json (default: 1)")
+    parser.add_argument("--id", type=natural, metavar="N", help=f"number of the object in models_info.json {NUMBERED}")
     scaled = "millimetres in one unit of PATH: 1000 for metres (default: 1)"
     parser.add_argument("--scale", type=millimetres, metavar="X", help=scaled)
     parser.add_argument("--improper", action="store_true", default=None, help="npz: mirrors and the like too")
@@ -124,6 +126,8 @@ def _check(args: argparse.Namespace) -> None:
             raise InputError(f"--out {out}: is a file; expected a folder")
         if not out.parent.is_dir():
             raise InputError(f"--out {out}: cannot be made: there is no directory {out.parent}")
+        if not os.access(out if out.exists() else out.parent, os.W_OK | os.X_OK):
+            raise InputError(f"--out {out}: cannot be written: no permission in the directory")
         return
     outputs = {"--out": args.out, "--transform": str(_transform(args)) if args.to == "canonical" else None}
     check_outputs(outputs, [Path(args.path)])

@@ -13,6 +13,7 @@ from symrefine.cli.values import (
     add_class_options,
     add_detection_options,
     add_frame_option,
+    add_loudness,
     add_scan_options,
     detection_options,
     millimetres,
@@ -38,7 +39,8 @@ DESCRIPTION = (
     "labels.json with who settled them and what is still open, and review.html, a page that needs no server, on which "
     "a person chooses the group of each object and saves the choices as decisions.json. Run again with --decisions "
     "they are applied, and kept in the folder. An object is settled where a person decided it, or its confidence is "
-    "that of --accept; no other has an entry in models_info.json. What was detected is not detected again."
+    "that of --accept; no other has an entry in models_info.json. What was detected with the same options is not "
+    "detected again."
 )
 # Of a group that was not found: the least probability that is worth a word.
 _WORTH = 0.01
@@ -205,9 +207,18 @@ def _write(args: argparse.Namespace, rows: "Rows", order: list[int], decisions: 
         DECISIONS: text_writer(decisions_text(decisions)),
         INFO: pieces_writer(info_json(rows, labels)),
         LABELS: pieces_writer(labels_json(rows, labels, args.accept)),
-        PAGE: text_writer(page_text(args.dir, out, rows, order, decisions, labels)),
+        PAGE: text_writer(page_text(args.dir, out, rows, order, decisions, labels, _again(args.argv))),
     }
     write_all({str(out / name): writer for name, writer in writers.items()})
+
+
+def _again(argv: list[str]) -> list[str]:
+    """The command that applies what the page saves: with all options that a result depends on, and no others."""
+    others = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    others.add_argument("--decisions")
+    add_executor_options(others, "file")
+    add_loudness(others)
+    return ["symrefine", *others.parse_known_args(argv)[1], "--decisions", "decisions.json"]
 
 
 def _line(row: "Row") -> str:

@@ -2,7 +2,8 @@
 
 import os
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -48,8 +49,8 @@ def check_outputs(outputs: dict[str, str | None], inputs: Iterable[Path]) -> Non
             check_target(path)
         if name == STDOUT or (option != "--json" and path.exists() and not path.is_file()):
             raise InputError(f"{option} {name}: expected a file; only --json writes to stdout and devices")
-        if option == "--picture" and path.suffix.lower() != SHOWN["picture"]:
-            raise InputError(f"{option} {name}: expected a name that ends in {SHOWN['picture']}")
+        if (suffix := SHOWN.get(option[2:])) and path.suffix.lower() != suffix:
+            raise InputError(f"{option} {name}: expected a name that ends in {suffix}")
         if path.is_file() or not path.exists():
             if path.resolve() in taken:
                 raise InputError(f"{option} {name}: is the same file as {taken[path.resolve()]}; name another one")
@@ -63,8 +64,12 @@ def _check_name(option: str, path: Path) -> None:
         return
     from symrefine.load import SUFFIXES, suffix_of
 
-    if suffix_of(path) in SUFFIXES:
-        raise InputError(f"{option} {path}: has the suffix of an object; expected a name such as {_REPORTS[option]}")
+    for place in (path, path.resolve()):
+        if suffix_of(place) in SUFFIXES:
+            here = "" if place == path else f" is a link to {place}, which"
+            raise InputError(
+                f"{option} {path}:{here} has the suffix of an object; expected a name such as {_REPORTS[option]}"
+            )
 
 
 def check_beside(option: str, name: str | None, details: dict[str, object]) -> None:
@@ -123,12 +128,13 @@ def print_lines(lines: Iterable[Any]) -> None:
     if is_quiet():
         return
     out = console()
-    for line in lines:
-        if isinstance(line, str):
-            out.print(printable(line), soft_wrap=True)
-        else:
-            out.print(line)
-    sys.stdout.flush()
+    with _on_stdout():
+        for line in lines:
+            if isinstance(line, str):
+                out.print(printable(line), soft_wrap=True)
+            else:
+                out.print(line)
+        sys.stdout.flush()
 
 
 def say(text: str) -> None:
@@ -138,7 +144,20 @@ def say(text: str) -> None:
         InputError: stdout is closed.
     """
     check_stdout()
-    sys.stdout.write(text)
+    with _on_stdout():
+        sys.stdout.write(text)
+        sys.stdout.flush()
+
+
+@contextmanager
+def _on_stdout() -> Iterator[None]:
+    """What the system says of stdout names it, as it names a file."""
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, "stdout") from None
 
 
 def say_lines(lines: Iterable[str]) -> None:

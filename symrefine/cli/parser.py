@@ -20,6 +20,7 @@ from symrefine.cli import (
     symmetrize,
     view,
 )
+from symrefine.cli.values import add_loudness
 from symrefine.errors import InputError, meant
 
 _COMMANDS = (detect, info, align, derive, export, symmetrize, complete, batch, label, run, merge, view, completion)
@@ -73,13 +74,14 @@ class _Version(argparse.Action):
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
-    """The values of a command line, with the function to call as `run`.
+    """The values of a command line, with its words as `argv` and the function to call as `run`.
 
     Raises:
         InputError: unknown commands, options or values.
     """
     argv = _joined(argv)
     args, rest = grammar().parse_known_args(argv)
+    args.argv = argv
     several = next((name for name in ("path", "target") if isinstance(getattr(args, name, None), list)), None)
     if several and not any(word.startswith("-") for word in rest):
         setattr(args, several, getattr(args, several) + rest)  # argparse takes only files that stand together
@@ -109,14 +111,7 @@ def grammar() -> Parser:
         name = command.__name__.rpartition(".")[2]
         sub = commands.add_parser(name, help=command.HELP, description=command.DESCRIPTION, allow_abbrev=False)
         command.add_arguments(sub)
-        _add_loudness(sub)
+        add_loudness(sub)
         sub.set_defaults(run=command.run, parser=sub)
     parser.commands = commands.choices
     return parser
-
-
-def _add_loudness(parser: Parser) -> None:
-    """How much is told besides the result, which every command lets choose."""
-    loud = parser.add_mutually_exclusive_group()
-    loud.add_argument("-v", "--verbose", action="store_true", help="tell stages with their seconds, on stderr")
-    loud.add_argument("-q", "--quiet", action="store_true", help="tell nothing but errors; files, and `-`, as ever")

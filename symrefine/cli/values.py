@@ -7,6 +7,9 @@ from typing import Any, Literal
 from symrefine.errors import InputError
 from symrefine.units import LARGEST_TOLERANCE, LEAST_MM, METRES, MOST_MM, TOLERANCE, read_length
 
+# Of options that number an object.
+NUMBERED = "(default: 7 of obj_000007.ply, 1 of any other name)"
+
 
 def add_detection_options(parser: argparse.ArgumentParser, counts_as: str = "symmetric") -> None:
     """The options that decide the result of a detection or an alignment."""
@@ -247,3 +250,10 @@ def _float(text: str) -> float:
         return float(text)
     except ValueError:
         return math.nan
+
+
+def add_loudness(parser: argparse.ArgumentParser) -> None:
+    """How much is told besides the result, which every command lets choose."""
+    loud = parser.add_mutually_exclusive_group()
+    loud.add_argument("-v", "--verbose", action="store_true", help="tell stages with their seconds, on stderr")
+    loud.add_argument("-q", "--quiet", action="store_true", help="tell nothing but errors; files, and `-`, as ever")

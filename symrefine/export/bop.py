@@ -120,6 +120,17 @@ def bop_text(path: Path, entries: Mapping[int, Entry]) -> str:
     return json_text(read_models_info(path) | {str(number): entry for number, entry in entries.items()})
 
 
+def replaced(path: Path, entries: Mapping[int, Entry]) -> str:
+    """Which objects a `models_info.json` has that are put in anew and differ, as a sentence; empty if there is none."""
+    known = read_models_info(path)
+    others = [n for n, entry in entries.items() if known.get(str(n), entry) != json.loads(json_text(entry))]
+    if not others:
+        return ""
+    was = known[str(others[0])].get("diameter")
+    size = f", of a diameter of {was:.4g} mm," if isinstance(was, float) else ""
+    return f"{path}: object {others[0]} was there{size} and is replaced"
+
+
 def read_models_info(path: Path) -> dict[str, Entry]:
     """The entries of an existing file; none if there is no file.
 
@@ -141,6 +152,14 @@ def number_of(name: str) -> int | None:
     """The number of the object whose model BOP gives a name: 1 of obj_000001; None if it is no such name."""
     match = _NAME.fullmatch(name)
     return int(match[1]) if match else None
+
+
+def number_for(source: str, asked: int | None = None) -> int:
+    """The number of the object in a file: what is asked for, or that of its name as BOP gives them, or 1."""
+    from symrefine.load import stem_of
+
+    found = number_of(stem_of(Path(source))) if asked is None else asked
+    return 1 if found is None else found
 
 
 def models_of(folder: Path, known: Mapping[str, int] | None = None) -> tuple[dict[int, Path], bool]:

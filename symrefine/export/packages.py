@@ -1,6 +1,6 @@
 """Everything that one export writes: names and contents of files, and what they cannot express."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -11,7 +11,7 @@ import numpy as np
 
 from symrefine.detection.result import Detection
 from symrefine.errors import InputError
-from symrefine.export.bop import bop_entry, bop_limits, bop_text, decided
+from symrefine.export.bop import bop_entry, bop_limits, bop_text, decided, number_for, replaced
 from symrefine.export.canonical import Canonical, canonical_pose
 from symrefine.export.consumers import CONSUMERS, Consumer, reading
 from symrefine.export.models import check_suffix, model_bytes, moved, npz_bytes
@@ -41,7 +41,7 @@ def package_of(
     detection: Detection,
     shape: Shape,
     *,
-    number: int = 1,
+    number: int | None = None,
     scale: float = 1.0,
     improper: bool = False,
     steps: int = STEPS,
@@ -51,20 +51,22 @@ def package_of(
 
     Args:
         out: the file, or the folder of a consumer.
-        number: of the object in `models_info.json`.
+        number: of the object in `models_info.json`; if None that of the name of the input, 7 of obj_000007.ply, or 1.
         scale: millimetres in one unit of the shape.
         improper: npz: whether mirrors and the like belong to the matrices.
         steps: npz: turns that stand for a continuous axis.
         transform: canonical: where the transform goes; `place_of_transform` if None.
 
     Raises:
-        InputError: another format, nothing decided, or a file that would take the place of the input.
+        InputError: another format, nothing decided, or a file that would take the place of the input, or of a model
+            that no export made.
     """
     if to not in get_args(Format):
         raise InputError(f"to is {to!r}; expected one of {list(get_args(Format))}")
     if improper and to != "npz":
         raise InputError(f"improper does not apply to {to!r}; it is for 'npz'")
     check_scale(scale)
+    number = number_for(shape.source, number)
     if to == "bop":
         made = bop_package(out, detection, shape, number=number, scale=scale)
     elif to == "npz":
@@ -75,12 +77,27 @@ def package_of(
         made = canonical_package(out, detection, shape, transform=transform or place_of_transform(out))
     else:
         made = consumer_package(to, out, detection, shape, number=number, scale=scale)
-    for path in made.files:
-        if path.resolve() == Path(shape.source).resolve():
-            raise InputError(f"{path}: is the input itself; name another {'folder' if to in CONSUMERS else 'file'}")
+    _check_places(list(made.files), shape.source, in_folder=to in CONSUMERS)
+    return made
+
+
+def _check_places(files: Sequence[Path], source: str, *, in_folder: bool) -> None:
+    """Refuse files that cannot be written, or would take the place of the input or of a model of others."""
+    for path in files:
+        if path.resolve() == Path(source).resolve():
+            raise InputError(f"{path}: is the input itself; name another {'folder' if in_folder else 'file'}")
         if path.parent.is_dir():
             check_target(path)
-    return made
+    if in_folder:
+        _check_made(*files[:2])
+
+
+def _check_made(model: Path, place: Path) -> None:
+    """Refuse to replace a model in a folder, named after its number and not by a person, that no export put there."""
+    if model.exists() and not place.exists():
+        raise InputError(
+            f"{model}: is there and was not made by export, which leaves {place.name} beside it; name another folder"
+        )
 
 
 def place_of_transform(out: Path) -> Path:
@@ -104,9 +121,10 @@ def _fill(data: bytes, path: Path) -> None:
 
 def bop_package(out: Path, detection: Detection, shape: Shape, *, number: int, scale: float) -> Package:
     """`models_info.json` with the entry of one object put in, in the frame of the model file."""
-    text = bop_text(out, {number: bop_entry(detection, shape, scale=scale)})
-    limits = bop_limits(detection)
-    notes = (*reflections_left_out(detection.group), *((limits,) if limits else ()))
+    entries = {number: bop_entry(detection, shape, scale=scale)}
+    text = bop_text(out, entries)
+    said = (bop_limits(detection), replaced(out, entries))
+    notes = (*reflections_left_out(detection.group), *filter(None, said))
     return Package(files={out: text.encode("ascii")}, notes=notes)
 
 
@@ -159,6 +177,7 @@ def consumer_package(
     if found.models_info is not None:
         info = folder / "models_info.json"
         files[info] = bop_text(info, {number: found.models_info}).encode("ascii")
+        notes += list(filter(None, [replaced(info, {number: found.models_info})]))
     if found.name:
         files[folder / (found.name if found.models_info is None else f"{stem}_{found.name}")] = found.content
     return Package(files=files, notes=(*found.notes, *notes))

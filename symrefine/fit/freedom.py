@@ -13,9 +13,9 @@ from symrefine.surface.skin import LocalPlanes
 def freest(cloud: LocalPlanes, state: Framed, *, turns: bool = True, stride: int = 1) -> Array:
     """Motions [p, 6] of a frame (rotation about and shift along its axes), the least told ones first.
 
-    Those that change no operation are not among them, as a turn about the normal of a lone mirror; without `turns`, none
-    is. What the pairs of each changes is weighed against how far images move, which is 1 in the mean square over all
-    operations.
+    Those that change no operation are not among them, as a turn about the normal of a lone mirror; without `turns` no
+    turn is. What the pairs of each changes is weighed against how far images move, which is 1 in the mean square over
+    all operations.
     """
     first = 0 if turns else 3
     points = cloud.points[::stride]

@@ -114,7 +114,7 @@ def export(
     out: str | Path,
     *,
     found: "Detection | None" = None,
-    number: int = 1,
+    number: int | None = None,
     scale: float = 1.0,
     improper: bool = False,
     steps: int | None = None,
@@ -128,7 +128,7 @@ def export(
             or a folder for "foundationpose", "megapose", "dope", "isaac".
         out: the file, or the folder.
         found: what `detect` found in it; detected if None.
-        number: of the object in `models_info.json`.
+        number: of the object in `models_info.json`; if None that of the name of the file, 7 of obj_000007.ply, or 1.
         scale: millimetres in one unit of the object.
         improper: npz: whether mirrors and the like belong to the matrices.
         steps: npz: turns that stand for a continuous axis; 72 if None.

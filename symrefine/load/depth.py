@@ -38,7 +38,7 @@ def load_depth(
     """The points that a depth image shows, with the camera that saw them as their viewpoint.
 
     Args:
-        path: .png of one channel (16 bits as a rule), or .npy [H, W].
+        path: .png of one channel, of 16 bits, or of 8 where `depth_scale` is told; or .npy [H, W].
         intrinsics: fx, fy, cx, cy in pixels, the centre of the first pixel being (0, 0).
         depth_scale: lengths in one unit of depth; 0.001 for whole numbers if None, which makes metres of millimetres,
             and 1 for floating point.
@@ -52,6 +52,8 @@ def load_depth(
         raise InputError(f"depth_scale is {depth_scale}; expected a number above 0")
     with about(str(path)):
         depth = _depth(Path(path))
+        if depth_scale is None and depth.dtype == np.uint8:
+            raise InputError("has pixels of 8 bits, as pictures do; of depths that are stored so, tell the depth scale")
         scale = depth_scale or (1.0 if np.issubdtype(depth.dtype, np.floating) else DEPTH_SCALE)
         seen = np.isfinite(depth) & (depth != 0)
         below = np.argwhere(seen & (depth < 0))

@@ -64,14 +64,21 @@ _TITLES: dict[State, str] = {
 
 
 def review_page(
-    cards: Sequence[Card], *, folder: str, out: str, more: int, failed: Sequence[str], more_failed: int, schema: str
+    cards: Sequence[Card],
+    *,
+    folder: str,
+    again: Sequence[str],
+    more: int,
+    failed: Sequence[str],
+    more_failed: int,
+    schema: str,
 ) -> str:
     """The whole page; equal input gives equal pages.
 
     Args:
         cards: the most doubtful first.
         folder: where the models are.
-        out: where the labels go.
+        again: words of the command that applies what is saved.
         more: objects that are to be looked at after these.
         failed: what was wrong with files that could not be used.
         more_failed: such files beside those.
@@ -81,7 +88,7 @@ def review_page(
     told = f"{waiting} {'object' if waiting == 1 else 'objects'} to look at"
     seen = [(card.number, card.sha256, card.decision) for card in cards]
     key = sha256(json.dumps(seen).encode()).hexdigest()[:16]
-    parts = [_head(told, folder, out)]
+    parts = [_head(told, folder, again)]
     parts += [_section(state, [card for card in cards if card.state == state], more) for state in _TITLES]
     page = Page(
         title=f"{plain(told)} · {plain(folder)}",
@@ -93,8 +100,8 @@ def review_page(
     return filled(page)
 
 
-def _head(told: str, folder: str, out: str) -> str:
-    command = shlex.join(["symrefine", "label", folder, "--out", out, "--decisions", "decisions.json"])
+def _head(told: str, folder: str, again: Sequence[str]) -> str:
+    command = shlex.join(again)
     return (
         f'<header><p class="over">Symmetry of {plain(folder)}</p><h1>{plain(told)}</h1>'
         '<p class="lead">Choose the group that each object is meant to have, save the choices, and apply them with</p>'

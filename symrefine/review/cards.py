@@ -19,7 +19,13 @@ _OF_CHOICE = ("point_group", "meaning", "rotations", "count", "forgiven", "limit
 
 
 def page_text(
-    folder: str, out: Path, rows: Mapping[int, Row], order: Sequence[int], decisions: Decisions, labels: Labels
+    folder: str,
+    out: Path,
+    rows: Mapping[int, Row],
+    order: Sequence[int],
+    decisions: Decisions,
+    labels: Labels,
+    again: Sequence[str],
 ) -> str:
     """The page, with the pictures in the folder of the labels inside it.
 
@@ -28,6 +34,7 @@ def page_text(
         out: where the labels go.
         rows: are asked for one by one, as many as one page takes.
         order: numbers of the objects that something was found in, the most doubtful first.
+        again: words of the command that applies what is saved.
     """
     waiting = [number for number in order if number not in labels]
     shown = [*waiting, *(number for number in order if number in labels)][:MOST]
@@ -37,7 +44,7 @@ def page_text(
     return review_page(
         cards,
         folder=folder,
-        out=str(out),
+        again=again,
         more=max(0, len(waiting) - MOST),
         failed=[one_line(str(rows[number]["error"])) for number in failed[:MOST]],
         more_failed=max(0, len(failed) - MOST),
