@@ -615,6 +615,36 @@ def test_a_model_is_not_written_over_itself(tmp_path: Path, capsys: pytest.Captu
     assert path.read_bytes() == before
 
 
+def test_what_others_put_into_a_folder_is_not_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A model is named by its number, which nobody typed; what export wrote itself, it writes anew."""
+    shelf, part = tmp_path / "shelf", placed(tmp_path, prism(5), 1, "obj_000003.ply")
+    shelf.mkdir()
+    other = placed(shelf, prism(6), 2, "obj_000003.ply")
+    before = other.read_bytes()
+    line = ["export", str(part), "--to", "foundationpose", "--out"]
+    assert invoke([*line, str(shelf)]) == 2
+    assert "obj_000003.ply: is there and was not made by export" in capsys.readouterr().err
+    assert ([p.name for p in shelf.iterdir()], other.read_bytes()) == ([other.name], before)
+    for scale, told in (("1", ""), ("10", "models_info.json: object 3 was there"), ("10", "")):
+        assert invoke([*line, str(tmp_path / "new"), "--scale", scale]) == 0
+        said = capsys.readouterr().err
+        assert told in said
+        assert ("was there" in said) == bool(told)
+    assert (tmp_path / "new" / "obj_000003.ply").is_file()
+    assert sorted(json.loads((tmp_path / "new" / "models_info.json").read_text())) == ["3"]
+
+
+def test_an_entry_that_is_replaced_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    info = tmp_path / "models_info.json"
+    one, two = placed(tmp_path, prism(5), 1, "one.ply"), placed(tmp_path, prism(6), 2, "obj_000007.ply")
+    assert invoke(["detect", str(one), "--bop", str(info)]) == 0
+    assert invoke(["detect", str(two), "--bop", str(info)]) == 0
+    assert sorted(json.loads(info.read_text())) == ["1", "7"]
+    assert "was there" not in capsys.readouterr().err
+    assert invoke(["detect", str(two), "--bop", str(info), "--bop-id", "1"]) == 0
+    assert "object 1 was there, of a diameter of" in capsys.readouterr().err
+
+
 def test_a_folder_of_models_becomes_one_models_info(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

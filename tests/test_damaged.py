@@ -471,6 +471,16 @@ def test_a_sharp_rim_is_no_border(half_height):
     assert made.openings.border[out > out.max() - 0.02].mean() > 0.8
 
 
+@pytest.mark.parametrize("seed", [3, 6])
+def test_where_noise_needs_all_that_is_allowed_a_hole_still_is_one(seed):
+    """Of fins sampled as coarsely as they are thick nobody sees where they end, but that they do."""
+    fins = [box((x, 0.0, 0.6), (0.05, 1.4, 1.0)) for x in np.linspace(-0.97, 0.97, 12)]
+    sink = join([box((0.0, 0.0, 0.05), (2.0, 1.4, 0.1)), *fins])
+    found = detect(damage.hole(sink, 0.15, np.random.default_rng(seed)).points)
+    assert found.surface.floor >= found.tolerance
+    assert (found.point_group, found.at_least) == ("C1", True)
+
+
 @pytest.mark.parametrize("half_height", [0.12, 0.2])
 def test_what_stands_at_a_sharp_rim_is_not_explained_away(half_height):
     """A block on one side of the rim leaves one mirror, whatever a body of revolution would hide behind the rim."""

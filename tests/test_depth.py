@@ -135,6 +135,10 @@ def test_pictures_that_are_no_depths_or_masks(folder, tmp_path):
         load_depth(tmp_path / "colour.png", INTRINSICS)
     with pytest.raises(InputError, match="has 4 x 4 pixels, the depth image 240 x 180"):
         load_depth(folder / "depth.png", INTRINSICS, mask=tmp_path / "colour.png")
+    Image.new("L", (240, 180), 200).save(tmp_path / "grey.png")
+    with pytest.raises(InputError, match="has pixels of 8 bits, as pictures do"):
+        load_depth(tmp_path / "grey.png", INTRINSICS)
+    assert load_depth(tmp_path / "grey.png", INTRINSICS, depth_scale=0.01).points[0, 2] == pytest.approx(2.0)
     Image.new("L", (240, 180)).save(tmp_path / "black.png")
     with pytest.raises(InputError, match=r"no pixel in .*black\.png has a depth"):
         load_depth(folder / "depth.png", INTRINSICS, mask=tmp_path / "black.png")

@@ -2,6 +2,8 @@
 
 import json
 import math
+import re
+import shlex
 import shutil
 import tracemalloc
 from collections.abc import Callable
@@ -138,6 +140,10 @@ def test_what_is_sure_enough_is_settled(run: Run, out: Path, models: Path) -> No
     assert "symmetries_discrete" not in info["12"]
     for name in ("labels", "decisions"):
         jsonschema.validate(of(out, f"{name}.json"), schema(name))
+    # What applies the decisions asks for the same.
+    command = shlex.split(re.findall(r"<pre>(.*)</pre>", (out / "review.html").read_text())[0])
+    assert command[:2] == ["symrefine", "label"]
+    assert command[-4:] == ["--accept", str(sure[1]), "--decisions", "decisions.json"]
 
 
 def test_equal_runs_give_equal_bytes_and_nothing_is_detected_twice(

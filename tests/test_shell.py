@@ -113,10 +113,19 @@ def test_the_json_of_several_files_is_an_array(run: Run, folder: Path) -> None:
 def test_what_is_of_one_file_is_refused_for_several(run: Run, folder: Path, option: str) -> None:
     before = sorted(folder.iterdir())
     right = "symrefine batch DIR --bop" if option == "--bop" else "`detect` for each"
-    name = "f.png" if option == "--picture" else "f.html"
+    name = {"--picture": "f.png", "--recording": "f.rrd"}.get(option, "f.html")
     assert_refused(run("detect", "box.xyz", "row.csv", option, name), f"{option} {name}: is for one object", right)
     assert_refused(run("detect", "box.xyz", "row.csv", "--json", "row.csv"), "same file as the input")
     assert sorted(folder.iterdir()) == before
+
+
+def test_a_link_to_an_object_is_no_place_for_a_report(run: Run, folder: Path) -> None:
+    (folder / "other.json").symlink_to(folder / "scalene.xyz")
+    (folder / "lost.json").symlink_to(folder / "nowhere" / "x.json")
+    before = (folder / "scalene.xyz").read_bytes()
+    assert_refused(run("detect", "box.xyz", "--json", "other.json"), "other.json: is a link to", "suffix of an object")
+    assert (folder / "scalene.xyz").read_bytes() == before
+    assert_refused(run("detect", "box.xyz", "--json", "lost.json"), "lost.json: cannot be written", "no directory")
 
 
 def test_a_picture_is_written(run: Run, folder: Path) -> None:

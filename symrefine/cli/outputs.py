@@ -2,15 +2,14 @@
 
 import os
 import sys
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from symrefine.cli.streams import aside, check_stdout
 from symrefine.errors import InputError, one_line, printable
-from symrefine.files import Writer, check_target, json_text, text_writer
+from symrefine.files import Writer, check_target, json_text, naming, text_writer
 from symrefine.files import write_all as write_all
 
 if TYPE_CHECKING:
@@ -49,13 +48,13 @@ def check_outputs(outputs: dict[str, str | None], inputs: Iterable[Path]) -> Non
             check_target(path)
         if name == STDOUT or (option != "--json" and path.exists() and not path.is_file()):
             raise InputError(f"{option} {name}: expected a file; only --json writes to stdout and devices")
-        if (suffix := SHOWN.get(option[2:])) and path.suffix.lower() != suffix:
-            raise InputError(f"{option} {name}: expected a name that ends in {suffix}")
         if path.is_file() or not path.exists():
             if path.resolve() in taken:
                 raise InputError(f"{option} {name}: is the same file as {taken[path.resolve()]}; name another one")
             taken[path.resolve()] = f"that of {option}"
         _check_name(option, path)
+        if (suffix := SHOWN.get(option[2:])) and path.suffix.lower() != suffix:
+            raise InputError(f"{option} {name}: expected a name that ends in {suffix}")
 
 
 def _check_name(option: str, path: Path) -> None:
@@ -128,7 +127,7 @@ def print_lines(lines: Iterable[Any]) -> None:
     if is_quiet():
         return
     out = console()
-    with _on_stdout():
+    with naming("stdout"):
         for line in lines:
             if isinstance(line, str):
                 out.print(printable(line), soft_wrap=True)
@@ -144,20 +143,9 @@ def say(text: str) -> None:
         InputError: stdout is closed.
     """
     check_stdout()
-    with _on_stdout():
+    with naming("stdout"):
         sys.stdout.write(text)
         sys.stdout.flush()
-
-
-@contextmanager
-def _on_stdout() -> Iterator[None]:
-    """What the system says of stdout names it, as it names a file."""
-    try:
-        yield
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, "stdout") from None
 
 
 def say_lines(lines: Iterable[str]) -> None:

@@ -67,8 +67,8 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     """
     nothing = max(ALIKE * _hidden(surface), certain(finest))
     whole = replace(_of_whole(surface.closed, evidence, limit, nothing), whole=True)
-    if surface.openings is None or (surface.closed is surface and surface.openings.floor is None):
-        return whole
+    if surface.openings is None or (not surface.is_open and surface.openings.floor is None):
+        return replace(whole, at_least=surface.openings is not None and surface.openings.evident)
     ends, evident = ends_there(surface, whole.largest), surface.openings.evident
     if not whole.largest.group.is_polar and (ends or not evident):
         return replace(whole, at_least=evident)  # no single hole leaves such a group, and there is hardly one

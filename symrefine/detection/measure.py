@@ -24,7 +24,7 @@ from symrefine.surface.drift import Drift
 from symrefine.surface.floor import Floor, floor_of
 from symrefine.surface.misses import TOLERANCE, noise_distances, sampling_distances
 from symrefine.surface.neighbourhoods import fills_volume
-from symrefine.surface.openings import NEIGHBOURS, OPEN, openings
+from symrefine.surface.openings import NEIGHBOURS, openings
 from symrefine.surface.sampling import sampling
 from symrefine.surface.skin import FEW, LocalPlanes, Skin, drawn, isolated_points, make_skin
 from symrefine.surface.surface import WINDOWS, Surface
@@ -354,9 +354,7 @@ def _surface(
         noise = noise_distances(len(local), half, rng)
     skin = None if exact else whole
     surface = Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, skin=skin, tolerance=tolerance)
-    # Where noise alone needs all that is allowed, nobody sees what is open, but what a floor hides.
-    sees = surface.floor < tolerance
-    if tree is not None and (sees or views or measured.floor is not None):
+    if tree is not None:
         found = openings(
             cloud,
             local,
@@ -366,7 +364,7 @@ def _surface(
             clumps=tuple(Clump.of((p - moments.center) / moments.scale) for _, p in measured.clumps),
             floor=None if measured.floor is None else measured.floor.normalised(moments.center, moments.scale),
             strays=len(measured.strays) > 0,
-            least=OPEN if sees else math.inf,
+            blurred=surface.floor >= tolerance,
         )
         surface = replace(surface, openings=found)
     # Where density differs, as between what cameras saw from far and near or where a clump adds to it, a window and its

@@ -239,6 +239,7 @@ def openings(
     floor: Floor | None = None,
     strays: bool = False,
     least: float = OPEN,
+    blurred: bool = False,
 ) -> Openings | None:
     """What is open of a surface, or hidden; None if it is closed, or known too coarsely to tell.
 
@@ -253,6 +254,7 @@ def openings(
         strays: whether there were any: then what is lonely may be one more, which has all that is near to one side,
             and no end of the surface.
         least: share of the local planes that have to lie far aside, for each RMS radius that neighbourhoods are wide.
+        blurred: whether noise alone needs all that is allowed: then nobody sees where it is open, only that, if so.
     """
     none = np.zeros(len(cloud.points), dtype=bool)
     if cameras:
@@ -262,11 +264,13 @@ def openings(
         aside[floor.meets(cloud.points, cloud.beside)] = 0.0
     far = _lines(cloud, (aside > FAR_ASIDE) & ~(cloud.lonely & strays))
     far[far] = ~_folded(cloud.points[far], points, tree, None if near is None else near[far])
-    if width > WIDEST or far.mean() < least * width or not far.any():
-        closed = Openings(line=none, border=none, evident=False, clumps=clumps, floor=floor)
-        return closed if closed.covering else None
+    is_open = width <= WIDEST and far.mean() >= least * width and far.any()
+    evident = bool(is_open and far.mean() > EVIDENT * width)
+    if blurred or not is_open:
+        closed = Openings(line=none, border=none, evident=evident, clumps=clumps, floor=floor)
+        return closed if closed.covering or evident else None
     line = (aside > ASIDE) & _beside(cloud, far)
-    border, evident = _beside(cloud, line), bool(far.mean() > EVIDENT * width)
+    border = _beside(cloud, line)
     far[far] = ~_thin(cloud.points[far], points, tree)
     ends = border & ~_beside(cloud, line & _beside(cloud, far)) if far.any() else border
     return Openings(
