@@ -390,3 +390,20 @@ def test_the_tone_of_an_area_may_be_any(tone):
     found = detect_planar(Shape(points=points, weights=grain[row, column]))
     assert found.point_group == "D6"
     assert found.confidence > 0.95
+
+
+@pytest.mark.parametrize("seed", [1, 8, 14])
+def test_a_fit_that_ends_beside_a_line_hides_no_better_start(seed):
+    """One mark of twelve on a dial is larger: where grain puts the doublets' line off, its fit ends beside the mirror."""
+    rng = np.random.default_rng(seed)
+    angles = np.radians(10.0 + 17.0 * seed) + np.pi / 6.0 * np.arange(12)
+    place = (np.mgrid[:300, :300].reshape(2, -1).T - 149.5) / 125.0
+    radius = np.hypot(*place.T)
+    ink = (radius > 0.93) & (radius < 1.0)
+    for k, angle in enumerate(angles):
+        along, across = place @ [np.cos(angle), np.sin(angle)], abs(place @ [-np.sin(angle), np.cos(angle)])
+        ink |= (along > 0.75 - 0.15 * (k == 0)) & (along < 0.92) & (across < 0.035 + 0.03 * (k == 0))
+    grey = np.clip(ink + rng.normal(scale=12.0 / 255.0, size=len(ink)), 0.0, 1.0)
+    found = detect_planar(Shape(points=place, weights=grey))
+    assert found.point_group == "D1"
+    assert angle_off(found.lines[0].line.normal, angles[0]) < 0.2

@@ -100,20 +100,28 @@ def _products(turns: Sequence[Hypothesis], lines: Sequence[Hypothesis]) -> Itera
 
 
 def _distinct(outlines: Outlines, starts: Iterable[Placed], limit: float) -> Iterator[Hypothesis]:
-    """The starts fitted and judged, but for those that miss by far, or that a group has that was fitted before them."""
+    """The starts fitted and judged, but for those that miss by far, or that a group has that was fitted before them.
+
+    A fit may end beside where a group holds: what is the same but looks better than that is fitted as well.
+    """
     seen: list[Hypothesis] = []
 
-    def known(placed: Placed) -> bool:
-        """Whether a group fitted before is the same, or has it and holds exactly."""
-        return any(h.placed.holds(placed) and (h.need <= ROUNDED or h.placed.order == placed.order) for h in seen)
+    def known(placed: Placed, needs: float) -> bool:
+        """Whether a group fitted before has it and holds exactly, or is the same and needs no more."""
+        return any(
+            h.placed.holds(placed)
+            and (h.need <= ROUNDED or (h.placed.order == placed.order and h.need <= ALIKE * needs))
+            for h in seen
+        )
 
     for start in starts:
-        if known(start):
+        if known(start, 0.0):
             continue
-        if outlines.need([start.widest()]) > limit:
+        needs = outlines.need([start.widest()])
+        if needs > limit or known(start, needs):
             continue
         found = _judged(outlines, start)
-        if not known(found.placed):
+        if not known(found.placed, found.need):
             seen.append(found)
             yield found
 
