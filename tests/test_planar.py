@@ -394,7 +394,7 @@ def test_the_tone_of_an_area_may_be_any(tone):
 
 @pytest.mark.parametrize("seed", [1, 8, 14])
 def test_a_fit_that_ends_beside_a_line_hides_no_better_start(seed):
-    """One mark of twelve on a dial is larger: where grain puts the doublets' line off, its fit ends beside the mirror."""
+    """One of twelve marks is larger; where grain puts the doublets' line off, its fit ends beside the mirror."""
     rng = np.random.default_rng(seed)
     angles = np.radians(10.0 + 17.0 * seed) + np.pi / 6.0 * np.arange(12)
     place = (np.mgrid[:300, :300].reshape(2, -1).T - 149.5) / 125.0

@@ -225,7 +225,7 @@ def _write_bop(args: argparse.Namespace, rows: Sequence["Row"], numbers: Mapping
     write_all({name: text_writer(bop_text(Path(name), dict(sorted(entries.items()))))})
     if entries and not told:
         size, number = min((entry["diameter"], number) for number, entry in entries.items())
-        if doubt := metres_doubt(f"object {number}", size, "--bop-scale"):
+        if doubt := metres_doubt(f"object {number}", size, "--bop-scale", None):
             note(doubt)
     print_lines([f"wrote {name}: {len(entries)} of {len(rows)} objects"])
     return left_out

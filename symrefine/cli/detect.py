@@ -200,8 +200,8 @@ def _notes(
     if args.bop is not None:
         from symrefine.export.bop import bop_limits, diameter, metres_doubt, replaced
 
-        size = diameter(detection.own(shape).points)
-        doubt = "" if args.bop_scale else metres_doubt(shape.source, size, "--bop-scale")
+        size = (args.bop_scale or 1.0) * diameter(detection.own(shape).points)
+        doubt = metres_doubt(shape.source, size, "--bop-scale", args.bop_scale)
         yield from filter(None, (bop_limits(detection), doubt, replaced(Path(args.bop), entries)))
     is_grey = shape.dim == 2 and "threshold" in record["options"] and args.threshold is None
     if is_grey and (record["undetermined"] or record["point_group"] == "C1"):

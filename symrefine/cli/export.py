@@ -86,10 +86,11 @@ def run(args: argparse.Namespace) -> int:
     tell(None, {}, [f"{args.path}: {detection.point_group}"], map(str, package.files))
     for text in package.notes:
         note(text)
-    if "scale" in _OPTIONS[args.to] and args.scale is None:
+    if "scale" in _OPTIONS[args.to]:
         from symrefine.export.bop import diameter, metres_doubt
 
-        if doubt := metres_doubt(args.path, diameter(shape.points), "--scale"):
+        size = (args.scale or 1.0) * diameter(shape.points)
+        if doubt := metres_doubt(args.path, size, "--scale", args.scale):
             note(doubt)
     return 0
 

@@ -245,7 +245,8 @@ def _tell(args: argparse.Namespace, objects: int, failed: int, labels: "Labels")
     print_lines(f"wrote {Path(args.out, name)}" for name in (INFO, LABELS, PAGE))
     if left:
         print_lines([f"open {Path(args.out, PAGE)}, choose, save, and run this again with --decisions"])
-    if labels and args.scale is None:
-        size, number = min((label.diameter, number) for number, label in labels.items())
-        if doubt := metres_doubt(f"object {number}", size, "--scale"):
+    if labels:
+        farthest = min if args.scale is None else max
+        size, number = farthest((label.diameter, number) for number, label in labels.items())
+        if doubt := metres_doubt(f"object {number}", size, "--scale", args.scale):
             note(doubt)

@@ -96,16 +96,19 @@ def bop_limits(detection: Detection) -> str:
     return "BOP cannot express a sphere: three continuous axes through its centre stand for all the others"
 
 
-def metres_doubt(source: str, size: float, option: str) -> str:
-    """That a file taken to be in millimetres may be in metres, as a sentence; empty where nothing speaks for it.
+def metres_doubt(source: str, size: float, option: str, scale: float | None) -> str:
+    """That a file may be in metres, or millimetres, and was taken for the other, as a sentence; else nothing.
 
     Args:
-        size: diameter in units of the file.
+        size: diameter in millimetres.
         option: of the command line that takes the millimetres in one unit of the file.
+        scale: what that was given, if anything.
     """
-    if size * METRES["mm"] >= EVERYDAY_M[0]:
-        return ""
-    return f"{source}: a diameter of {size:.3g} mm is little; metres? then give {option} 1000"
+    if scale is None and size * METRES["mm"] < EVERYDAY_M[0]:
+        return f"{source}: a diameter of {size:.3g} mm is little; metres? then give {option} 1000"
+    if scale is not None and size * METRES["mm"] > EVERYDAY_M[1]:
+        return f"{source}: a diameter of {size:,.0f} mm is much; is one unit of it {scale:g} mm, as {option} says?"
+    return ""
 
 
 def bop_text(path: Path, entries: Mapping[int, Entry]) -> str:

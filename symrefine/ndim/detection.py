@@ -100,7 +100,8 @@ def detect_nd(
     check_tolerance(tolerance)
     if not 2 <= shape.dim <= LARGEST_DIM or shape.faces is not None:
         what = "a mesh" if shape.faces is not None else f"{shape.dim} coordinates"
-        raise InputError(f"{shape.source}: {what}; detect_nd takes points of 2 to {LARGEST_DIM} coordinates")
+        rows = "; a row is a point, transpose them?" if len(shape.points) <= LARGEST_DIM < shape.dim else ""
+        raise InputError(f"{shape.source}: {what}; detect_nd takes points of 2 to {LARGEST_DIM} coordinates{rows}")
     sampled = len(shape.points) > FEW if sampled is None else sampled
     clock = Clock()
     with clock("moments"):
