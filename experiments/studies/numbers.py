@@ -36,7 +36,6 @@ KIND_OF = {
         "align.rivals": "GOOD",
         "align.span": "SHARED",
         "align.sides": "RADII",
-        "decide.chain": "ENCLOSED",
         "decide.ends": "KEPT PLACES",
         "decide.doubts": "STRAY",
         "decide.hypotheses": "SAME_RAD",

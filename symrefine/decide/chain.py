@@ -42,9 +42,6 @@ from symrefine.propose.candidates import (
 )
 from symrefine.surface.surface import Surface
 
-# Share of a surface that a border encloses at most which is too short to be evident: of a ball that is 3 %, by the
-# isoperimetric inequality, and four times that where half of the border was seen.
-ENCLOSED = 0.12
 # Candidates of an open surface that are looked at: where little was seen many seem possible at a glance.
 LOOKED = 24
 # Candidates turned down after a look that are fitted all the same where nothing else was: the nearest misses.
@@ -75,12 +72,11 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     evident = surface.openings.hide_much
     part = _of_part(surface, whole)
     more = _size(part.largest.placed) > _size(whole.largest.placed)
-    # What may not be open at all is missing a part only where that explains more, and no more than so short a border
-    # may enclose.
     hidden = max((e.coverage.unseen for e in part.largest.elements), default=0.0)
     # A group that a single hole leaves may keep its border because it keeps the border of almost any.
     ends = ends and not (more and often_kept(surface, whole.largest, hidden))
-    missing = (evident or (more and hidden <= ENCLOSED and hides_there(surface, part.largest))) and not ends
+    # What may not be open at all is missing a part only where that explains more.
+    missing = (evident or (more and hides_there(surface, part.largest))) and not ends
     missing = missing or places(whole.largest, part.largest) >= PLACES
     missing = missing and not (more and ends_too(surface, part.largest, ALIKE * limit))
     if missing and (not more or hides_surely(surface, part.largest, limit)):
