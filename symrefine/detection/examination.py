@@ -215,12 +215,13 @@ def _likeliest(
         if not (foreign := suspects(found, points, tolerance)):
             continue
         without = examine(apart=apart, foreign=foreign)
+        if without.size(tolerance) <= found.size(tolerance):
+            continue
         own, others = _told_apart(without, tolerance)
-        if own and without.size(tolerance) > found.size(tolerance):
-            hides = True
-            if others:
-                without = examine(apart=False, foreign=others)
-                own, _ = _told_apart(without, tolerance)
+        hides = hides or bool(own)
+        if own and others:
+            without = examine(apart=False, foreign=others)
+            own, _ = _told_apart(without, tolerance)
         if not own and without.size(tolerance) > found.size(tolerance):
             return replace(without, denied=found.links[found.decided(tolerance).index])
     return replace(found, hides=hides)
