@@ -34,18 +34,28 @@ def check_target(path: Path) -> None:
         InputError: a directory, no such parent directory, or no permission.
     """
     try:
-        is_folder = path.is_dir()
-    except (OSError, ValueError) as error:
+        is_folder, place = path.is_dir(), path.resolve()
+    except (OSError, ValueError, RuntimeError) as error:  # the last of links that lead to one another
         raise InputError(f"{str(path)[:60]!a}: is no name of a file: {error}") from None
     if is_folder:
         raise InputError(f"{path}: is a directory; expected a file to write")
-    folders = (path.parent, path.resolve().parent)  # a link may lead to where nothing is
+    folders = (path.parent, place.parent)  # a link may lead to where nothing is
     if missing := next((folder for folder in folders if not folder.is_dir()), None):
         raise InputError(f"{path}: cannot be written: there is no directory {missing}")
     if path.exists() and not os.access(path, os.W_OK):
         raise InputError(f"{path}: cannot be written: the file is write-protected")
-    if _is_replaceable(path) and not os.access(path.resolve().parent, os.W_OK | os.X_OK):
-        raise InputError(f"{path}: cannot be written: no permission in the directory {path.resolve().parent}")
+    if _is_replaceable(path):
+        check_folder(place.parent, f"{path}")
+
+
+def check_folder(folder: Path, what: str) -> None:
+    """Refuse a directory that nothing can be put into, named with what was to be.
+
+    Raises:
+        InputError: no permission.
+    """
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"{what}: cannot be written: no permission in the directory {folder}")
 
 
 @contextmanager

@@ -126,6 +126,9 @@ def test_a_link_to_an_object_is_no_place_for_a_report(run: Run, folder: Path) ->
     assert_refused(run("detect", "box.xyz", "--json", "other.json"), "other.json: is a link to", "suffix of an object")
     assert (folder / "scalene.xyz").read_bytes() == before
     assert_refused(run("detect", "box.xyz", "--json", "lost.json"), "lost.json: cannot be written", "no directory")
+    (folder / "here.json").symlink_to(folder / "there.json")
+    (folder / "there.json").symlink_to(folder / "here.json")
+    assert_refused(run("detect", "box.xyz", "--json", "here.json"), "is no name of a file", "loop")
 
 
 def test_a_picture_is_written(run: Run, folder: Path) -> None:

@@ -198,10 +198,10 @@ def _notes(
 ) -> Iterator[str]:
     """What else there is to say, on stderr."""
     if args.bop is not None:
-        from symrefine.export.bop import bop_limits, diameter, metres_doubt, replaced
+        from symrefine.export.bop import bop_limits, metres_doubt, replaced
 
-        size = (args.bop_scale or 1.0) * diameter(detection.own(shape).points)
-        doubt = metres_doubt(shape.source, size, "--bop-scale", args.bop_scale)
+        (entry,) = entries.values()
+        doubt = metres_doubt(shape.source, entry["diameter"], "--bop-scale", args.bop_scale)
         yield from filter(None, (bop_limits(detection), doubt, replaced(Path(args.bop), entries)))
     is_grey = shape.dim == 2 and "threshold" in record["options"] and args.threshold is None
     if is_grey and (record["undetermined"] or record["point_group"] == "C1"):

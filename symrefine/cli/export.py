@@ -1,7 +1,6 @@
 """`symrefine export`: the symmetries of a file as other programs read them."""
 
 import argparse
-import os
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +19,7 @@ from symrefine.cli.values import (
     natural,
 )
 from symrefine.errors import InputError
+from symrefine.files import check_folder
 
 if TYPE_CHECKING:
     from symrefine.detection.measure import Outliers
@@ -127,8 +127,7 @@ def _check(args: argparse.Namespace) -> None:
             raise InputError(f"--out {out}: is a file; expected a folder")
         if not out.parent.is_dir():
             raise InputError(f"--out {out}: cannot be made: there is no directory {out.parent}")
-        if not os.access(out if out.exists() else out.parent, os.W_OK | os.X_OK):
-            raise InputError(f"--out {out}: cannot be written: no permission in the directory")
+        check_folder(out if out.exists() else out.parent, f"--out {out}")
         return
     outputs = {"--out": args.out, "--transform": str(_transform(args)) if args.to == "canonical" else None}
     check_outputs(outputs, [Path(args.path)])

@@ -35,6 +35,9 @@ def check_outputs(outputs: dict[str, str | None], inputs: Iterable[Path]) -> Non
     Args:
         outputs: option to path, None where the option is not given; only `--json` may be "-", for stdout.
     """
+    for name in outputs.values():
+        if name not in (None, STDOUT):
+            check_target(Path(name))
     given = {Path(name).resolve() for name in outputs.values() if name not in (None, STDOUT)}
     taken = {place: "the input" for path in inputs if (place := path.resolve()) in given}
     for option, name in outputs.items():
@@ -44,8 +47,6 @@ def check_outputs(outputs: dict[str, str | None], inputs: Iterable[Path]) -> Non
         if name is None:
             continue
         path = Path(name)
-        if name != STDOUT:
-            check_target(path)
         if name == STDOUT or (option != "--json" and path.exists() and not path.is_file()):
             raise InputError(f"{option} {name}: expected a file; only --json writes to stdout and devices")
         if path.is_file() or not path.exists():

@@ -126,11 +126,11 @@ def bop_text(path: Path, entries: Mapping[int, Entry]) -> str:
 def replaced(path: Path, entries: Mapping[int, Entry]) -> str:
     """Which objects a `models_info.json` has that are put in anew and differ, as a sentence; empty if there is none."""
     known = read_models_info(path)
-    others = [n for n, entry in entries.items() if known.get(str(n), entry) != json.loads(json_text(entry))]
+    others = [n for n, entry in entries.items() if known.get(str(n), entry) != entry]
     if not others:
         return ""
     was = known[str(others[0])].get("diameter")
-    size = f", of a diameter of {was:.4g} mm," if isinstance(was, float) else ""
+    size = f", of a diameter of {was:.4g} mm," if isinstance(was, int | float) else ""
     return f"{path}: object {others[0]} was there{size} and is replaced"
 
 

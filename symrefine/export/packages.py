@@ -89,11 +89,12 @@ def _check_places(files: Sequence[Path], source: str, *, in_folder: bool) -> Non
         if path.parent.is_dir():
             check_target(path)
     if in_folder:
-        _check_made(*files[:2])
+        _check_made(files[0])
 
 
-def _check_made(model: Path, place: Path) -> None:
+def _check_made(model: Path) -> None:
     """Refuse to replace a model in a folder, named after its number and not by a person, that no export put there."""
+    place = place_of_transform(model)
     if model.exists() and not place.exists():
         raise InputError(
             f"{model}: is there and was not made by export, which leaves {place.name} beside it; name another folder"
@@ -171,9 +172,10 @@ def consumer_package(
     found = reading(consumer, pose.group, pose.apply(shape.points, scale))
     stem = f"obj_{number:06d}" if found.models_info is not None else "model"
     unit = scale * per_metre / 1000.0
-    model, notes = _model(folder / (stem + suffix), shape, pose, unit)
-    place = folder / f"{stem}_transform.json"
-    files = {folder / (stem + suffix): model, place: transform_bytes(place, pose, shape.source, unit)}
+    path = folder / (stem + suffix)
+    model, notes = _model(path, shape, pose, unit)
+    place = place_of_transform(path)
+    files = {path: model, place: transform_bytes(place, pose, shape.source, unit)}
     if found.models_info is not None:
         info = folder / "models_info.json"
         files[info] = bop_text(info, {number: found.models_info}).encode("ascii")

@@ -112,6 +112,7 @@ def _check_meet(operations: Array, center: Array, diameter: float) -> None:
     shifts = operations[:, :3, 3]
     misses = np.linalg.norm(operations[:, :3, :3] @ center + shifts - center, axis=1)
     size = max(diameter, float(np.linalg.norm(shifts, axis=1).max()))
+    # A size of nothing leaves rounding, in any unit in which things that one can hold have poses.
     if misses.max() > max(_MEET_REL * size, SINGLE):
         raise InputError(
             f"operation {int(misses.argmax())} moves the point that all should leave in place by {misses.max():.3g}; "
