@@ -38,11 +38,11 @@ from symrefine.align.span import span_fit
 from symrefine.clock import Clock
 from symrefine.decide.maps import SURE
 from symrefine.decide.posterior import Link, certain, meant
-from symrefine.detection.measure import PARTS
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, check_tolerance, cross_matrix
 from symrefine.groups import PointGroup
+from symrefine.moments.moments import PARTS
 from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
 from symrefine.plane import detect_planar
 from symrefine.shape import Shape

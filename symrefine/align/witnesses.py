@@ -13,6 +13,7 @@ import numpy as np
 from symrefine.align.kinds import nearest_both_ways, with_one_set_of_classes
 from symrefine.align.pair import Side, few
 from symrefine.align.shown import MOST_PLANES, Shown
+from symrefine.detection.measure import SAMPLES
 from symrefine.geometry import Array, Isometry, tight_diagonal
 from symrefine.moments.moments import shape_moments
 from symrefine.shape import Index, Shape
@@ -20,8 +21,6 @@ from symrefine.surface.misses import LIMITS, disc_distances
 from symrefine.surface.surface import HOPELESS
 from symrefine.surface.tree import Tree
 
-# Points that are asked of either object where none of them stand for a surface.
-ASKED = 20_000
 Misses = tuple[Array, Array]
 
 
@@ -56,7 +55,7 @@ def witnesses(source: Shape, target: Shape, *, scale: float = 1.0, tolerance: fl
             return _Surfaces(shown=shown, centers=centers, unit=unit, scale=scale, tolerance=tolerance)
     points, labels = [], []
     for shape in (source, target):
-        some = slice(None, None, max(1, -(-len(shape.points) // ASKED)))
+        some = slice(None, None, max(1, -(-len(shape.points) // SAMPLES)))
         points.append(shape.points[some])
         labels.append(None if shape.labels is None else shape.labels[some])
     size = target.diagonal

@@ -8,8 +8,9 @@ import numpy as np
 
 from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, has_all
 from symrefine.decide.looks import START_ERROR
-from symrefine.fit.placed import DIRECTION_ERROR, Placed
+from symrefine.fit.placed import Placed
 from symrefine.groups import PointGroup, is_subgroup
+from symrefine.groups.elements import DIRECTION_ERROR_RAD
 
 # Needs within this factor are the same, as the elements of a true group miss alike.
 ALIKE = 1.5
@@ -103,7 +104,7 @@ class Pool:
 
 def is_at(a: Placed, b: Placed) -> bool:
     """Whether two groups are one and stand at the very same place, as far as fitted directions tell."""
-    return a.group.name == b.group.name and is_subgroup(b.group, a.group, DIRECTION_ERROR)
+    return a.group.name == b.group.name and is_subgroup(b.group, a.group, DIRECTION_ERROR_RAD)
 
 
 def is_same(a: Placed, b: Placed, within_rad: float = SAME_RAD) -> bool:

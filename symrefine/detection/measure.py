@@ -12,7 +12,7 @@ from symrefine.decide.doubts import on_a_line, set_by_strays
 from symrefine.decide.posterior import UNKNOWN
 from symrefine.errors import InputError
 from symrefine.geometry import Array, tight_diagonal
-from symrefine.moments.moments import Moments, shape_moments
+from symrefine.moments.moments import PARTS, Moments, shape_moments
 from symrefine.moments.quadrature import mesh_nodes, sample_surface
 from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import FixedSubspace, fixed_subspace
@@ -31,8 +31,8 @@ from symrefine.surface.surface import WINDOWS, Surface
 from symrefine.surface.tree import Tree, side_by_side
 
 Outliers = Literal["auto", "floor", "none"]
-# Order of the moments, and parts of their jackknife.
-ORDER, PARTS = 8, 16
+# Order of the moments.
+ORDER = 8
 # Local planes of a cloud; points that a volume is known by, and planes of a mesh, whose normals are exact.
 PLANES, SAMPLES = 8000, 20000
 # Masses of atoms that differ by more than this fraction are masses of different kinds.

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.clock import passed
-from symrefine.detection.measure import ORDER, PARTS, Measured, masses
+from symrefine.detection.measure import ORDER, Measured, masses
 from symrefine.geometry import Array
-from symrefine.moments.moments import Moments
+from symrefine.moments.moments import PARTS, Moments
 from symrefine.moments.running import running_moments
 from symrefine.shape import Index, Shape
 from symrefine.stream import Stream

@@ -12,12 +12,12 @@ import numpy as np
 
 from symrefine.clock import Clock
 from symrefine.decide.hypotheses import MOVED_EACH, NOTHING, SAME_RAD, Element, Hypothesis, judged
-from symrefine.decide.looks import exact_need
+from symrefine.decide.looks import exact_need, few_motions
 from symrefine.decide.posterior import BEYOND
 from symrefine.decide.subgroups import subgroup_chain
 from symrefine.detection.examination import Examined, examined
-from symrefine.detection.measure import PLANES
-from symrefine.fit.placed import Placed, elements, evenly
+from symrefine.detection.measure import PLANES, SAMPLES
+from symrefine.fit.placed import Placed
 from symrefine.geometry import Array, Isometry, rotation
 from symrefine.groups import PointGroup, is_subgroup
 from symrefine.moments.quadrature import sample_surface
@@ -26,13 +26,9 @@ from symrefine.surface.misses import Deviation
 from symrefine.surface.painted import Painted, needed
 from symrefine.texture import colour_classes, corner_weights
 
-# Samples of a textured surface of revolution in which marks are looked for.
-MARKED = 20000
 # Operations of the largest group whose subgroups are looked through: those of an icosahedron, and of folds up to 30. Of
 # more, as of endless ones, samples that are labelled by their colours tell what is left.
 MOST = 120
-# Elements that tell how a group is best turned about an axis of revolution.
-FEW = 4
 
 
 def textured(found: Examined, shape: Shape, *, tolerance: float, limit: float, seed: int, clock: Clock) -> Examined:
@@ -120,7 +116,7 @@ def _marked(
         return [], []
     assert shape.texture is not None
     assert shape.faces is not None
-    points, normals, face = sample_surface(shape, MARKED, rng)
+    points, normals, face = sample_surface(shape, SAMPLES, rng)
     colours = shape.texture.colours(face, corner_weights(points, shape.points[shape.faces[face]]))
     labels = colour_classes(colours, np.ones(len(colours)))
     seen = examined(Shape(points=points, normals=normals, labels=labels), tolerance=tolerance, clock=Clock())
@@ -150,5 +146,5 @@ def _turned(painted: Painted, placed: Placed, whole: Placed) -> Placed:
 
 def _colour_miss(painted: Painted, placed: Placed) -> float:
     """Mean miss of the colours over some elements of a group."""
-    motions = [m for part in evenly(elements(placed.group), FEW) for m in part.motions(placed.center)]
+    motions = few_motions(placed)
     return float(np.mean([miss.mean() for miss in painted.misses(motions, sources=MOVED_EACH, bound=0.0)]))

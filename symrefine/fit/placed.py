@@ -21,8 +21,6 @@ SAMPLED = 7
 # Operations of one kind that are fitted together: more add points, but no knowledge. Of the mirrors through an axis all
 # are, each with its own angle, up to so many.
 FITTED, BUNDLE = 8, 60
-# How far directions of fitted elements may be off.
-DIRECTION_ERROR = np.radians(1.5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -187,7 +185,6 @@ def joined(parts: Sequence[Placed]) -> Placed | None:
             axes=[a for g in groups for a in g.rotation_axes()],
             improper=[a for g in groups for a in g.improper_axes() if np.isfinite(a[1])],
             inversion=any(g.has_inversion for g in groups),
-            tolerance_rad=DIRECTION_ERROR,
         )
     except DegenerateShapeError:
         return None

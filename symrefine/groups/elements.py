@@ -18,7 +18,7 @@ from symrefine.groups.standard import standard_operations
 from symrefine.rounding import SINGLE
 
 # By how much directions of elements that somebody found may be off: several times what a fit leaves at 1 % noise.
-DEFAULT_TOLERANCE_RAD = math.radians(2.0)
+DIRECTION_ERROR_RAD = math.radians(2.0)
 GivenAxis = tuple[ArrayLike, float | Literal["inf"]]
 
 
@@ -43,7 +43,7 @@ def from_elements(
     axes: Sequence[GivenAxis] = (),
     improper: Sequence[GivenAxis] = (),
     inversion: bool = False,
-    tolerance_rad: float = DEFAULT_TOLERANCE_RAD,
+    tolerance_rad: float = DIRECTION_ERROR_RAD,
 ) -> PointGroup:
     """The point group that symmetry elements found by a detector generate, its frame fitted to all their directions.
 

@@ -23,6 +23,8 @@ from symrefine.shape import Shape
 BLOCK = 2048
 # Waves, about a radian to a diagonal, that the edges of a solid's surface are tested with.
 WAVES = 6
+# Parts of the jackknife that tells by how much moments of a sample are off.
+PARTS = 16
 
 
 def exponents_of(dim: int, degree: int) -> list[tuple[int, ...]]:

@@ -11,7 +11,7 @@ from symrefine.decide.doubts import on_a_line, set_by_strays
 from symrefine.decide.posterior import NEAR
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance, positive
-from symrefine.moments.moments import shape_moments
+from symrefine.moments.moments import PARTS, shape_moments
 from symrefine.ndim import sampled as samples
 from symrefine.ndim.matched import Points
 from symrefine.ndim.search import Search, among_points, among_samples
@@ -22,8 +22,7 @@ from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.skin import FEW
 from symrefine.threads import one_thread
 
-# Parts of the jackknife, and dimensions up to which moments of order 5 are few enough.
-PARTS = 16
+# Dimensions up to which moments of order 5 are few enough.
 LARGEST_DIM = 8
 
 

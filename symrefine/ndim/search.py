@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.fit.placed import DIRECTION_ERROR
 from symrefine.geometry import Array
+from symrefine.groups.elements import DIRECTION_ERROR_RAD
 from symrefine.moments.moments import shape_moments
 from symrefine.ndim import sampled as samples
 from symrefine.ndim.matched import Points, distinct
@@ -155,7 +155,7 @@ def _same(tolerance: float) -> float:
     A hyperplane that turns by the tolerance about the centre moves the farthest image by the tolerance; each of the two
     may be off by as much.
     """
-    return max(DIRECTION_ERROR, 2.0 * tolerance)
+    return max(DIRECTION_ERROR_RAD, 2.0 * tolerance)
 
 
 def _closed(

@@ -10,9 +10,9 @@ import numpy as np
 from symrefine.decide.looks import LOOK, START_ERROR, exact_need, hopeless
 from symrefine.decide.pool import ALIKE
 from symrefine.decide.posterior import NEAR
-from symrefine.fit.placed import DIRECTION_ERROR
 from symrefine.fit.vertices import ROUNDED
 from symrefine.geometry import Array
+from symrefine.groups.elements import DIRECTION_ERROR_RAD
 from symrefine.plane.outline import NOISES, Outlines
 from symrefine.plane.placed import Placed, fitted
 from symrefine.surface.misses import NO_MISS, Deviation
@@ -86,7 +86,7 @@ def _implied(lines: Sequence[Hypothesis]) -> Iterator[Placed]:
         a, b = first.placed.line, other.placed.line
         angle = (other.placed.angle_rad - first.placed.angle_rad) / math.pi
         folds = range(2, MAX_FOLD + 1)
-        fold = next((n for n in folds if abs(n * angle - round(n * angle)) * math.pi < n * DIRECTION_ERROR), None)
+        fold = next((n for n in folds if abs(n * angle - round(n * angle)) * math.pi < n * DIRECTION_ERROR_RAD), None)
         if fold is not None:
             center = np.linalg.solve([a.normal, b.normal], [a.offset, b.offset])
             yield Placed(fold=fold, mirrored=False, center=center)

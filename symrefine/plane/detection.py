@@ -12,7 +12,7 @@ from symrefine.decide.posterior import BEYOND, NEAR, PICTURE, Alternative, Decis
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance, toward_positive
 from symrefine.groups import PointGroup2D
-from symrefine.moments.moments import Moments, shape_moments
+from symrefine.moments.moments import PARTS, Moments, shape_moments
 from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.plane.chain import Hypothesis, chain, explore
 from symrefine.plane.doublets import ORDER, PLANAR_ORDERS, DoubletClass, classify_doublets
@@ -20,9 +20,6 @@ from symrefine.plane.outline import NOISES, Outlines, make_outlines
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE, Deviation
 from symrefine.threads import one_thread
-
-# Parts of the jackknife.
-PARTS = 32
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

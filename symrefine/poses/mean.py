@@ -4,6 +4,7 @@ Both steps lower `sum_i w_i |R - R_i S_i|^2`, over the operations S_i first and 
 for a finite group after finitely many steps. Where it ends may depend on where it began: it begins at several poses.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +16,6 @@ from symrefine.rounding import DOUBLE, SINGLE
 
 # Poses that the alternation starts from. Of poses that lie together any one leads to their mean.
 _STARTS = 16
-# Far more than was ever needed: choices of operations do not come back.
-_MOST_STEPS = 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,13 +60,15 @@ def _around(symmetry: Symmetry, poses: Array, weights: Array, rotation: Array) -
 
 def _settled(symmetry: Symmetry, poses: Array, weights: Array, start: Array) -> Array:
     """The rotation [3, 3] at which the alternation ends that starts at a pose [4, 4]."""
-    rotation = start[:3, :3]
-    for _ in range(_MOST_STEPS):
-        before = rotation
-        rotation = _mean_of(symmetry, symmetry.toward(poses, before)[:, :3, :3], weights, before)
-        if chord_angles(rotation, before) < DOUBLE:
-            break
-    return rotation
+    rotation, least = start[:3, :3], math.inf
+    while True:
+        before, nearest = rotation, symmetry.toward(poses, rotation)[:, :3, :3]
+        # Neither half of a step makes poses farther from their mean, so that no choice of operations comes back.
+        apart = float(weights @ np.square(nearest - before).sum(axis=(1, 2)))
+        rotation = _mean_of(symmetry, nearest, weights, before)
+        if apart >= least or chord_angles(rotation, before) < DOUBLE:
+            return rotation
+        least = apart
 
 
 def _mean_of(symmetry: Symmetry, rotations: Array, weights: Array, before: Array) -> Array:

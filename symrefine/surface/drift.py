@@ -16,13 +16,11 @@ import numpy as np
 
 from symrefine.geometry import Array, Isometry, Mask, ReadOnly, rows
 from symrefine.surface.floor import Floor
-from symrefine.surface.neighbourhoods import NEIGHBOURS, in_cells
+from symrefine.surface.neighbourhoods import NEIGHBOURS, PROBES, in_cells
 from symrefine.surface.tree import Tree
 
 # Cells that a window is put together from, and how far they reach, in standard deviations of its weights.
 CELLS, REACH = 32, 2.5
-# Points that tell how far it is to the neighbours.
-PROBES = 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -12,11 +12,9 @@ import numpy as np
 
 from symrefine.geometry import Array, Axis, Isometry, frame_with_z, orthogonal_factor
 from symrefine.shape import Index
-from symrefine.surface.misses import disc_distances, halves, needs
+from symrefine.surface.misses import ASKED, disc_distances, halves, needs
 from symrefine.surface.skin import LocalPlanes, Skin, drawn
 
-# Local planes of a wedge.
-PLANES = 4000
 # Neighbourhoods side by side that a wedge has to be wide for what leans in it to be seen as it is: two for each half of
 # the second harmonic, the first that tells a wedge from its mirror image. With more, wider wedges are folded too.
 ACROSS = 4.0
@@ -162,7 +160,7 @@ def _planes(skin: Skin, some: Index | slice, pitch: float, rng: np.random.Genera
         neighbours=skin.neighbours,
         labels=None if labels is None else np.tile(labels, 2),
     )
-    own = wider.local_planes(drawn(len(points), PLANES, rng))
+    own = wider.local_planes(drawn(len(points), ASKED, rng))
     aside = _aside(own.points, pitch)
     return own.with_copies(_turned(own.points, aside), _turned(own.normals, aside))
 
