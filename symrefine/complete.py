@@ -9,15 +9,13 @@ from symrefine.detection.measure import Outliers, is_few
 from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
+from symrefine.fit.finite import TURNS
 from symrefine.fit.placed import Placed
 from symrefine.geometry import Array
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.tree import Tree
 from symrefine.threads import one_thread
-
-# Turns that stand for those of a surface of revolution.
-ROUND = 36
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -101,7 +99,7 @@ def verdicts(found: Detection, points: Array) -> Verdicts:
     """What points [N, 3] of the scan in which a group was found say of their images under it."""
     surface = found.surface
     center, local = ((x - found.origin) / found.scale for x in (found.center, points))
-    motions = Placed(group=found.group, center=center).motions(ROUND)
+    motions = Placed(group=found.group, center=center).motions(TURNS)
     misses = surface.misses(motions)
     unseen = np.isnan(surface.seen(misses, motions))
     owner = surface.cloud.of_one_class().nearest(local, None)[1]

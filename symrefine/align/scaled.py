@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symrefine.align.pair import Evidence
-from symrefine.align.partial import Judge
+from symrefine.align.partial import POLISHED, Judge
 from symrefine.align.polish import Similarity, polish
 from symrefine.align.shown import Shown
 from symrefine.decide.maps import said_by_both
@@ -20,8 +20,6 @@ from symrefine.propose.maps import WITHIN
 # Sizes of the source that are tried, over that at which both spread alike: what is missing of a half changes its spread
 # by less than 2. From one to the next no point of a part that both share moves by more than matches may be apart.
 WIDEST, STEP = 2.0, 1.12
-# Maps that are polished.
-POLISHED = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,12 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, batches
+from symrefine.groups.names import MAX_FOLD
 from symrefine.groups.orthogonal import Index, about_z
 from symrefine.groups.standard import GOLDEN
 from symrefine.poses.symmetry import Symmetry
 
-# Turns that a search looks at before it goes closer: finer than the 315 of `bop_toolkit` as BOP is evaluated.
-_TURNS = 360
 # Each step of a golden section leaves 0.618 of the width, 45 of them a billionth of a degree.
 _SECTIONS = 45
 
@@ -82,7 +81,7 @@ class Revolution(Choices):
 
     @property
     def count(self) -> int:
-        return _TURNS
+        return MAX_FOLD
 
     def about(self, poses: Array, angles_rad: Array, over: float = 1.0) -> Array:
         """Poses [..., 4, 4] turned by angles [...] about the axis, after a half turn across it where `over` is -1."""
@@ -132,8 +131,9 @@ class Search(Revolution):
     __slots__ = ()
 
     def _about_axis(self, a: Array, b: Array, vertices: Array) -> tuple[Array, Array]:
-        step = 2.0 * np.pi / _TURNS
-        turns = step * np.arange(_TURNS)
+        # Turns that a search looks at before it goes closer: nobody tells them from all (BOP evaluates 315).
+        step = 2.0 * np.pi / MAX_FOLD
+        turns = step * np.arange(MAX_FOLD)
         seen = image(a, vertices, self.camera)
 
         def at(angles: Array) -> Array:
