@@ -15,13 +15,13 @@ from experiments.objects.household import camera
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
 from experiments.studies import partial_alignment
 from symrefine.align import story
+from symrefine.align.judge import Judge
 from symrefine.align.landscape import grid_rotations, harmonic_pair, hills, landscape, least_misfit
 from symrefine.align.moment_fit import as_good, best_fits, covariance, exact, fit, misfit
 from symrefine.align.pair import Evidence
-from symrefine.align.partial import Judge
 from symrefine.align.polish import SOON, Polished, Similarity, polish
 from symrefine.align.procrustes import procrustes
-from symrefine.align.rivals import choose, polished
+from symrefine.align.rivals import Choice, choose, polished
 from symrefine.align.shown import Shown
 from symrefine.align.sides import side_of
 from symrefine.align.span import monomial_pair, span_fit
@@ -799,6 +799,38 @@ def test_what_is_seen_of_a_symmetric_object_leaves_its_equivalents(det: int) -> 
         assert min(angle_deg(m, matrix @ np.diag(signs)) for m in found.equivalents) < 0.3
     assert f"{len(found.equivalents)} maps" in found.observable
     assert "the determinant is free" in found.observable
+
+
+@pytest.mark.parametrize(("name", "seed"), [("chair", 4), ("bed", 0), ("bed", 3)])
+def test_what_carries_a_whole_source_onto_itself_leaves_equivalents_whatever_the_target_shows(name, seed) -> None:
+    # All points of the source have their images, so that a map and what it makes of the mirror miss by the same.
+    mesh, truth = specimen("household", name)
+    normal, rng = truth.group.mirrors()[0], np.random.default_rng(seed)
+    half, target = (sample(mesh, count, 0.0, rng) for count in (4000, 9000))
+    source = np.concatenate([half, half @ householder(normal).T])
+    target = target[target @ normal > np.quantile(target @ normal, 0.3)]
+    matrix = random_orthogonal(rng)
+    found = align(source, target @ matrix.T + 5.0)
+    assert found.status == "ok"
+    for wanted in (matrix, matrix @ householder(normal)):
+        assert min(angle_deg(m, wanted) for m in found.equivalents) < 0.3
+    assert found.determinant_confidence < 0.7
+
+
+def test_what_nothing_tells_of_the_hand_is_a_half_and_no_less() -> None:
+    rng = rng_of(83)
+    side = side_of(Shape(points=rng.random((300, 3))), 0)
+    evidence = Evidence(source=side, target=side, scale=False, tolerance=0.02, seed=0)
+    still = Similarity(matrix=np.eye(3), shift=np.zeros(3))
+    leads = [-0.2, 0.0, 0.25, 1.0]
+    told = [
+        Choice(
+            evidence=evidence, motion=still, covariance=np.eye(3), exact=False, misfit=0.0, excess=0.0, lead=lead
+        ).determinant_confidence
+        for lead in leads
+    ]
+    assert told[:2] == [0.5, 0.5]
+    assert 0.5 < told[2] < told[3] < 1.0
 
 
 def test_of_maps_that_may_all_be_right_the_one_that_neither_side_denies_comes_first() -> None:

@@ -30,7 +30,7 @@ KINDS = {
 KIND_OF = {
     "decides": {
         "align.moment_fit": "MISFIT",
-        "align.partial": "ITS_OWN",
+        "align.judge": "ITS_OWN",
         "align.shown": "MOST",
         "align.procrustes": "SIGNIFICANT",
         "align.rivals": "GOOD",
@@ -72,7 +72,7 @@ KIND_OF = {
         "align.landscape": "GRID GRID_DEGREE",
         "align.moment_fit": "LONGEST",
         "align.pair": "MOVED SOURCE_PLANES TARGET_PLANES THIN ASKED REACH",
-        "align.partial": "LOOK POLISHED WORTH APART MOST_MAPS VOTERS MIRRORS",
+        "align.judge": "LOOK POLISHED WORTH APART MOST_MAPS VOTERS MIRRORS",
         "align.polish": "COARSE ENOUGH SOON",
         "align.rivals": "RIVALS",
         "align.scaled": "WIDEST STEP",
@@ -127,7 +127,7 @@ KIND_OF = {
         "texture": "_CELL",
     },
     "rounding": {
-        "align.partial": "SMALL",
+        "align.judge": "SMALL",
         "align.moment_fit": "ROUNDING",
         "fit.vertices": "ROUNDED",
         "groups.axial": "_EXACT",

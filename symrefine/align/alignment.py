@@ -1,14 +1,16 @@
 """The answer to "which map takes one object onto another", with what else would do as well and how well it does."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.align.coset import Coset
 from symrefine.decide.posterior import Link, meant
+from symrefine.errors import InputError
 from symrefine.geometry import Array, ReadOnly
 from symrefine.threads import one_thread
 
@@ -81,6 +83,10 @@ class Alignment(ReadOnly):
     _verdict: Callable[[], Verdict] = field(repr=False)
     _nearness: Callable[[], Nearness] = field(repr=False)
 
+    def __reduce__(self) -> tuple[Callable[..., "Alignment"], tuple[Any, ...]]:
+        told = {f.name: getattr(self, f.name) for f in fields(self) if f.name[0] != "_"}
+        return _known, (type(self), told, self.coset, self._said, self._near)  # what is told on first use, too
+
     @property
     def determinant(self) -> int:
         """+1 for a rotation, -1 for a reflection or rotoreflection."""
@@ -92,8 +98,15 @@ class Alignment(ReadOnly):
         return _homogeneous(self.scale * self.matrix, self.translation)
 
     def apply(self, points: ArrayLike) -> Array:
-        """Points [N, n] of the source, in the pose of the target."""
-        return np.asarray(self.scale * (np.asarray(points, dtype=np.float64) @ self.matrix.T) + self.translation)
+        """Points [N, n] of the source, in the pose of the target.
+
+        Raises:
+            InputError: another number of coordinates.
+        """
+        given, dim = np.asarray(points, dtype=np.float64), len(self.matrix)
+        if given.shape[-1:] != (dim,):
+            raise InputError(f"points have shape {given.shape}; expected [N, {dim}]")
+        return np.asarray(self.scale * (given @ self.matrix.T) + self.translation)
 
     @cached_property
     @one_thread()
@@ -179,6 +192,10 @@ class Alignment(ReadOnly):
     def is_misfit(self) -> bool:
         """Whether no map that was admitted takes the source onto the target: then `matrix` is the closest found."""
         return not self.status.startswith((OK, OPEN))
+
+
+def _known(kind: type[Alignment], told: dict[str, Any], coset: Coset, said: Verdict, near: Nearness) -> Alignment:
+    return kind(**told, _coset=lambda: coset, _verdict=lambda: said, _nearness=lambda: near)
 
 
 def _homogeneous(matrix: Array, shift: Array) -> Array:

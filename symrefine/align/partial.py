@@ -6,82 +6,16 @@ upon -> the polish on the points -> what each map lays on the other side, where 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 
 from symrefine.align.alignment import OK, OPEN
+from symrefine.align.judge import Judge, Met
 from symrefine.align.pair import Evidence
-from symrefine.align.polish import Polished, Similarity, polish
 from symrefine.align.shown import Shown
-from symrefine.decide.maps import Merit, ahead, as_good, fits, said_by_both, score, well_met
-from symrefine.decide.posterior import LEAST
-from symrefine.fit.matching import AGREE
-from symrefine.fit.refine import MAX_OUTER
-from symrefine.geometry import Array, Isometry, Mask, householder, tight_diagonal
-from symrefine.groups.orthogonal import chord_angles
-from symrefine.ntuples.rank import SIGNIFICANT
-from symrefine.propose.maps import WITHIN, maps_between
-from symrefine.propose.votes import mirror_votes
-from symrefine.shape import Index
-from symrefine.surface.misses import LIMITS, disc_distances
-from symrefine.surface.surface import HOPELESS
-
-# One in so many local planes is asked by the looks at maps that are proposed, or polished.
-LOOK = 3
-# Maps of each determinant that are polished, if they meet at least such a share of what the best does.
-POLISHED, WORTH = 4, 0.5
-# Maps nearer than this, radians and diagonals, are one.
-APART = (0.17, 0.04)
-# Maps that are looked at where many do as well: as many as the rotations of a cube, and their images, would be 48.
-MOST_MAPS = 16
-# Local planes that vote for the mirrors of what meets under a map, and how many of the densest spots are looked at: one
-# in three of the planes of a box, that of each mirror among the first.
-VOTERS, MIRRORS = 300, 12
-# Share of what meets that has to meet in a mirror, as it was voted for, lest the polish is wasted.
-ITS_OWN = 0.8
-# A turn and a shift so small that what they do to points is linear in them.
-SMALL = 1e-3
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Met:
-    """A map between two surfaces that was polished, and what they say of it.
-
-    Attributes:
-        motion: the map.
-        covariance: [6, 6] of the rotation vector (target axes, radians) and the shift; zero along what nothing tells.
-        sides: what of the source, and of the target, it lays on the other.
-        overlap: share of the source, and of the target, that meets the other.
-        rms: of the misses where they meet.
-    """
-
-    motion: Similarity
-    covariance: Array
-    sides: tuple[Merit, Merit]
-    overlap: tuple[float, float]
-    rms: float
-
-    @property
-    def score(self) -> float:
-        """The more the better."""
-        return score(self.sides)
-
-    @property
-    def is_promising(self) -> bool:
-        """Whether more speaks for it than against it."""
-        return self.score > 0.0
-
-    @property
-    def determinant(self) -> int:
-        """+1 or -1."""
-        return int(np.sign(np.linalg.det(self.motion.matrix)))
-
-    @property
-    def is_loose(self) -> bool:
-        """Whether it may slide or turn, and meets as well."""
-        return bool(np.linalg.matrix_rank(self.covariance) < len(self.covariance))
+from symrefine.decide.maps import ahead, as_good, fits, said_by_both
+from symrefine.geometry import tight_diagonal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -136,191 +70,15 @@ def partial_meeting(evidence: Evidence, *, reflections: bool, factor: float = 1.
         return None
     best = max(admitted, key=lambda m: m.score)
     if best.is_promising:
-        found = judge.closed(judge.polished_all(found, judge.mirrored(best)), best)
+        found = judge.polished_all(found, judge.mirrored(best))
+        images = judge.images(best)
+        found = judge.closed(judge.polished_all(judge.not_short_of(found, images), images, error=judge.beside), best)
         best = max((m for m in found if reflections or m.determinant > 0), key=lambda m: m.score)
     ridge = best
     best, slid = judge.uphill(ridge)
     rivals = [m for m in found if m is not ridge and not judge.same(m.motion, best.motion)]  # what leads to it is none
     open_ = source.openings.evident or target.openings.evident
     return _weighed(best, sorted(rivals, key=lambda m: -m.score), slid, reflections=reflections, open_=open_)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Judge:
-    """Two surfaces that judge maps between them, the smaller diagonal of both, and the tolerance."""
-
-    source: Shown
-    target: Shown
-    diagonal: float
-    tolerance: float
-
-    @cached_property
-    def near(self) -> float:
-        """Miss up to which local planes are well met, diagonals."""
-        return well_met(np.concatenate([self.source.noise, self.target.noise])) / self.diagonal
-
-    @property
-    def far(self) -> float:
-        """Miss from which on nothing is met, diagonals."""
-        return LIMITS[1] * self.tolerance
-
-    def promising(self) -> list[Similarity]:
-        """The maps of each determinant that are proposed under which most local planes meet others, as they stand."""
-        proposed = maps_between(self.source.cloud, self.target.cloud, self.diagonal)
-        every = [Similarity(matrix=p.matrix, shift=p.shift) for p in proposed]
-        count = [int(self.meets(m).sum()) for m in every]
-        order = [i for i in np.argsort(-np.array(count), kind="stable") if count[i] >= max(WORTH * max(count), 1.0)]
-        signs = [float(np.sign(np.linalg.det(every[i].matrix))) for i in order]
-        return [every[i] for k, i in enumerate(order) if signs[:k].count(signs[k]) < POLISHED]
-
-    def meets(self, motion: Similarity) -> Mask:
-        """Which of every so many local planes of the source meet others of the target, as they stand."""
-        every = slice(None, None, LOOK)
-        some, classes = self.source.cloud.chosen(every), self.source.cloud.classes(every)
-        away, met = self.target.cloud.met_by(motion.apply(some.points), classes)
-        facing = np.abs(np.einsum("ij,ij->i", motion.turn(some.normals), met.normals)) > AGREE
-        return facing & (away < WITHIN * self.diagonal)
-
-    def shared(self, motion: Similarity) -> float:
-        """What shares of the local planes of both meet others, as they stand, multiplied."""
-        back = replace(self, source=self.target, target=self.source)
-        return float(self.meets(motion).mean() * back.meets(motion.inverse).mean())
-
-    def mirrored(self, best: Met) -> list[Similarity]:
-        """What the best map is followed by where what meets under it may be its own mirror image, to be polished.
-
-        Of many equal matches few agree on any one map, so that others as good need not be among those proposed.
-        """
-        meets = self.meets(best.motion)
-        some = self.source.cloud.chosen(slice(None, None, LOOK)).chosen(meets)
-        if len(some.points) < VOTERS // 10:
-            return []
-        points, normals = best.motion.apply(some.points), best.motion.turn(some.normals)
-        voters = slice(None, None, -(-len(points) // VOTERS))
-        votes = mirror_votes(points[voters], normals[voters], np.random.default_rng(0), told=MIRRORS)
-        planes = [Isometry.about(v.foot, householder(v.direction)) for v in votes]
-        starts = [Similarity(matrix=p.matrix, shift=p.shift).after(best.motion) for p in planes]
-        return [s for s in starts if self.meets(s).sum() >= ITS_OWN * meets.sum()]
-
-    def polished(self, start: Similarity) -> Met:
-        """A map after the polish, judged from both sides."""
-        return self._judged(self._polish(start))
-
-    def _polish(self, start: Similarity, *, patient: bool = True) -> Polished:
-        """A map after the polish, which is given up early where nothing comes of it, unless one is `patient`."""
-        error, known, worth = WITHIN * self.diagonal, np.zeros((6, 6)), lambda m: self.within_reach(m) > 0.0
-        asked = None if patient else worth
-        return polish(self.source.moving, self.target.cloud, start, error=error, known=known, worthwhile=asked)
-
-    def _judged(self, done: Polished) -> Met:
-        there, back = (self.source, self.target, done.motion), (self.target, self.source, done.motion.inverse)
-        (one, misses), (other, back_misses) = self.side(*there), self.side(*back)
-        met = np.concatenate([misses, back_misses])
-        return Met(
-            motion=done.motion,
-            covariance=done.covariance,
-            sides=(one, other),
-            overlap=(one.well + one.less, other.well + other.less),
-            rms=self.diagonal * float(np.sqrt(np.mean(met**2))) if len(met) else math.inf,
-        )
-
-    def side(self, here: Shown, there: Shown, motion: Similarity) -> tuple[Merit, Array]:
-        """What one side says of a map, and by how much its local planes miss the other where they meet, diagonals."""
-        moved = motion.apply(here.cloud.points)
-        misses = self.misses(there, moved, here.cloud.labels)
-        unseen = here.unseen(there, moved, misses > self.far, self.far * self.diagonal)
-        return Merit.of(misses, unseen, self.near, self.far), misses[~unseen & (misses <= self.far)]
-
-    def misses(self, there: Shown, moved: Array, classes: Index | None) -> Array:
-        """By how much points [N, 3] of some classes [N] miss one of the two surfaces, diagonals."""
-        bound = HOPELESS * self.far * self.diagonal
-        return disc_distances(there.cloud, moved, classes, bound=bound) / self.diagonal
-
-    def within_reach(self, motion: Similarity) -> float:
-        """What a map scores at best, as every so many local planes tell it: nobody looked where nothing is met."""
-        every, found = slice(None, None, LOOK), []
-        ways = (self.source, self.target, motion), (self.target, self.source, motion.inverse)
-        for here, there, way in ways:
-            misses = self.misses(there, way.apply(here.cloud.points[every]), here.cloud.classes(every))
-            merit = Merit.of(misses, misses > self.far, self.near, self.far)
-            found.append(merit.score + SIGNIFICANT * merit.sigma(len(misses)))
-        return max(found)
-
-    def uphill(self, met: Met) -> tuple[Met, float]:
-        """A map, or what it leads to where it does better slid aside; and the best score, at most, slid from there.
-
-        The polish ends where too few of the local planes tell it to go on along a ridge.
-        """
-        for _ in range(MAX_OUTER):
-            aside, slid = self._aside(met)
-            if slid <= met.score or (further := self.polished(aside)).score <= met.score:
-                break
-            met = further
-        return met, slid
-
-    def _aside(self, met: Met) -> tuple[Similarity, float]:
-        """A map slid or turned in the way that is known worst, to the better side, and its score, at most.
-
-        The score is the bound `within_reach` where that leaves less doubt than is worth telling.
-        """
-        worst = np.linalg.eigh(met.covariance)[1][:, -1]
-        points = self.source.moving.points
-        travel = np.linalg.norm(met.motion.moved(SMALL * worst).apply(points) - met.motion.apply(points), axis=1).mean()
-        step = SMALL * APART[1] * self.diagonal / travel * worst
-        moved = [met.motion.moved(x) for x in (step, -step)]
-        scores = [self.within_reach(m) for m in moved]
-        if ahead(met.score, scores) <= 1.0 - LEAST:
-            scores = [self._score(m) for m in moved]
-        return max(zip(moved, scores, strict=True), key=lambda pair: pair[1])
-
-    def _score(self, motion: Similarity) -> float:
-        there, back = (self.source, self.target, motion), (self.target, self.source, motion.inverse)
-        return score([self.side(*way)[0] for way in (there, back)])
-
-    def polished_all(self, known: Sequence[Met], starts: Sequence[Similarity], *, patient: bool = False) -> list[Met]:
-        """The maps that are known, and those that starts lead to and are none of them, nor far behind the best.
-
-        The most promising are judged first, which shows how good the others would have to be; one is told if one is
-        `patient`.
-        """
-        every, ends, there = list(known), list[Polished](), [m.motion for m in known]
-        for start in starts:
-            if self._among(start, there):
-                continue
-            done = self._polish(start, patient=patient)
-            if not done.given_up and not self._among(done.motion, there):
-                ends.append(done)
-                there.append(done.motion)
-        bounds = [self.within_reach(done.motion) for done in ends]
-        for bound, done in sorted(zip(bounds, ends, strict=True), key=lambda pair: -pair[0]):
-            if not every or (bound > 0.0 and as_good(max(m.score for m in every), bound)):
-                every.append(self._judged(done))
-        return every
-
-    def _among(self, one: Similarity, others: Sequence[Similarity]) -> bool:
-        return any(self.same(one, other) for other in others)
-
-    def same(self, one: Similarity, other: Similarity) -> bool:
-        """Whether two maps are one."""
-        turned = float(chord_angles(one.matrix, other.matrix))
-        return turned < APART[0] and float(np.linalg.norm(one.shift - other.shift)) < APART[1] * self.diagonal
-
-    def closed(self, found: Sequence[Met], best: Met) -> list[Met]:
-        """With the maps that what leads from the best to another as good makes of those as good, until none is new.
-
-        They differ by what carries onto themselves the parts that are shared: each is as good but for what is not.
-        """
-        every, tried = list(found), [m.motion for m in found]
-        while len(every) < MOST_MAPS:
-            good = [m.motion for m in every if as_good(best.score, m.score)]
-            products = (a.after(best.motion.inverse).after(b) for a in good for b in good)
-            fresh = next((p for p in products if not self._among(p, tried)), None)
-            if fresh is None:
-                break
-            tried.append(fresh)
-            every = self.polished_all(every, [fresh])
-            tried.append(every[-1].motion)
-        return every
 
 
 def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool, open_: bool) -> Meeting:
@@ -334,7 +92,7 @@ def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool
     slides = best.is_loose or ahead(best.score, [slid]) < 0.5
     certain = 0.0 if slides else fitting * ahead(best.score, [*others, slid])
     every = [best, *(r for r in alike if reflections or r.determinant > 0)]
-    first = max(every, key=lambda m: said_by_both(m.sides))
+    first = _first(every)
     other_hand = [m.score for m in (best, *rivals) if m.determinant != first.determinant]
     return Meeting(
         best=first,
@@ -345,6 +103,17 @@ def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool
         slides=slides,
         status=OK if certain > 0.5 else _doubt(best, rivals, fitting, slides, open_),
     )
+
+
+def _first(every: Sequence[Met]) -> Met:
+    """Of maps that do about as well the one that both sides say most for; a rotation where nothing tells the hand."""
+    said = [said_by_both(m.sides) for m in every]
+    most = int(np.argmax(said))
+    first = every[most]
+    proper = (
+        k for k, m in enumerate(every) if m.determinant > 0 and said[most] - said[k] < math.hypot(first.sigma, m.sigma)
+    )
+    return first if first.determinant > 0 else every[max(proper, key=lambda k: said[k], default=most)]
 
 
 def _doubt(best: Met, rivals: Sequence[Met], fitting: float, slides: bool, open_: bool) -> str:

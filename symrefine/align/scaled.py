@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from symrefine.align.judge import POLISHED, Judge
 from symrefine.align.pair import Evidence
-from symrefine.align.partial import POLISHED, Judge
 from symrefine.align.polish import Similarity, polish
 from symrefine.align.shown import Shown
 from symrefine.decide.maps import said_by_both
