@@ -1012,6 +1012,18 @@ def test_the_normals_of_what_was_seen_tell_what_was_not(count, low, high):
     assert low <= unclosed(turned, np.ones(len(points))) < high
 
 
+@pytest.mark.parametrize("opening", [0.05, 0.11, 0.22])
+@pytest.mark.parametrize("count", [5000, 20000])
+def test_a_bowl_may_be_a_ball_with_a_hole_and_is_not_told_as_one(opening, count):
+    """Whatever hole a ball has, an axis is left: nothing tells that somebody's bowl is no bowl."""
+    rng = np.random.default_rng(47)
+    turn, height = rng.uniform(0.0, 2.0 * np.pi, count), rng.uniform(-1.0, 1.0 - 2.0 * opening, count)
+    radius = np.sqrt(1.0 - height**2)
+    bowl = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), height])
+    found = detect(Pose.random(rng).of(bowl))
+    assert (found.point_group, found.at_least) == ("Cinfv", True)
+
+
 def test_a_single_view_leaves_a_doubt_and_views_from_all_sides_none():
     sure = {}
     for count in (1.0, 2.0):

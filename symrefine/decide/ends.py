@@ -110,11 +110,10 @@ def places(seen: Hypothesis, found: Hypothesis) -> float:
     """Mirrors or axes of a group through which a hole leaves the symmetry that is seen: a hole is round.
 
     So what is left keeps its middle: one mirror, or the turns and mirrors about an axis; of what is round, any mirror.
+    Of a ball it leaves an axis wherever it is, which a bowl has as well: nothing tells which of the two it is.
     """
     if seen.group.name == "Cs":
         return len(found.group.mirrors()) if found.group.is_finite else math.inf
-    if not seen.group.is_finite:
-        return math.inf if (seen.group.name, found.group.name) == ("Cinfv", "Kh") else 1.0
-    if not seen.group.is_polar or not found.group.is_finite:
+    if not (seen.group.is_finite and seen.group.is_polar and found.group.is_finite):
         return 1.0
     return sum(order % seen.group.symbol.fold == 0 for _, order in found.group.rotation_axes())
