@@ -48,6 +48,21 @@ def check_target(path: Path) -> None:
         check_folder(place.parent, f"{path}")
 
 
+def place_of(path: Path) -> Path:
+    """Where a path leads, as far as links lead anywhere: where they lead to one another the file is missing."""
+    return Path(os.path.realpath(path))
+
+
+def check_other(path: Path, source: str, *, in_folder: bool = False) -> None:
+    """Refuse to write over what was read.
+
+    Raises:
+        InputError: the path leads to the input.
+    """
+    if place_of(path) == place_of(Path(source)):
+        raise InputError(f"{path}: is the input itself; name another {'folder' if in_folder else 'file'}")
+
+
 def check_folder(folder: Path, what: str) -> None:
     """Refuse a directory that nothing can be put into, named with what was to be.
 

@@ -249,6 +249,15 @@ def test_a_manifest_is_not_overwritten(run: Run, lab: Path) -> None:
     assert table.read_text() == text
 
 
+def test_a_table_takes_the_place_of_tables_alone(run: Run, lab: Path) -> None:
+    cloud = lab / "cloud.csv"
+    cloud.write_text(text := "x,y,z\n1,2,3\n2,3,1\n")
+    refused(run("batch", "objects/box001.xyz", "--table", cloud), "cloud.csv: is there already and holds no rows")
+    assert cloud.read_text() == text
+    for _ in range(2):
+        assert run("batch", "objects/box001.xyz", "--table", lab / "rows.csv")[0] == 0
+
+
 def test_ids_of_bop_are_numbers(run: Run, lab: Path) -> None:
     (lab / "m.csv").write_text("path,id\nobjects/box001.xyz,mug\n")
     refused(run("batch", "--manifest", "m.csv", "--bop", "info.json"), "m.csv:2: --bop takes the number", "'mug' is no")

@@ -1,6 +1,8 @@
 """Objects in, answers out: whatever people hold gives one answer, which prints, becomes JSON and saves itself."""
 
+import copy
 import json
+import pickle
 import re
 from importlib.resources import files
 from pathlib import Path
@@ -141,6 +143,63 @@ def test_pictures_and_tables_are_no_points_by_chance():
     assert symrefine.detect(table).point_group == "D2h"
     with pytest.raises(InputError, match="has the columns x y z label; give those of the coordinates"):
         symrefine.detect(table.assign(label=1))
+
+
+ANSWERS = {
+    "a cloud": lambda: symrefine.detect(POINTS),
+    "a mesh": lambda: symrefine.detect((CORNERS, TRIANGLES)),
+    "a map": lambda: symrefine.align(POINTS, POINTS[::-1] + 1.0),
+    "a map of a part": lambda: symrefine.align(POINTS, POINTS[POINTS[:, 0] < np.median(POINTS[:, 0])]),
+    "a map in the plane": lambda: symrefine.align(POINTS[:, :2], POINTS[::-1, :2]),
+    "an exact shape": lambda: symrefine.symmetrize((CORNERS, TRIANGLES)),
+}
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda answer: pickle.loads(pickle.dumps(answer))])
+@pytest.mark.parametrize("make", ANSWERS.values(), ids=ANSWERS)
+def test_answers_come_back_from_other_processes(make, copied):
+    answer = make()
+    again = copied(answer)
+    assert {**again.to_dict(), "timings": 0} == {**answer.to_dict(), "timings": 0}
+    assert type(again) is type(answer)
+
+
+ASKED = {
+    "a text for no": (lambda: symrefine.align(POINTS, POINTS, allow_reflection="no"), "allow_reflection is 'no'"),
+    "a factor": (lambda: symrefine.align(POINTS, POINTS, scale=2.0), "scale is 2.0; expected True or False"),
+    "a count": (lambda: symrefine.align(POINTS, POINTS, polish=2), "polish is 2; expected True or False"),
+    "one tolerance": (lambda: symrefine.detect(POINTS, ladder=0.1), "ladder is 0.1; expected several tolerances"),
+    "a letter": (lambda: symrefine.export(POINTS, "bop", "x.json", number="a"), "number is 'a'; expected a whole"),
+    "turns for bop": (lambda: symrefine.export(POINTS, "bop", "x.json", steps=3), "steps does not apply to 'bop'"),
+    "a transform for npz": (
+        lambda: symrefine.export(POINTS, "npz", "x.npz", transform="t.json"),
+        "transform does not apply to 'npz'; it is for 'canonical'",
+    ),
+    "points of the plane": (
+        lambda: symrefine.align(POINTS, POINTS).apply(POINTS[:, :2]),
+        r"points have shape \(\d+, 2\); expected \[N, 3\]",
+    ),
+}
+
+
+@pytest.mark.parametrize(("ask", "message"), ASKED.values(), ids=ASKED)
+def test_options_are_never_misread(ask, message):
+    with pytest.raises(InputError, match=message):
+        ask()
+
+
+def test_what_was_made_does_not_take_the_place_of_what_it_was_made_from(tmp_path):
+    path = tmp_path / "box.off"
+    corners, sides = ("\n".join(" ".join(map(str, row)) for row in rows) for rows in (CORNERS, TRIANGLES))
+    threes = "\n".join(f"3 {row}" for row in sides.splitlines())
+    path.write_text(text := f"OFF\n{len(CORNERS)} {len(TRIANGLES)} 0\n{corners}\n{threes}\n")
+    made = symrefine.symmetrize(path)
+    (tmp_path / "link.off").symlink_to(path)
+    for name in ("box.off", "link.off"):
+        with pytest.raises(InputError, match="is the input itself; name another file"):
+            made.save(tmp_path / name)
+    assert path.read_text() == text
+    made.save(tmp_path / "exact.off")
 
 
 def test_an_answer_undetermined_at_its_tolerance_tells_others_truly():

@@ -131,6 +131,26 @@ def test_a_link_to_an_object_is_no_place_for_a_report(run: Run, folder: Path) ->
     assert_refused(run("detect", "box.xyz", "--json", "here.json"), "is no name of a file", "loop")
 
 
+@pytest.mark.parametrize("command", ["detect", "info", "align box.xyz", "complete -o x.ply", "merge --out z"])
+def test_links_that_lead_to_one_another_are_no_input(run: Run, folder: Path, command: str) -> None:
+    (folder / "round.ply").symlink_to(folder / "again.ply")
+    (folder / "again.ply").symlink_to(folder / "round.ply")
+    verb, *rest = command.split()
+    status, _, err = run(verb, *rest[: rest[:1] == ["box.xyz"]], "round.ply", *rest[rest[:1] == ["box.xyz"] :])
+    assert status == 2
+    assert "round.ply" in err
+    assert "internal" not in err
+    assert err.count("\n") == 1
+
+
+def test_a_report_takes_the_place_of_reports_alone(run: Run, folder: Path) -> None:
+    (folder / "box.mtl").write_text("newmtl red\n")
+    assert_refused(run("detect", "box.xyz", "--json", "box.mtl"), "--json box.mtl: is there already and is no JSON")
+    assert (folder / "box.mtl").read_text() == "newmtl red\n"
+    for _ in range(2):
+        assert run("detect", "box.xyz", "--json", "box.json")[0] == 0
+
+
 def test_a_picture_is_written(run: Run, folder: Path) -> None:
     assert_refused(run("detect", "box.xyz", "--picture", "box.svg"), "--picture box.svg: expected a name", ".png")
     assert "wrote box.png" in run("detect", "box.xyz", "--picture", "box.png")[1]

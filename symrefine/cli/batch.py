@@ -133,10 +133,10 @@ def _jobs(args: argparse.Namespace) -> tuple[list["Job"], dict[str, int]]:
     from symrefine.fleet.tasks import our_version
 
     found = _sources(args)
-    check_table_option(args)
     outputs = {"--out": args.out, "--bop": args.bop, "--table": args.table}
     manifests = () if args.manifest is None else (args.manifest,)
     check_outputs(outputs, (Path(name) for name in chain(manifests, (source.path for source in found))))
+    check_table_option(args)
     check_beside("--bop", args.bop, {"--bop-scale": args.bop_scale})
     numbers = {} if args.bop is None else _numbered(args, found)
     options = detection_options(args)

@@ -46,8 +46,8 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"{args.out}: is there already; name another one with --out")
     if studies and args.table:
         raise InputError(f"--table {args.table}: is for parts of `batch`; `symrefine run` writes the table of a study")
-    check_table_option(args)
     check_outputs({"--table": args.table} | ({} if studies else {"--out": args.out}), files)
+    check_table_option(args)
     rows = merged({str(path): _rows(path, is_study=bool(studies)) for path in files})
     with naming(str(out)):
         out.parent.mkdir(exist_ok=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from symrefine.cli.streams import aside, check_stdout
 from symrefine.errors import InputError, one_line, printable
-from symrefine.files import Writer, check_target, json_text, naming, text_writer
+from symrefine.files import Writer, check_target, json_text, naming, place_of, text_writer
 from symrefine.files import write_all as write_all
 
 if TYPE_CHECKING:
@@ -38,8 +38,8 @@ def check_outputs(outputs: dict[str, str | None], inputs: Iterable[Path]) -> Non
     for name in outputs.values():
         if name not in (None, STDOUT):
             check_target(Path(name))
-    given = {Path(name).resolve() for name in outputs.values() if name not in (None, STDOUT)}
-    taken = {place: "the input" for path in inputs if (place := path.resolve()) in given}
+    given = {place_of(Path(name)) for name in outputs.values() if name not in (None, STDOUT)}
+    taken = {place: "the input" for path in inputs if (place := place_of(path)) in given}
     for option, name in outputs.items():
         if option == "--json" and name == STDOUT:
             check_stdout()
@@ -50,9 +50,9 @@ def check_outputs(outputs: dict[str, str | None], inputs: Iterable[Path]) -> Non
         if name == STDOUT or (option != "--json" and path.exists() and not path.is_file()):
             raise InputError(f"{option} {name}: expected a file; only --json writes to stdout and devices")
         if path.is_file() or not path.exists():
-            if path.resolve() in taken:
-                raise InputError(f"{option} {name}: is the same file as {taken[path.resolve()]}; name another one")
-            taken[path.resolve()] = f"that of {option}"
+            if (place := place_of(path)) in taken:
+                raise InputError(f"{option} {name}: is the same file as {taken[place]}; name another one")
+            taken[place] = f"that of {option}"
         _check_name(option, path)
         if (suffix := SHOWN.get(option[2:])) and path.suffix.lower() != suffix:
             raise InputError(f"{option} {name}: expected a name that ends in {suffix}")
@@ -64,12 +64,20 @@ def _check_name(option: str, path: Path) -> None:
         return
     from symrefine.load import SUFFIXES, suffix_of
 
-    for place in (path, path.resolve()):
+    for place in (path, place_of(path)):
         if suffix_of(place) in SUFFIXES:
             here = "" if place == path else f" is a link to {place}, which"
             raise InputError(
                 f"{option} {path}:{here} has the suffix of an object; expected a name such as {_REPORTS[option]}"
             )
+    if option == "--json" and path.is_file() and not _may_be_json(path):
+        raise InputError(f"{option} {path}: is there already and is no JSON; expected a name such as x.json")
+
+
+def _may_be_json(path: Path) -> bool:
+    """Whether a file begins as JSON of records does, or holds nothing."""
+    with naming(str(path)), path.open("rb") as stream:
+        return stream.read(1) in (b"", b"{", b"[")
 
 
 def check_beside(option: str, name: str | None, details: dict[str, object]) -> None:

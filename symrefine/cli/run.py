@@ -63,8 +63,8 @@ def run(args: argparse.Namespace) -> int:
         say_lines(_runs(plan.cases[: args.limit]))
         return 0
     folder = Path(args.out or plan.study.out)
-    check_table_option(args)
     check_outputs({"--table": args.table}, [])
+    check_table_option(args)
     with naming(str(folder)):
         outcome = run_study(
             plan,

@@ -16,7 +16,7 @@ from symrefine.export.canonical import Canonical, canonical_pose
 from symrefine.export.consumers import CONSUMERS, Consumer, reading
 from symrefine.export.models import check_suffix, model_bytes, moved, npz_bytes
 from symrefine.export.operations import STEPS, motions_bytes, motions_limits, reflections_left_out
-from symrefine.files import check_target, json_text, write_all
+from symrefine.files import check_other, check_target, json_text, write_all
 from symrefine.shape import Shape
 from symrefine.units import check_scale
 
@@ -44,7 +44,7 @@ def package_of(
     number: int | None = None,
     scale: float = 1.0,
     improper: bool = False,
-    steps: int = STEPS,
+    steps: int | None = None,
     transform: Path | None = None,
 ) -> Package:
     """What one export writes.
@@ -54,7 +54,7 @@ def package_of(
         number: of the object in `models_info.json`; if None that of the name of the input, 7 of obj_000007.ply, or 1.
         scale: millimetres in one unit of the shape.
         improper: npz: whether mirrors and the like belong to the matrices.
-        steps: npz: turns that stand for a continuous axis.
+        steps: npz: turns that stand for a continuous axis; 72 if None.
         transform: canonical: where the transform goes; `place_of_transform` if None.
 
     Raises:
@@ -63,8 +63,9 @@ def package_of(
     """
     if to not in get_args(Format):
         raise InputError(f"to is {to!r}; expected one of {list(get_args(Format))}")
-    if improper and to != "npz":
-        raise InputError(f"improper does not apply to {to!r}; it is for 'npz'")
+    given = {"improper": (improper, "npz"), "steps": (steps, "npz"), "transform": (transform, "canonical")}
+    for name in (name for name, (value, meant) in given.items() if value and to != meant):
+        raise InputError(f"{name} does not apply to {to!r}; it is for {given[name][1]!r}")
     check_scale(scale)
     number = number_for(shape.source, number)
     if to == "bop":
@@ -72,7 +73,7 @@ def package_of(
     elif to == "npz":
         if out.suffix.lower() != ".npz":
             raise InputError(f"{out}: expected a name that ends in .npz")
-        made = npz_package(out, detection, shape, improper=improper, steps=steps)
+        made = npz_package(out, detection, shape, improper=improper, steps=steps or STEPS)
     elif to == "canonical":
         made = canonical_package(out, detection, shape, transform=transform or place_of_transform(out))
     else:
@@ -84,8 +85,7 @@ def package_of(
 def _check_places(files: Sequence[Path], source: str, *, in_folder: bool) -> None:
     """Refuse files that cannot be written, or would take the place of the input or of a model of others."""
     for path in files:
-        if path.resolve() == Path(source).resolve():
-            raise InputError(f"{path}: is the input itself; name another {'folder' if in_folder else 'file'}")
+        check_other(path, source, in_folder=in_folder)
         if path.parent.is_dir():
             check_target(path)
     if in_folder:

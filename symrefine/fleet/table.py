@@ -15,6 +15,8 @@ FORMATS = (".csv", ".parquet")
 # Rows of a row group of Parquet, which are held together: some 50 MB of the widest.
 _GROUP = 4096
 _LARGEST_INT64 = 2**63 - 1
+# A column that rows of every kind have, and characters of a head at most.
+_EVERYWHERE, _LONGEST = "error", 2**16
 
 
 def flat(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -31,13 +33,29 @@ def _flat(row: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
 
 
 def check_table(path: Path) -> None:
-    """Refuse a table in another format.
+    """Refuse a table in another format, or in place of a file that holds no rows, such as somebody's cloud.
 
     Raises:
-        InputError: naming those that there are.
+        InputError: naming the formats that there are, or the file.
     """
     if path.suffix.lower() not in FORMATS:
         raise InputError(f"{path}: expected the name of a table that ends in {' or '.join(FORMATS)}")
+    if path.is_file() and path.stat().st_size and _EVERYWHERE not in _columns(path):
+        raise InputError(f"{path}: is there already and holds no rows of symrefine; name another file")
+
+
+def _columns(path: Path) -> list[str]:
+    """The names of the columns of a table that is there; none if it is no such table."""
+    if path.suffix.lower() == ".csv":
+        with path.open(encoding="utf-8", errors="replace", newline="") as stream:
+            return next(csv.reader([stream.readline(_LONGEST)]), [])
+    from pyarrow import ArrowException
+    from pyarrow.parquet import read_schema
+
+    try:
+        return list(read_schema(path).names)
+    except (ArrowException, OSError):
+        return []
 
 
 def write_table(rows: Sequence[Mapping[str, Any]], path: Path) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from symrefine.errors import InputError, about
-from symrefine.files import Writer, bytes_writer, check_target, json_text, text_writer, write_all
+from symrefine.files import Writer, bytes_writer, check_other, check_target, json_text, text_writer, write_all
 from symrefine.front import lines
 from symrefine.geometry import Array, homogeneous
 from symrefine.shape import Shape
@@ -79,13 +79,20 @@ class Answer:
         """Write the answer, whole or not at all, as its suffix says: .json; of most also .png, .html (a page), .rrd.
 
         Raises:
-            InputError: another suffix, a kind of file that there is not for this kind of answer, or no room.
+            InputError: another suffix, a kind of file that there is not for this kind of answer, the input itself, or
+                no room.
         """
         path = Path(path)
         with about(str(path)):
             write = self.writer(path.suffix.lower())
         check_target(path)
+        for name in self._read():
+            check_other(path, name)
         write_all({str(path): write})
+
+    def _read(self) -> tuple[str, ...]:
+        """Files that the answer was made from, which it might be written over."""
+        return ()
 
     def writer(self, suffix: str) -> Writer:
         """What fills a file with the answer, in the format of a suffix such as `.json`.

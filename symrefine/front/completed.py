@@ -27,6 +27,9 @@ class Completion(Pictured, BareCompletion):
     options: Options
     timings: Mapping[str, float]
 
+    def _read(self) -> tuple[str, ...]:
+        return (self.source.source,)
+
     def _record(self, options: Options, load_s: float | None) -> dict[str, Any]:
         from symrefine.export.made import completed_record
 

@@ -30,6 +30,9 @@ class Symmetrized(Pictured, BareSymmetrized):
     options: Options
     timings: Mapping[str, float]
 
+    def _read(self) -> tuple[str, ...]:
+        return (self.source.source,)
+
     def _record(self, options: Options, load_s: float | None) -> dict[str, Any]:
         from symrefine.export.made import symmetrized_record
 

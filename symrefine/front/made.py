@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
 from symrefine.errors import InputError
-from symrefine.front.asked import found_in, in_space, seed_of, told
+from symrefine.front.asked import flag_of, found_in, in_space, seed_of, told, whole_of
 from symrefine.front.verbs import detect_in_space
 from symrefine.lengths import relative_tolerance
 from symrefine.load.objects import shape_of
@@ -140,15 +140,20 @@ def export(
     Raises:
         InputError: another format, nothing decided, what was found in another object, or files that cannot be written.
     """
-    from symrefine.export.operations import STEPS
     from symrefine.export.packages import package_of, write_package
 
     shape, out = shape_of(shape), Path(out)
     found = detect_in_space(shape) if found is None else found_in(found, shape)
-    place = None if transform is None else Path(transform)
-    turns = STEPS if steps is None else steps
     package = package_of(
-        to, out, found, shape, number=number, scale=scale, improper=improper, steps=turns, transform=place
+        to,
+        out,
+        found,
+        shape,
+        number=None if number is None else whole_of("number", number),
+        scale=scale,
+        improper=flag_of("improper", improper),
+        steps=None if steps is None else whole_of("steps", steps, least=1),
+        transform=None if transform is None else Path(transform),
     )
     write_package(package, to, out)
     return package

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from symrefine.errors import InputError
 from symrefine.front.answers import Found, check_kind
-from symrefine.front.asked import seed_of, told
+from symrefine.front.asked import flag_of, ladder_of, seed_of, told
 from symrefine.lengths import relative_tolerance
 from symrefine.load.objects import objects_of, shape_of, stream_of
 from symrefine.shape import Shape
@@ -85,7 +85,7 @@ def detect(
     if not isinstance(shape, Shape) or shape.dim == 3:
         from symrefine.detection import story
 
-        steps = story.LADDER if ladder is None else tuple(ladder)
+        steps = story.LADDER if ladder is None else ladder_of(ladder)
         return _detect_in_space(shape, options | {"outliers": outliers}, used, steps, verify)
     given = {
         "labels are": shape.labels is not None,
@@ -236,15 +236,16 @@ def align(
     from symrefine.front.aligned import Alignment
 
     moved, several = shape_of(source, name="source"), objects_of(target)
-    chosen: dict[str, Any] = {"scale": scale, "polish": polish, "allow_reflection": allow_reflection}
+    asked = {"scale": scale, "polish": polish, "allow_reflection": allow_reflection}
+    chosen: dict[str, Any] = {name: flag_of(name, value) for name, value in asked.items()}
 
     def onto(given: Any, name: str) -> Alignment:
         met = shape_of(given, name=name)
         used, whole = relative_tolerance(tolerance, met, units=units), seed_of(seed)
         found = story.align(moved, met, **chosen, tolerance=used, seed=whole)
-        options = told(tolerance, units) | {"scale": bool(scale), "seed": whole}
+        options = told(tolerance, units) | {"scale": chosen["scale"], "seed": whole}
         options |= {"relative_tolerance": used} if isinstance(tolerance, str) else {}
-        options |= {"measure": None, "rotations_only": not allow_reflection}
+        options |= {"measure": None, "rotations_only": not chosen["allow_reflection"]}
         return Alignment.of(found, source=moved, target=met, options=options)
 
     if several is None:

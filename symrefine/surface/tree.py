@@ -25,6 +25,9 @@ class Tree:
         with one_thread():
             self._tree: Any = KDTree(self.points, leafsize=LEAF) if len(self.points) else None
 
+    def __reduce__(self) -> tuple[type["Tree"], tuple[Array]]:
+        return Tree, (self.points,)  # the tree itself is memory of C
+
     def query(
         self, queries: Array, count: int, *, skip: int = 0, bound: float = math.inf, scattered: bool = False
     ) -> tuple[Array, Index]:
