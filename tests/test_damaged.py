@@ -1024,6 +1024,27 @@ def test_a_bowl_may_be_a_ball_with_a_hole_and_is_not_told_as_one(opening, count)
     assert (found.point_group, found.at_least) == ("Cinfv", True)
 
 
+OPEN_BOXES = {  # sides, which of six faces are not there, the group
+    "no lid": ((2.0, 2.0, 2.0), (5,), "C4v"),
+    "no side": ((3.0, 2.0, 2.0), (5,), "C2v"),
+    "a channel": ((2.0, 2.0, 2.0), (0, 1, 5), "C2v"),
+}
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.003])
+@pytest.mark.parametrize(("sides", "without", "group"), OPEN_BOXES.values(), ids=OPEN_BOXES)
+def test_what_ends_at_edges_all_along_has_no_hole_there(sides, without, group, noise):
+    """A lid would stand across the walls; what a sensor leaves out goes on from its border as the surface does."""
+    vertices, faces = box((0, 0, 0), sides)
+    kept = [face for side, face in zip(np.repeat(range(6), 2), faces, strict=True) if side not in without]
+    rng = np.random.default_rng(48)
+    points = sample(Shape(points=vertices, faces=np.array(kept)), 20000, noise, rng)
+    found = detect(Pose.random(rng).of(points))
+    assert (found.point_group, found.at_least) == (group, True)
+    whole = detect(Pose.random(rng).of(damage.hole(join([(vertices, faces)]), 0.1, rng).points))
+    assert (whole.point_group, whole.at_least) == ("Oh" if len(set(sides)) == 1 else "D4h", True)
+
+
 def test_a_single_view_leaves_a_doubt_and_views_from_all_sides_none():
     sure = {}
     for count in (1.0, 2.0):

@@ -192,12 +192,13 @@ class Evidence:
         back = disc_distances(self._judged, moved, cloud.labels, bound=bound)
         return motion.scale * back / size
 
-    def excess(self, motion: Similarity) -> float:
+    def excess(self, motion: Similarity, *, both: bool = False) -> float:
         """The largest statistic of the miss over its limit; <= 1 if the surfaces agree. Of atoms every one counts.
 
         Where the scale is open the target has to meet the source as well: a source that is small enough misses nothing.
+        Else it may have more than that, unless `both` are to be alike.
         """
-        ways = [self.misses(motion), self.misses_back(motion)] if self.scale else [self.misses(motion)]
+        ways = [self.misses(motion), self.misses_back(motion)] if self.scale or both else [self.misses(motion)]
         return max(float(self.judge.needed(misses[None], [motion])[0]) for misses in ways) / self.tolerance
 
     def own_excess(self, motion: Similarity) -> float:

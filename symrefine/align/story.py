@@ -240,9 +240,15 @@ def _of_transform(covariance: Array, evidence: Evidence, matrix: Array, factor: 
 
 
 def _symmetry(evidence: Evidence, motion: Similarity) -> tuple[PointGroup, Array]:
-    """Symmetry group of the target and its centre, from whichever of the two objects is the better known."""
-    side = max(evidence.target, evidence.source, key=lambda s: (s.is_mesh, len(s.shape.points)))
-    found = detect(side.shape, tolerance=evidence.tolerance, seed=evidence.seed)
+    """Symmetry group of the target and its centre, from whichever of the two objects is the better known.
+
+    Where they are not sure to be alike, from that of the larger group: what carries one of them onto itself makes maps
+    that do as well, whatever the other has beside.
+    """
+    alike = not evidence.has_points or evidence.excess(motion, both=True) <= certain(1.0)
+    sides = sorted((evidence.target, evidence.source), key=lambda s: (not s.is_mesh, -len(s.shape.points)))
+    every = [(s, detect(s.shape, tolerance=evidence.tolerance, seed=evidence.seed)) for s in sides[: 1 if alike else 2]]
+    side, found = max(every, key=lambda known: known[1].group.order)
     if side is evidence.target:
         return found.group, found.center
     # R G R' = (-R) G (-R)', so a rotation turns the frame; the centre moves with the object, at the target's size.

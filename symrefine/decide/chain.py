@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 from operator import attrgetter
 
-from symrefine.decide.ends import PLACES, ends_there, ends_too, hides_surely, hides_there, often_kept, places
+from symrefine.decide.ends import PLACES, ends_there, ends_too, goes_on, hides_surely, hides_there, often_kept, places
 from symrefine.decide.hypotheses import (
     NOTHING,
     SAME_RAD,
@@ -78,7 +78,8 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     # What may not be open at all is missing a part only where that explains more.
     missing = (evident or (more and hides_there(surface, part.largest))) and not ends
     missing = missing or places(whole.largest, part.largest) >= PLACES
-    missing = missing and not (more and ends_too(surface, part.largest, ALIKE * limit))
+    if missing and more:
+        missing = goes_on(surface, part.largest) and not ends_too(surface, part.largest, ALIKE * limit)
     if missing and (not more or hides_surely(surface, part.largest, limit)):
         return replace(part, at_least=True)
     # What a border hides may be why a larger group is in doubt.

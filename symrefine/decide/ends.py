@@ -1,13 +1,15 @@
 """Where an object ends: an open border that a group carries onto itself is its own, and no hole in it."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from symrefine.decide.hypotheses import Hypothesis, judged, seen_to_end
 from symrefine.decide.looks import few_motions
-from symrefine.geometry import Array, Isometry
+from symrefine.geometry import Array, Isometry, Mask
+from symrefine.surface.misses import SURE
 from symrefine.surface.openings import MOST, TELLING
 from symrefine.surface.surface import Surface
 from symrefine.surface.tree import Tree
@@ -73,13 +75,39 @@ def hides_there(surface: Surface, found: Hypothesis) -> bool:
     """
     if surface.openings is None:
         return False
-    cloud, line, motions = surface.cloud, surface.openings.line, few_motions(found.placed)
-    unseen = np.isnan(surface.seen(surface.misses(motions), motions, together=True))
+    cloud, line = surface.cloud, surface.openings.line
     shares = [
-        float(np.mean(Tree(m.apply(cloud.points[hidden])).nearest(cloud.points[line])[0] < cloud.beside))
-        for m, hidden in zip(motions, unseen, strict=True)
+        float(np.mean(Tree(motion.apply(cloud.points[hidden])).nearest(cloud.points[line])[0] < cloud.beside))
+        for motion, hidden in _hidden(surface, found)
     ]
     return MOST * float(np.median(shares)) >= 1.0
+
+
+def goes_on(surface: Surface, found: Hypothesis) -> bool:
+    """Whether what a group carries to where nobody looked goes on from the borders there, or lies to them by chance.
+
+    What a sensor leaves out ends anywhere in a surface. A box without a lid ends where the lid would stand across the
+    walls all along: such an object just is so. Normals that have nothing to do with one another have a mean squared
+    cosine of 1/3, of standard deviation sqrt(4/45).
+    """
+    if surface.openings is None or surface.viewed:
+        return True
+    cloud, line, along = surface.cloud, surface.openings.line, []
+    borders, normals = Tree(cloud.points[line]), cloud.normals[line]
+    for motion, hidden in _hidden(surface, found):
+        away, near = borders.nearest(motion.apply(cloud.points[hidden]))
+        beside = away < cloud.beside
+        if beside.any():
+            cosines = np.einsum("ni,ni->n", motion.turn(cloud.normals[hidden]), normals[near])[beside]
+            along.append(float(np.mean(cosines**2) + SURE * math.sqrt(4.0 / 45.0 / len(cosines))))
+    return not along or float(np.median(along)) >= 1.0 / 3.0
+
+
+def _hidden(surface: Surface, found: Hypothesis) -> Iterator[tuple[Isometry, Mask]]:
+    """A few operations of a group, and which local planes [M] each carries to where nobody looked."""
+    motions = few_motions(found.placed)
+    unseen = np.isnan(surface.seen(surface.misses(motions), motions, together=True))
+    return zip(motions, unseen, strict=True)
 
 
 def _motions(found: Hypothesis) -> list[Isometry]:
