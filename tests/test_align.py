@@ -817,6 +817,20 @@ def test_what_carries_a_whole_source_onto_itself_leaves_equivalents_whatever_the
     assert found.determinant_confidence < 0.7
 
 
+@pytest.mark.parametrize(("name", "seed"), [("propeller5", 0), ("rotor3", 2)])
+def test_turns_of_a_whole_source_leave_equivalents_of_a_part(name: str, seed: int) -> None:
+    mesh, truth = specimen("shape", name)
+    rng = np.random.default_rng(seed)
+    source, target = (sample(mesh, count, 0.0, rng) for count in (8000, 9000))
+    away = target @ random_orthogonal(rng)[0]
+    target = target[away > np.quantile(away, 0.3)]
+    matrix = random_orthogonal(rng)
+    found = align(source, target @ matrix.T + 5.0)
+    assert found.status == "ok"
+    for operation in truth.group.operations():
+        assert min(angle_deg(m, matrix @ operation) for m in found.equivalents) < 1.0
+
+
 def test_what_nothing_tells_of_the_hand_is_a_half_and_no_less() -> None:
     rng = rng_of(83)
     side = side_of(Shape(points=rng.random((300, 3))), 0)

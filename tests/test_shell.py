@@ -147,6 +147,7 @@ def test_a_report_takes_the_place_of_reports_alone(run: Run, folder: Path) -> No
     (folder / "box.mtl").write_text("newmtl red\n")
     assert_refused(run("detect", "box.xyz", "--json", "box.mtl"), "--json box.mtl: is there already and is no JSON")
     assert (folder / "box.mtl").read_text() == "newmtl red\n"
+    (folder / "box.json").write_text("\n {}")
     for _ in range(2):
         assert run("detect", "box.xyz", "--json", "box.json")[0] == 0
 

@@ -20,7 +20,7 @@ from symrefine.fit.refine import MAX_OUTER
 from symrefine.geometry import Array, Isometry, Mask, householder
 from symrefine.groups.orthogonal import chord_angles
 from symrefine.ntuples.rank import SIGNIFICANT
-from symrefine.propose.maps import WITHIN, maps_between
+from symrefine.propose.maps import WITHIN, maps_between, maps_onto_itself
 from symrefine.propose.votes import mirror_votes
 from symrefine.shape import Index
 from symrefine.surface.misses import LIMITS, disc_distances
@@ -141,21 +141,28 @@ class Judge:
         return [s for s in (p.after(motion) for p in planes) if self.meets(s).sum() >= ITS_OWN * meets.sum()]
 
     def images(self, best: Met) -> list[Similarity]:
-        """The best map after the mirrors of the source, and before those of the target.
+        """The best map after what carries all of the source onto itself, and before what does so of the target.
 
-        What carries all of a side onto itself makes maps that do as well, whatever the other side shows of it.
+        That makes maps that do as well, whatever the other side shows of it.
         """
         before, after = replace(self, target=self.source), replace(self, source=self.target)
-        starts = [best.motion.after(p) for p in before.own_mirrors()]
-        return starts + [p.after(best.motion) for p in after.own_mirrors()]
+        starts = [best.motion.after(p) for p in before.own_maps()]
+        return starts + [p.after(best.motion) for p in after.own_maps()]
 
-    def own_mirrors(self) -> list[Similarity]:
-        """The mirrors of a surface, judged with itself, that it votes for and most of it meets itself in.
+    def own_maps(self) -> list[Similarity]:
+        """What carries most of a surface, judged with itself, onto itself: mirrors that it votes for, and other maps.
 
-        Polished, as all of it tells where they stand, and not only what the other side shows.
+        Polished, as all of it tells where they stand, and not only what the other side shows. What is evidently a part
+        hardly has any other.
         """
-        planes = _mirrors(self.source.cloud.points, self.source.cloud.normals)
-        return [self._polish(p).motion for p in planes if self.meets(p).mean() >= ITS_OWN]
+        cloud, found, still = self.source.cloud, list[Similarity](), Similarity(matrix=np.eye(3), shift=np.zeros(3))
+        whole = not self.source.openings.evident
+        others = maps_onto_itself(cloud, self.diagonal, np.random.default_rng(0)) if whole else []
+        turns = [Similarity(matrix=p.matrix, shift=p.shift) for p in others]
+        for start in (*_mirrors(cloud.points, cloud.normals), *turns):
+            if not self._among(start, [still, *found]) and self.meets(start).mean() >= ITS_OWN:
+                found.append(self._polish(start).motion)
+        return found
 
     def polished(self, start: Similarity) -> Met:
         """A map after the polish, judged from both sides."""

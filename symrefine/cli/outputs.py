@@ -77,7 +77,7 @@ def _check_name(option: str, path: Path) -> None:
 def _may_be_json(path: Path) -> bool:
     """Whether a file begins as JSON of records does, or holds nothing."""
     with naming(str(path)), path.open("rb") as stream:
-        return stream.read(1) in (b"", b"{", b"[")
+        return stream.read(2**10).lstrip()[:1] in (b"", b"{", b"[")
 
 
 def check_beside(option: str, name: str | None, details: dict[str, object]) -> None:

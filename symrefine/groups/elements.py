@@ -18,7 +18,7 @@ from symrefine.groups.standard import standard_operations
 from symrefine.rounding import SINGLE
 
 # By how much directions of elements that somebody found may be off: several times what a fit leaves at 1 % noise.
-DIRECTION_ERROR_RAD = math.radians(2.0)
+DIRECTION_ERROR_RAD = math.radians(1.5)
 GivenAxis = tuple[ArrayLike, float | Literal["inf"]]
 
 
