@@ -96,7 +96,7 @@ def _listed(operations: Array, diameter: float) -> Symmetry:
 
 
 def _identified(rotations: Array) -> PointGroup:
-    """The group that orthogonal matrices [N, 3, 3] are, each off by no more than two degrees."""
+    """The group that orthogonal matrices [N, 3, 3] are, each off by no more than a degree and a half."""
     group = identify(rotations)
     worst = float(group.distance_rad(rotations).max())
     if worst > TILT_RAD:
