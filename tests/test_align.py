@@ -15,10 +15,11 @@ from experiments.objects.household import camera
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
 from experiments.studies import partial_alignment
 from symrefine.align import story
-from symrefine.align.judge import Judge
+from symrefine.align.judge import Judge, Met
 from symrefine.align.landscape import grid_rotations, harmonic_pair, hills, landscape, least_misfit
 from symrefine.align.moment_fit import as_good, best_fits, covariance, exact, fit, misfit
 from symrefine.align.pair import Evidence
+from symrefine.align.partial import _first
 from symrefine.align.polish import SOON, Polished, Similarity, polish
 from symrefine.align.procrustes import procrustes
 from symrefine.align.rivals import Choice, choose, polished
@@ -815,6 +816,18 @@ def test_what_carries_a_whole_source_onto_itself_leaves_equivalents_whatever_the
     for wanted in (matrix, matrix @ householder(normal)):
         assert min(angle_deg(m, wanted) for m in found.equivalents) < 0.3
     assert found.determinant_confidence < 0.7
+
+
+@pytest.mark.parametrize(("lead", "det"), [(0.0, 1), (0.02, 1), (0.1, -1)])
+def test_a_rotation_comes_first_where_a_reflection_leads_by_what_chance_explains(lead: float, det: int) -> None:
+    def met(sign: float, well: float) -> Met:
+        side = Merit(well=well, less=0.05, nothing=0.0)
+        motion = Similarity(matrix=np.diag([1.0, 1.0, sign]), shift=np.zeros(3))
+        return Met(motion=motion, covariance=np.eye(6), sides=(side, side), overlap=(0.8, 0.8), rms=0.0, sigma=0.02)
+
+    every = [met(1.0, 0.6), met(-1.0, 0.6 + 0.5 * lead), met(-1.0, 0.5)]
+    for maps in (every, every[::-1]):
+        assert _first(maps).determinant == det
 
 
 @pytest.mark.parametrize(("name", "seed"), [("propeller5", 0), ("rotor3", 2)])

@@ -111,7 +111,7 @@ class Judge:
     def promising(self) -> list[Similarity]:
         """The maps of each determinant that are proposed under which most local planes meet others, as they stand."""
         proposed = maps_between(self.source.cloud, self.target.cloud, self.diagonal)
-        every = [Similarity(matrix=p.matrix, shift=p.shift) for p in proposed]
+        every = [Similarity.of(p) for p in proposed]
         count = [int(self.meets(m).sum()) for m in every]
         order = [i for i in np.argsort(-np.array(count), kind="stable") if count[i] >= max(WORTH * max(count), 1.0)]
         signs = [float(np.sign(np.linalg.det(every[i].matrix))) for i in order]
@@ -158,8 +158,7 @@ class Judge:
         cloud, found, still = self.source.cloud, list[Similarity](), Similarity(matrix=np.eye(3), shift=np.zeros(3))
         whole = not self.source.openings.evident
         others = maps_onto_itself(cloud, self.diagonal, np.random.default_rng(0)) if whole else []
-        turns = [Similarity(matrix=p.matrix, shift=p.shift) for p in others]
-        for start in (*_mirrors(cloud.points, cloud.normals), *turns):
+        for start in (*_mirrors(cloud.points, cloud.normals), *map(Similarity.of, others)):
             if not self._among(start, [still, *found]) and self.meets(start).mean() >= ITS_OWN:
                 found.append(self._polish(start).motion)
         return found
@@ -309,5 +308,4 @@ def _mirrors(points: Array, normals: Array) -> list[Similarity]:
         return []
     some = slice(None, None, -(-len(points) // VOTERS))
     votes = mirror_votes(points[some], normals[some], np.random.default_rng(0), told=MIRRORS)
-    planes = [Isometry.about(v.foot, householder(v.direction)) for v in votes]
-    return [Similarity(matrix=p.matrix, shift=p.shift) for p in planes]
+    return [Similarity.of(Isometry.about(v.foot, householder(v.direction))) for v in votes]

@@ -107,13 +107,12 @@ def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool
 
 def _first(every: Sequence[Met]) -> Met:
     """Of maps that do about as well the one that both sides say most for; a rotation where nothing tells the hand."""
-    said = [said_by_both(m.sides) for m in every]
-    most = int(np.argmax(said))
-    first = every[most]
-    proper = (
-        k for k, m in enumerate(every) if m.determinant > 0 and said[most] - said[k] < math.hypot(first.sigma, m.sigma)
-    )
-    return first if first.determinant > 0 else every[max(proper, key=lambda k: said[k], default=most)]
+    first, *others = sorted(every, key=lambda m: -said_by_both(m.sides))
+    if first.determinant > 0:
+        return first
+    most = said_by_both(first.sides)
+    level = (m for m in others if most - said_by_both(m.sides) < math.hypot(first.sigma, m.sigma))
+    return next((m for m in level if m.determinant > 0), first)
 
 
 def _doubt(best: Met, rivals: Sequence[Met], fitting: float, slides: bool, open_: bool) -> str:

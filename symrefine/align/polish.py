@@ -15,6 +15,7 @@ from symrefine.fit.matching import SCALE_FLOOR, Contact, each_coordinate, geman_
 from symrefine.fit.refine import MAX_OUTER, SETTLED, WITHIN_NOISE
 from symrefine.fit.residual import SIZE, design_rows, gram, turn_frame
 from symrefine.geometry import Array, Isometry, cross_matrix
+from symrefine.propose.consensus import Proposal
 from symrefine.surface.skin import LocalPlanes, Patches, Skin
 
 # One in so many of the planes of the source moves until the motion changes by less than the spacing, of sources with
@@ -31,6 +32,11 @@ class Similarity(Isometry):
     """Map x -> scale * matrix x + shift with an orthogonal matrix of determinant +1 or -1."""
 
     scale: float = 1.0
+
+    @classmethod
+    def of(cls, motion: "Isometry | Proposal") -> "Similarity":
+        """A map that keeps lengths."""
+        return cls(matrix=motion.matrix, shift=motion.shift)
 
     def apply(self, points: Array) -> Array:
         """Images [N, n] of points [N, n]."""

@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 from operator import attrgetter
 
-from symrefine.decide.ends import PLACES, ends_there, ends_too, goes_on, hides_surely, hides_there, often_kept, places
+from symrefine.decide.ends import ends_there, ends_too, hidden_by, hides_surely, hides_there, often_kept, often_left
 from symrefine.decide.hypotheses import (
     NOTHING,
     SAME_RAD,
@@ -76,10 +76,10 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     # A group that a single hole leaves may keep its border because it keeps the border of almost any.
     ends = ends and not (more and often_kept(surface, whole.largest, hidden))
     # What may not be open at all is missing a part only where that explains more.
-    missing = (evident or (more and hides_there(surface, part.largest))) and not ends
-    missing = missing or places(whole.largest, part.largest) >= PLACES
-    if missing and more:
-        missing = goes_on(surface, part.largest) and not ends_too(surface, part.largest, ALIKE * limit)
+    unseen = hidden_by(surface, part.largest) if more else []
+    missing = (evident or (more and hides_there(surface, unseen))) and not ends
+    missing = missing or often_left(whole.largest, part.largest)
+    missing = missing and not (more and ends_too(surface, part.largest, unseen, ALIKE * limit))
     if missing and (not more or hides_surely(surface, part.largest, limit)):
         return replace(part, at_least=True)
     # What a border hides may be why a larger group is in doubt.

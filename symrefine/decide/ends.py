@@ -1,7 +1,7 @@
 """Where an object ends: an open border that a group carries onto itself is its own, and no hole in it."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -39,14 +39,17 @@ def ends_there(surface: Surface, found: Hypothesis) -> bool:
     return bool(shares) and float(np.median(shares)) > KEPT
 
 
-def ends_too(surface: Surface, found: Hypothesis, limit: float) -> bool:
+def ends_too(surface: Surface, found: Hypothesis, hidden: Sequence[tuple[Isometry, Mask]], limit: float) -> bool:
     """Whether an object ends at its open borders if it has a group that what lies beyond them was to hide.
 
-    A handle at a rim breaks what the rest keeps: it comes to lie where the rim ends, which all other operations carry
-    onto the rim. Few operations do not tell by themselves where it ends, but by how much of the border they keep.
+    What is `hidden_by` the group may not go on from there. And a handle at a rim breaks what the rest keeps: it comes
+    to lie where the rim ends, which all other operations carry onto the rim. Few operations do not tell by themselves
+    where it ends, but by how much of the border they keep.
     """
     if surface.viewed:
         return False  # what cameras see to be free says it
+    if not _goes_on(surface, hidden):
+        return True
     few = len(found.placed.motions()) < TELLING
     return ends_there(surface, found) if few else seen_to_end(surface, found) > limit
 
@@ -68,8 +71,15 @@ def hides_surely(surface: Surface, found: Hypothesis, limit: float) -> bool:
     return judged(replace(surface, openings=replace(openings, doubted=True)), found.placed).need <= limit
 
 
-def hides_there(surface: Surface, found: Hypothesis) -> bool:
-    """Whether a group carries something that nobody saw to one in `MOST` of the places at open borders.
+def hidden_by(surface: Surface, found: Hypothesis) -> list[tuple[Isometry, Mask]]:
+    """A few operations of a group, and which local planes [M] each carries to where nobody looked."""
+    motions = few_motions(found.placed)
+    unseen = np.isnan(surface.seen(surface.misses(motions), motions, together=True))
+    return list(zip(motions, unseen, strict=True))
+
+
+def hides_there(surface: Surface, hidden: Sequence[tuple[Isometry, Mask]]) -> bool:
+    """Whether something that nobody saw, as it is `hidden_by` a group, lies in one of `MOST` places at open borders.
 
     As a patch is unseen only where it begins at a border, a border that hides nothing may be a whim of the sample.
     """
@@ -77,37 +87,30 @@ def hides_there(surface: Surface, found: Hypothesis) -> bool:
         return False
     cloud, line = surface.cloud, surface.openings.line
     shares = [
-        float(np.mean(Tree(motion.apply(cloud.points[hidden])).nearest(cloud.points[line])[0] < cloud.beside))
-        for motion, hidden in _hidden(surface, found)
+        float(np.mean(Tree(motion.apply(cloud.points[some])).nearest(cloud.points[line])[0] < cloud.beside))
+        for motion, some in hidden
     ]
     return MOST * float(np.median(shares)) >= 1.0
 
 
-def goes_on(surface: Surface, found: Hypothesis) -> bool:
-    """Whether what a group carries to where nobody looked goes on from the borders there, or lies to them by chance.
+def _goes_on(surface: Surface, hidden: Sequence[tuple[Isometry, Mask]]) -> bool:
+    """Whether what is `hidden_by` a group goes on from the borders there, or lies to them by chance.
 
     What a sensor leaves out ends anywhere in a surface. A box without a lid ends where the lid would stand across the
     walls all along: such an object just is so. Normals that have nothing to do with one another have a mean squared
     cosine of 1/3, of standard deviation sqrt(4/45).
     """
-    if surface.openings is None or surface.viewed:
+    if surface.openings is None:
         return True
     cloud, line, along = surface.cloud, surface.openings.line, []
     borders, normals = Tree(cloud.points[line]), cloud.normals[line]
-    for motion, hidden in _hidden(surface, found):
-        away, near = borders.nearest(motion.apply(cloud.points[hidden]))
+    for motion, some in hidden:
+        away, near = borders.nearest(motion.apply(cloud.points[some]))
         beside = away < cloud.beside
         if beside.any():
-            cosines = np.einsum("ni,ni->n", motion.turn(cloud.normals[hidden]), normals[near])[beside]
+            cosines = np.einsum("ni,ni->n", motion.turn(cloud.normals[some]), normals[near])[beside]
             along.append(float(np.mean(cosines**2) + SURE * math.sqrt(4.0 / 45.0 / len(cosines))))
     return not along or float(np.median(along)) >= 1.0 / 3.0
-
-
-def _hidden(surface: Surface, found: Hypothesis) -> Iterator[tuple[Isometry, Mask]]:
-    """A few operations of a group, and which local planes [M] each carries to where nobody looked."""
-    motions = few_motions(found.placed)
-    unseen = np.isnan(surface.seen(surface.misses(motions), motions, together=True))
-    return zip(motions, unseen, strict=True)
 
 
 def _motions(found: Hypothesis) -> list[Isometry]:
@@ -134,14 +137,15 @@ def often_kept(surface: Surface, found: Hypothesis, share: float) -> bool:
     return bool(kept) and PLACES * float((np.median(kept, axis=0) > KEPT).mean()) > 1.0
 
 
-def places(seen: Hypothesis, found: Hypothesis) -> float:
-    """Mirrors or axes of a group through which a hole leaves the symmetry that is seen: a hole is round.
+def often_left(seen: Hypothesis, found: Hypothesis) -> bool:
+    """Whether a group has `PLACES` mirrors or axes or more through which a hole leaves the symmetry that is seen.
 
-    So what is left keeps its middle: one mirror, or the turns and mirrors about an axis; of what is round, any mirror.
-    Of a ball it leaves an axis wherever it is, which a bowl has as well: nothing tells which of the two it is.
+    A hole is round, so that what is left keeps its middle: one mirror, or the turns and mirrors about an axis; of what
+    is round, any mirror. Of a ball it leaves an axis wherever it is, which a bowl has as well: nothing tells which of
+    the two it is.
     """
     if seen.group.name == "Cs":
-        return len(found.group.mirrors()) if found.group.is_finite else math.inf
+        return not found.group.is_finite or len(found.group.mirrors()) >= PLACES
     if not (seen.group.is_finite and seen.group.is_polar and found.group.is_finite):
-        return 1.0
-    return sum(order % seen.group.symbol.fold == 0 for _, order in found.group.rotation_axes())
+        return False
+    return sum(order % seen.group.symbol.fold == 0 for _, order in found.group.rotation_axes()) >= PLACES
