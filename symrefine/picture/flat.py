@@ -1,6 +1,5 @@
 """The picture of an object in the plane: what it is made of, its mirror lines, the point it turns about."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,7 @@ from symrefine.picture.canvas import Canvas
 from symrefine.picture.palette import AXIS, MISS, OBJECT, Colour, plane_colour
 from symrefine.picture.words import order_name, planar_headline
 from symrefine.plane.detection import PlanarDetection
-from symrefine.plane.raster import Raster, raster_of
+from symrefine.plane.raster import Raster, coarser, raster_of
 from symrefine.shape import Shape
 
 # How far lines stick out of the object, and what is free around it, in diagonals.
@@ -76,7 +75,7 @@ def flat_scene(detection: PlanarDetection, shape: Shape) -> FlatScene:
     return FlatScene(
         center=detection.center,
         diagonal=detection.diagonal,
-        raster=None if raster is None else _coarser(raster),
+        raster=None if raster is None else coarser(raster, MOST_CELLS),
         points=points[:: max(1, -(-len(points) // MOST_POINTS))] if raster is None else _corners(points),
         lines=tuple(stroke(found.line, str(k + 1), plane_colour(k)) for k, found in enumerate(detection.lines)),
         missed=tuple(None if m is None else stroke(m, f"near miss {k}", MISS) for k, m in enumerate(missed, start=1)),
@@ -138,20 +137,6 @@ def _draw_object(axes, scene: FlatScene) -> None:  # type: ignore[no-untyped-def
 def shares(raster: Raster) -> Array:
     """How much [H, W] of each cell is object, 0 to 1."""
     return np.asarray(np.clip(raster.values / max(float(np.quantile(raster.values, 0.99)), 1e-300), 0.0, 1.0))
-
-
-def _coarser(raster: Raster) -> Raster:
-    """The same with a longest side of at most `MOST_CELLS` cells: the mean of blocks."""
-    size = -(-max(raster.values.shape) // MOST_CELLS)
-    if size == 1:
-        return raster
-    height, width = (math.ceil(n / size) * size for n in raster.values.shape)
-    padded = np.zeros((height, width))
-    padded[: raster.values.shape[0], : raster.values.shape[1]] = raster.values
-    blocks = padded.reshape(height // size, size, width // size, size).mean(axis=(1, 3))
-    turned = np.array([-raster.step[1], raster.step[0]])
-    origin = raster.origin + 0.5 * (size - 1) * (raster.step + turned)
-    return Raster(values=blocks, origin=origin, step=size * raster.step)
 
 
 def _corners(points: Array) -> Array:
