@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 
@@ -155,14 +155,10 @@ class Found(Pictured):
         """Operations, or what generates them, as homogeneous matrices in the units and the frame of the input."""
         raise NotImplementedError
 
-    def _bare(self) -> "BareFound":
-        """Itself, as pictures and pages know it."""
-        raise NotImplementedError
-
     def _picture(self, width: int, height: int) -> bytes:
         from symrefine.picture.draw import picture_png
 
-        return picture_png(self._bare(), self.shape, width=width, height=height)
+        return picture_png(cast("BareFound", self), self.shape, width=width, height=height)
 
     def kinds(self) -> dict[str, Callable[[], Writer]]:
         return super().kinds() | {".html": self._page}
@@ -170,7 +166,7 @@ class Found(Pictured):
     def _page(self) -> Writer:
         from symrefine.report import write_html
 
-        return partial(write_html, self._bare(), self.shape)
+        return partial(write_html, cast("BareFound", self), self.shape)
 
 
 def check_kind(path: Path) -> None:

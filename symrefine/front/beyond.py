@@ -26,9 +26,6 @@ class SubspaceDetection(Found, BareSubspaceDetection):
     shape: Shape
     options: Options
 
-    def _bare(self) -> BareSubspaceDetection:
-        return self
-
     def _record(self, options: Options, load_s: float | None) -> dict[str, Any]:
         from symrefine.export.records import subspace_record
 

@@ -23,9 +23,6 @@ class PlanarDetection(Found, BarePlanarDetection):
     shape: Shape
     options: Options
 
-    def _bare(self) -> BarePlanarDetection:
-        return self
-
     def _record(self, options: Options, load_s: float | None) -> dict[str, Any]:
         from symrefine.export.records import planar_record
 

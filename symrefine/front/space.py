@@ -27,9 +27,6 @@ class Detection(Found, BareDetection):
     shape: Shape
     options: Options
 
-    def _bare(self) -> BareDetection:
-        return self
-
     def _record(self, options: Options, load_s: float | None) -> dict[str, Any]:
         from symrefine.export.records import detection_record
 
