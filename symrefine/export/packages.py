@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -16,7 +15,7 @@ from symrefine.export.canonical import Canonical, canonical_pose
 from symrefine.export.consumers import CONSUMERS, Consumer, reading
 from symrefine.export.models import check_suffix, model_bytes, moved, npz_bytes
 from symrefine.export.operations import STEPS, motions_bytes, motions_limits, reflections_left_out
-from symrefine.files import check_other, check_target, json_text, write_all
+from symrefine.files import bytes_writer, check_other, check_target, json_text, write_all
 from symrefine.shape import Shape
 from symrefine.units import check_scale
 
@@ -112,12 +111,8 @@ def write_package(package: Package, to: Format, out: Path) -> None:
         if to in CONSUMERS and not out.exists():
             out.mkdir()
             undo.callback(out.rmdir)
-        write_all({str(path): partial(_fill, data) for path, data in package.files.items()})
+        write_all({str(path): bytes_writer(data) for path, data in package.files.items()})
         undo.pop_all()
-
-
-def _fill(data: bytes, path: Path) -> None:
-    path.write_bytes(data)
 
 
 def bop_package(out: Path, detection: Detection, shape: Shape, *, number: int, scale: float) -> Package:
