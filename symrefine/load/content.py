@@ -53,6 +53,11 @@ class Polygons:
     corners: Index
     counts: Index
 
+    @classmethod
+    def alike(cls, rows: Index) -> "Polygons":
+        """Faces [F, k] that have all as many corners."""
+        return cls(corners=rows.ravel(), counts=np.full(len(rows), rows.shape[1]))
+
     def __len__(self) -> int:
         return len(self.counts)
 

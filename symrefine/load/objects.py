@@ -195,7 +195,7 @@ def _faces(values: Any) -> Polygons:
         return polygons([_corner(corner) for corner in row] for row in values)
     if rows.ndim != 2 or not len(rows) or not np.issubdtype(rows.dtype, np.integer):
         raise InputError(f"faces have shape {rows.shape} of {rows.dtype}; expected whole numbers [F, 3], F >= 1")
-    return Polygons(corners=rows.astype(np.int64).ravel(), counts=np.full(len(rows), rows.shape[1]))
+    return Polygons.alike(rows.astype(np.int64))
 
 
 def _corner(value: Any) -> int:

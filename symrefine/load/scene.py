@@ -50,7 +50,7 @@ def flattened(scene: Any, *, texture: bool = False) -> Content:
     joined = np.concatenate([faces + shift for (_, faces), shift in zip(meshes, shifts, strict=True)])
     return Content(
         points=np.concatenate([points for points, _ in meshes]),
-        faces=Polygons(corners=joined.ravel(), counts=np.full(len(joined), 3)),
+        faces=Polygons.alike(joined),
         point_fields=fields,
         split=True,
         paint=_paint(looks) if texture else None,

@@ -44,7 +44,7 @@ def read_stl(data: bytes) -> Content:
 def _content(points: Array, lines: list[int] | None) -> Content:
     if len(points) == 0:
         return Content(points=points)
-    faces = Polygons(corners=np.arange(len(points), dtype=np.int64), counts=np.full(len(points) // 3, 3))
+    faces = Polygons.alike(np.arange(len(points), dtype=np.int64).reshape(-1, 3))
     return Content(
         points=points, faces=faces, point_lines=lines, face_lines=None if lines is None else lines[::3], split=True
     )

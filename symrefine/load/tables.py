@@ -259,7 +259,7 @@ def _numbers(array: NDArray[Any], name: str) -> Array:
 def _faces(array: NDArray[Any]) -> Polygons:
     if array.dtype.kind not in "iu" or array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
         raise InputError(f"faces have shape {array.shape} of {array.dtype}; expected [F, 3] integers, F >= 1")
-    return Polygons(corners=array.ravel().astype(np.int64), counts=np.full(len(array), 3))
+    return Polygons.alike(array.astype(np.int64))
 
 
 def _check_shape(table: Array) -> None:

@@ -80,7 +80,7 @@ def read_3mf(data: bytes) -> Content:
     joined = np.concatenate(corners)
     return Content(
         points=np.concatenate([points for points, _ in meshes]),
-        faces=Polygons(corners=joined.ravel(), counts=np.full(len(joined), 3)),
+        faces=Polygons.alike(joined),
         unit=_UNITS[unit],
     )
 
