@@ -8,7 +8,7 @@ from symrefine.picture.words import direction, kind_name, order_name
 from symrefine.surface.misses import Deviation
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Row:
     """An element: its name and colour in the picture, its kind, its normal or direction, and what it misses by.
 
@@ -26,21 +26,17 @@ class Row:
 def found_rows(detection: Detection) -> list[Row]:
     """Planes, then axes, then the inversion."""
     rows = [
-        _row(str(k + 1), plane_colour(k), kind_name("plane"), direction(p.plane.normal), p.residual, p.confidence)
+        Row(str(k + 1), plane_colour(k), kind_name("plane"), direction(p.plane.normal), p.residual, p.confidence)
         for k, p in enumerate(detection.planes)
     ]
     for a in detection.axes:
         kind = kind_name("improper" if a.improper else "axis", a.order)
         name = order_name(a.order, a.improper)
-        rows.append(_row(name, AXIS, kind, direction(a.axis.direction), a.residual, a.confidence))
+        rows.append(Row(name, AXIS, kind, direction(a.axis.direction), a.residual, a.confidence))
     miss, sure = detection.inversion_residual, detection.inversion_confidence
     if miss is None or sure is None:
         return rows
-    return [*rows, _row("i", AXIS, kind_name("inversion"), "about the centre", miss, sure)]
-
-
-def _row(name: str, colour: Colour, kind: str, vector: str, residual: Deviation, score: float) -> Row:
-    return Row(name=name, colour=colour, kind=kind, vector=vector, residual=residual, score=score)
+    return [*rows, Row("i", AXIS, kind_name("inversion"), "about the centre", miss, sure)]
 
 
 def near_miss_rows(detection: Detection) -> list[Row]:
@@ -49,5 +45,5 @@ def near_miss_rows(detection: Detection) -> list[Row]:
     for k, m in enumerate(detection.near_misses, start=1):
         order = f" {order_name(m.order, m.kind == 'improper')}" if m.kind in ("axis", "improper") else ""
         kind = kind_name(m.kind, m.order) + order
-        rows.append(_row(str(k), MISS, kind, direction(m.direction), m.residual, m.excess))
+        rows.append(Row(str(k), MISS, kind, direction(m.direction), m.residual, m.excess))
     return rows
