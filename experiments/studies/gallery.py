@@ -28,10 +28,9 @@ from symrefine.errors import InputError
 from symrefine.files import replacing
 from symrefine.geometry import Array, Plane, line_angle_rad
 from symrefine.groups import PointGroup
-from symrefine.picture.camera import look_at
+from symrefine.picture.camera import FOV_RAD, look_at
 from symrefine.picture.painter import paint
 from symrefine.picture.scene import make_scene
-from symrefine.picture.space import FOV_RAD
 from symrefine.picture.surface import make_surface
 from symrefine.picture.words import symbol
 from symrefine.shape import Shape

@@ -9,6 +9,8 @@ import numpy as np
 from symrefine.geometry import Array, ReadOnly, unit
 from symrefine.picture.scene import Scene
 
+# What the height of a picture spans, and that of a page's model.
+FOV_RAD = math.radians(26.0)
 ELEVATIONS_DEG = (22, 26, 30, 34)
 AZIMUTH_STEP_DEG = 5
 # |cos| between normal and line of sight from which a plane is well seen, and where it starts to hide the rest.

@@ -8,8 +8,8 @@ from symrefine.picture.palette import Colour
 DPI = 100
 POINTS_PER_PIXEL = 72.0 / DPI
 INK, SOFT = "#14181f", "#48505e"
-# Where the title begins, in pixels from the left and from above.
-LEFT, BASE = 24, 50
+# Where the title begins, in pixels from the left and from above, and the height that is kept for it.
+LEFT, BASE, TITLE = 24, 50, 76
 
 
 class Canvas:

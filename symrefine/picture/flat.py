@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, Plane, ReadOnly
-from symrefine.picture.canvas import Canvas
+from symrefine.picture.canvas import TITLE, Canvas
 from symrefine.picture.palette import AXIS, MISS, OBJECT, Colour, plane_colour
 from symrefine.picture.words import order_name, planar_headline
 from symrefine.plane.detection import PlanarDetection
@@ -14,7 +14,7 @@ from symrefine.shape import Shape
 
 # How far lines stick out of the object, and what is free around it, in diagonals.
 MARGIN, FREE = 0.07, 0.13
-LETTER, TITLE = 24, 76
+LETTER = 24
 # Points of a cloud that are drawn, and longest side of the grid of a picture.
 MOST_POINTS, MOST_CELLS = 6000, 900
 

@@ -7,16 +7,15 @@ import numpy as np
 
 from symrefine.errors import printable
 from symrefine.geometry import Array
-from symrefine.picture.camera import look_at, seen_from
-from symrefine.picture.canvas import Canvas
+from symrefine.picture.camera import FOV_RAD, look_at, seen_from
+from symrefine.picture.canvas import TITLE, Canvas
 from symrefine.picture.painter import paint
 from symrefine.picture.pair import Pair, Side
 from symrefine.picture.palette import AXIS, CONTRADICTED, INFERRED, Colour
 from symrefine.picture.surface import Surface
 
-FOV_RAD = np.radians(26.0)
-# Height of the title and of the words below, in pixels of the finished picture; size of a letter.
-TITLE, WORDS, LETTER, LINE = 76, 104, 17, 24
+# Height of the words below, in pixels of the finished picture; size of a letter, height of a line.
+WORDS, LETTER, LINE = 104, 17, 24
 # Of a name so many letters are told, the last.
 NAME = 48
 # Width of a letter over its size, of bold ones.

@@ -6,14 +6,14 @@ import numpy as np
 
 from symrefine.geometry import Array, ReadOnly, toward_positive, unit
 from symrefine.ndim.detection import Hyperplane, SubspaceDetection
-from symrefine.picture.canvas import Canvas
+from symrefine.picture.canvas import TITLE, Canvas
 from symrefine.picture.palette import MISS, OBJECT, Colour, plane_colour
 from symrefine.picture.words import subspace_headline
 from symrefine.shape import Shape
 
 # Hyperplanes that are shown, and points of each projection.
 MOST, MOST_POINTS = 6, 3000
-LETTER, TITLE, GAP = 20, 76, 24
+LETTER, GAP = 20, 24
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

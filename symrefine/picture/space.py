@@ -6,8 +6,8 @@ import numpy as np
 
 from symrefine.detection.result import Detection
 from symrefine.geometry import Array
-from symrefine.picture.camera import Camera, look_at
-from symrefine.picture.canvas import Canvas
+from symrefine.picture.camera import FOV_RAD, Camera, look_at
+from symrefine.picture.canvas import TITLE, Canvas
 from symrefine.picture.painter import paint
 from symrefine.picture.palette import Colour
 from symrefine.picture.scene import Scene, make_scene
@@ -15,11 +15,8 @@ from symrefine.picture.surface import make_surface
 from symrefine.picture.words import headline, symbol
 from symrefine.shape import Shape
 
-FOV_RAD = np.radians(26.0)
 # Size of a letter and room for a label, in pixels of the finished picture.
 LETTER, ROOM = 21, 26
-# Height of the title.
-TITLE = 76
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

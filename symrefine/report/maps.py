@@ -10,7 +10,7 @@ import numpy as np
 
 from symrefine.align.alignment import Alignment
 from symrefine.geometry import Array
-from symrefine.picture.camera import look_at
+from symrefine.picture.camera import FOV_RAD, look_at
 from symrefine.picture.pair import MOST_WAYS, Pair, Shares, Side, Way
 from symrefine.picture.pair_png import pair_png
 from symrefine.picture.pair_words import answer, headline, named, summary
@@ -18,7 +18,7 @@ from symrefine.picture.palette import OUTLIER, plane_colour
 from symrefine.picture.words import coordinates, percent
 from symrefine.report.listing import chooser, stage
 from symrefine.report.markup import Page, copy_button, facts, head, plain, prose, rounded, section
-from symrefine.report.model import DEEPEST, FOV_RAD, MOST_MISSES, heat, outline, packed
+from symrefine.report.model import DEEPEST, MOST_MISSES, heat, outline, packed
 from symrefine.report.space import again
 
 _BUTTONS = "".join(
@@ -150,7 +150,7 @@ def _reproduce(pair: Pair, options: Mapping[str, Any]) -> str:
 def _data(pair: Pair) -> dict[str, Any]:
     """What the script draws: the target, the source, and the maps; relative to the target's centre, in diagonals."""
     scene = pair.stage(pair.ways[0].matrix, pair.ways[0].shift)
-    camera = look_at(scene, aspect=1.4, fov_rad=float(FOV_RAD))
+    camera = look_at(scene, aspect=1.4, fov_rad=FOV_RAD)
     beside = pair.beside(-camera.frame[0])
     target, source = (_body(pair, side) for side in reversed(pair.sides))
     view = (camera.eye - camera.target) / np.linalg.norm(camera.eye - camera.target)

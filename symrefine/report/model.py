@@ -9,7 +9,7 @@ import numpy as np
 
 from symrefine.detection.result import Detection
 from symrefine.geometry import Array, Isometry
-from symrefine.picture.camera import look_at
+from symrefine.picture.camera import FOV_RAD, look_at
 from symrefine.picture.palette import INFERRED, OUTLIER
 from symrefine.picture.scene import Scene
 from symrefine.picture.surface import Surface, make_surface
@@ -27,7 +27,6 @@ EDGE, EDGE_TEXTURED = 1.0 / 60.0, 1.0 / 120.0
 POSITIONS, MISSES, UNSEEN = 65535, 250, 255
 # The deepest colour stands for so many tolerances: what no symmetry may miss by anywhere, and a little more.
 DEEPEST = 2.0
-FOV_RAD = np.radians(26.0)
 # Of a palette that a byte points into.
 COLOURS = 256
 # Directions in which the outermost points are looked for.
@@ -52,7 +51,7 @@ def model(detection: Detection, shape: Shape, scene: Scene, elements: Sequence[E
     told = _told(shape, surface, parts)
     places = parts.pop("places")
     misses = _misses(detection, places + detection.center, elements)
-    camera = look_at(scene, aspect=1.4, fov_rad=float(FOV_RAD))
+    camera = look_at(scene, aspect=1.4, fov_rad=FOV_RAD)
     back = camera.eye - camera.target
     data = {
         **parts,
