@@ -24,6 +24,7 @@ from symrefine.surface.skin import FEW
 from symrefine.symmetrize.leftover import with_leftovers
 from symrefine.symmetrize.surface import Closest, closest_on
 from symrefine.threads import one_thread
+from symrefine.units import TOLERANCE
 
 # Counterparts are looked for up to so many tolerances away. Where points are many they must miss by no more than so
 # much of the usual distance between points (RMS, and the worst), and in a mesh some of whose vertices have none each by
@@ -74,7 +75,7 @@ class Symmetrized(ReadOnly):
 
 @one_thread()
 def symmetrize(
-    shape: Shape, group: PointGroup, center: Array, *, tolerance: float = 0.02, seed: int = 0
+    shape: Shape, group: PointGroup, center: Array, *, tolerance: float = TOLERANCE, seed: int = 0
 ) -> Symmetrized:
     """The symmetric shape nearest to a shape that nearly has a group about a centre.
 
