@@ -355,4 +355,4 @@ def test_a_notebook_without_its_half_of_rerun_says_what_to_install(
 ) -> None:
     monkeypatch.setattr(recording, "find_spec", lambda _: None)
     with pytest.raises(SymrefineError, match=r'pip install "symrefine\[notebook\]"'):
-        recording.show_inline(*shapeless[:2])
+        recording.recorded(*shapeless[:2]).embed()

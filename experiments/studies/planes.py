@@ -173,7 +173,7 @@ def _progress(normals: Sequence[Array], truth: Truth) -> dict[str, float | int |
 def record(case: Case, path: Path) -> None:
     """A rerun recording of our detection on this scan."""
     from symrefine.detection.story import detect
-    from symrefine.viewer.recording import record as record_detection
+    from symrefine.viewer import record as record_detection
 
     scan, _ = make(case)
     shape = Shape(points=scan.points)

@@ -2,7 +2,6 @@
 
 import sys
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 from symrefine.align.alignment import Alignment
@@ -10,10 +9,28 @@ from symrefine.detection.result import Detection
 from symrefine.picture.pair import Pair
 from symrefine.shape import Shape
 from symrefine.viewer.opening import open_recording, serve_recording
-from symrefine.viewer.pair import record_pair, show_pair_inline
-from symrefine.viewer.recording import record, show_inline
+from symrefine.viewer.pair import recorded_pair
+from symrefine.viewer.recording import Recording, recorded
 
 __all__ = ["open_recording", "record", "record_pair", "serve_recording", "show", "show_pair"]
+
+
+def record(detection: Detection, shape: Shape, path: Path | str) -> None:
+    """Write the recording of a detection and the shape that `detect` was given, as `Recording.write` does.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    recorded(detection, shape).write(Path(path))
+
+
+def record_pair(found: Alignment, pair: Pair, path: Path | str) -> None:
+    """Write the recording of an alignment, as `Recording.write` does.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    recorded_pair(found, pair).write(Path(path))
 
 
 def show(detection: Detection, shape: Shape) -> None:
@@ -22,7 +39,7 @@ def show(detection: Detection, shape: Shape) -> None:
     Raises:
         SymrefineError: the viewer does not start, or a notebook lacks its half of rerun.
     """
-    _shown("detection", lambda: show_inline(detection, shape), lambda path: record(detection, shape, path))
+    _show("detection", recorded(detection, shape))
 
 
 def show_pair(found: Alignment, pair: Pair) -> None:
@@ -31,15 +48,15 @@ def show_pair(found: Alignment, pair: Pair) -> None:
     Raises:
         SymrefineError: the viewer does not start, or a notebook lacks its half of rerun.
     """
-    _shown("alignment", lambda: show_pair_inline(found, pair), lambda path: record_pair(found, pair, path))
+    _show("alignment", recorded_pair(found, pair))
 
 
-def _shown(name: str, inline: Callable[[], None], write: Callable[[Path], None]) -> None:
+def _show(name: str, recording: Recording) -> None:
     shell = sys.modules.get("IPython")
     if shell is not None and getattr(shell.get_ipython(), "kernel", None) is not None:
-        inline()
+        recording.embed()
         return
     # The viewer reads the file after this returns; the system clears its folder of temporary files.
     path = Path(tempfile.mkdtemp(prefix="symrefine-")) / f"{name}.rrd"
-    write(path)
+    recording.write(path)
     open_recording(path)

@@ -1,12 +1,13 @@
 """How a recording looks when it opens: the shape on the left, series and texts on the right."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import rerun.blueprint as rrb
 
 from symrefine.detection.result import Detection
-from symrefine.picture.camera import look_at
+from symrefine.picture.camera import Camera, look_at
 from symrefine.picture.palette import Colour
 from symrefine.picture.scene import Scene
 
@@ -45,8 +46,13 @@ def blueprint(detection: Detection, scene: Scene, scale: float) -> Any:
     report = rrb.TextDocumentView(origin="/report", name="Report")
     log = rrb.TextLogView(origin="/log", name="Log")
     right = rrb.Vertical(report, _series(), log, row_shares=[4, 4, 2]) if refined else rrb.Vertical(report, log)
+    return framed(rrb.Tabs(*views, active_tab=0), right)
+
+
+def framed(left: Any, right: Any) -> Any:
+    """The layout with these beside one another, the story on its timeline, all panels folded away."""
     return rrb.Blueprint(
-        rrb.Horizontal(rrb.Tabs(*views, active_tab=0), right, column_shares=[3, 2]),
+        rrb.Horizontal(left, right, column_shares=[3, 2]),
         rrb.TimePanel(timeline=STORY, fps=1.0, state="collapsed", play_state="following"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
@@ -59,6 +65,17 @@ def _view(name: str, scene: Scene, scale: float, without: list[str]) -> Any:
     crowd = ("object/planes", "object/refinement/planes") if scene.crowded else ()
     hidden = ("object/near_misses", "object/cameras", *crowd)
     camera = look_at(scene, aspect=1.1, fov_rad=FOV_RAD, fill=FILL)
+    return view3d(name, camera, scale, without=without, hidden=hidden)
+
+
+def view3d(name: str, camera: Camera, scale: float, *, without: Sequence[str] = (), hidden: Sequence[str] = ()) -> Any:
+    """A 3-D view of the object as a camera sees it.
+
+    Args:
+        scale: of the transform above all positions.
+        without: rules that leave entities out.
+        hidden: entities that are off until they are switched on.
+    """
     return rrb.Spatial3DView(
         origin="/",
         name=name,

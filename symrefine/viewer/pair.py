@@ -19,10 +19,11 @@ from symrefine.picture.pair import Pair, Side
 from symrefine.picture.pair_words import headline, named, summary
 from symrefine.picture.palette import CONTRADICTED, INFERRED, Colour
 from symrefine.picture.words import percent
-from symrefine.viewer.layout import BACKGROUND, FILL, FOV_RAD, STORY
+from symrefine.viewer.layout import FILL, FOV_RAD, framed, view3d
 from symrefine.viewer.marks import bright
-from symrefine.viewer.recording import display_scale, embed, new_stream, write
-from symrefine.viewer.story import POINT
+from symrefine.viewer.recording import Recording, display_scale, new_stream
+from symrefine.viewer.story import POINT, go_to, say
+from symrefine.viewer.text import table
 
 # Steps between before and after, and points of either side.
 WAY, MOST = 6, 20_000
@@ -37,49 +38,22 @@ SERIES: dict[str, tuple[str, Colour]] = {
 _NAMES = ("source", "target")
 
 
-def record_pair(found: Alignment, pair: Pair, path: Path | str) -> None:
-    """Write a recording (`.rrd` by custom) of an alignment. Equal input gives equal content (`rerun rrd compare`).
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    write(Path(path), _stream(found, pair), _layout(pair), lambda stream: _log(stream, found, pair))
-
-
-def show_pair_inline(found: Alignment, pair: Pair) -> None:
-    """Show the recording in the notebook that runs this.
-
-    Raises:
-        SymrefineError: the notebook's half of rerun is not installed.
-    """
-    embed(_stream(found, pair), _layout(pair), lambda stream: _log(stream, found, pair))
-
-
-def _stream(found: Alignment, pair: Pair) -> Any:
+def recorded_pair(found: Alignment, pair: Pair) -> Recording:
+    """The recording of an alignment."""
     digest = hashlib.sha256()
     for side in pair.sides:
         digest.update(side.shape.points.tobytes() + side.name.encode())
     digest.update(repr((found.matrix.tolist(), found.translation.tolist(), pair.tolerance)).encode())
-    return new_stream(f"{Path(pair.source.name).stem}-onto-{Path(pair.target.name).stem}", digest.hexdigest()[:32])
+    name = f"{Path(pair.source.name).stem}-onto-{Path(pair.target.name).stem}"
+    return Recording(
+        stream=new_stream(name, digest.hexdigest()[:32]),
+        layout=_layout(pair),
+        log=lambda stream: _log(stream, found, pair),
+    )
 
 
 def _layout(pair: Pair) -> Any:
     """Both objects on the left, the page, the shares of both sides and the log on the right."""
-    scale, (camera, _) = display_scale(pair.diagonal), view(pair)
-    eye = rrb.EyeControls3D(
-        position=scale * camera.eye,
-        look_target=scale * camera.target,
-        eye_up=camera.up,
-        kind=rrb.Eye3DKind.Orbital,
-    )
-    story = rrb.Spatial3DView(
-        origin="/",
-        name="Story",
-        contents=["+ /object/**"],
-        background=BACKGROUND,
-        line_grid=False,
-        eye_controls=eye,
-    )
     series = [rrb.TimeSeriesView(origin=f"/series/{name}", name=f"What the {name} says") for name in _NAMES]
     right = rrb.Vertical(
         rrb.TextDocumentView(origin="/report", name="Report"),
@@ -87,13 +61,7 @@ def _layout(pair: Pair) -> Any:
         rrb.TextLogView(origin="/log", name="Log"),
         row_shares=[4, 4, 2],
     )
-    return rrb.Blueprint(
-        rrb.Horizontal(story, right, column_shares=[3, 2]),
-        rrb.TimePanel(timeline=STORY, fps=1.0, state="collapsed", play_state="following"),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.BlueprintPanel(state="collapsed"),
-        auto_views=False,
-    )
+    return framed(view3d("Story", view(pair)[0], display_scale(pair.diagonal)), right)
 
 
 def view(pair: Pair) -> tuple[Camera, Array]:
@@ -119,12 +87,12 @@ def _log(stream: Any, found: Alignment, pair: Pair) -> None:
     places = [_log_points(stream, pair, side) for side in pair.sides]
     beside = view(pair)[1]
     for step, share in enumerate(np.linspace(0.0, 1.0, WAY + 1)[:-1].tolist()):
-        _at(stream, step)
+        go_to(stream, step)
         _place(stream, *pair.ways[0].part(share, beside))
         if step == 0:
-            _say(stream, f"before: {pair.source.name} beside {pair.target.name}, as it came")
+            say(stream, f"before: {pair.source.name} beside {pair.target.name}, as it came")
     for index, way in enumerate(pair.ways):
-        _at(stream, WAY + index)
+        go_to(stream, WAY + index)
         _place(stream, way.matrix, way.shift)
         _judge(stream, pair, index, places)
     stream.reset_time()
@@ -135,7 +103,7 @@ def _log_points(stream: Any, pair: Pair, side: Side) -> Array:
     surface = side.surface(dense=True)
     points = surface.points if not side.atoms else side.shape.points
     points = points[:: max(1, -(-len(points) // MOST))]
-    _at(stream, 0)
+    go_to(stream, 0)
     radius = POINT * pair.diagonal * (4.0 if side.atoms else 1.0)
     stream.log(
         f"object/{_NAMES[side.index]}/points",
@@ -159,16 +127,7 @@ def _judge(stream: Any, pair: Pair, index: int, places: list[Array]) -> None:
             stream.log(f"series/{name}/{entity}", rr.Scalars([100.0 * getattr(shares, entity)]))
     what, by = named(pair.ways[index])
     one, other = pair.shares(index)
-    _say(stream, f"map {index + 1} of {pair.equivalents}: {what} {by}; source {one}; target {other}")
-
-
-def _at(stream: Any, step: int) -> None:
-    stream.reset_time()
-    stream.set_time(STORY, sequence=step)
-
-
-def _say(stream: Any, line: str) -> None:
-    stream.log("log", rr.TextLog(line, level="INFO"))
+    say(stream, f"map {index + 1} of {pair.equivalents}: {what} {by}; source {one}; target {other}")
 
 
 def markdown(found: Alignment, pair: Pair) -> str:
@@ -178,7 +137,6 @@ def markdown(found: Alignment, pair: Pair) -> str:
         [str(k + 1), " ".join(named(way)).strip(), *(percent(shares.met) for shares in pair.shares(k))]
         for k, way in enumerate(pair.ways)
     ]
-    table = "\n".join("| " + " | ".join(row) + " |" for row in [heads, ["---"] * len(heads), *rows])
     matrix = "\n".join(" ".join(f"{x + 0.0:13.8g}" for x in row) for row in pair.ways[0].transform)
     colours = (
         "Blue: the source, grey: the target, where they meet. Red: one contradicts. Green: nobody looked there. Pink: "
@@ -186,4 +144,4 @@ def markdown(found: Alignment, pair: Pair) -> str:
     )
     title = f"# {headline(found, pair)}"
     about = f"`{pair.source.name}` onto `{pair.target.name}`. {summary(found, pair)}"
-    return "\n\n".join([title, about, table, f"```\n{matrix}\n```", colours]) + "\n"
+    return "\n\n".join([title, about, table(heads, rows), f"```\n{matrix}\n```", colours]) + "\n"

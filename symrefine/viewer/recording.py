@@ -10,6 +10,7 @@ import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -33,65 +34,51 @@ from symrefine.viewer.text import markdown
 RAY: Colour = (70, 90, 80)
 
 
-def record(detection: Detection, shape: Shape, path: Path | str) -> None:
-    """Write a recording (`.rrd` by custom) of a detection and the shape that `detect` was given.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recording:
+    """What a viewer shows: a stream of rerun, how it looks when it opens, and what logs all that it holds."""
 
-    Equal input gives equal content (`rerun rrd compare`).
+    stream: Any
+    layout: Any
+    log: Callable[[Any], None]
 
-    Raises:
-        InputError: the file cannot be written.
-    """
+    def write(self, path: Path) -> None:
+        """Write it (`.rrd` by custom), whole or not at all. Equal input gives equal content (`rerun rrd compare`).
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        with whole(path) as draft, _errors_of_the_system():
+            self.stream.save(draft, default_blueprint=self.layout)
+            try:
+                self.log(self.stream)
+                self.stream.flush()
+            finally:
+                self.stream.disconnect()
+            if not draft.exists():
+                raise InputError(f"{path}: rerun wrote nothing; is the environment variable RERUN set to off?")
+
+    def embed(self) -> None:
+        """Show it in the notebook that runs this.
+
+        Raises:
+            SymrefineError: the notebook's half of rerun is not installed.
+        """
+        if find_spec("rerun_notebook") is None:
+            raise SymrefineError('a notebook shows recordings by another package: pip install "symrefine[notebook]"')
+        self.log(self.stream)
+        self.stream.flush()
+        self.stream.notebook_show(blueprint=self.layout)
+
+
+def recorded(detection: Detection, shape: Shape) -> Recording:
+    """The recording of a detection and the shape that `detect` was given."""
     scene = make_scene(detection, shape)
-    write(
-        Path(path),
-        new_stream(shape.source, _identity(detection, shape)),
-        blueprint(detection, scene, display_scale(scene.stage.diagonal)),
-        lambda stream: _log(stream, detection, shape, scene),
+    return Recording(
+        stream=new_stream(shape.source, _identity(detection, shape)),
+        layout=blueprint(detection, scene, display_scale(scene.stage.diagonal)),
+        log=lambda stream: _log(stream, detection, shape, scene),
     )
-
-
-def show_inline(detection: Detection, shape: Shape) -> None:
-    """Show the recording in the notebook that runs this.
-
-    Raises:
-        SymrefineError: the notebook's half of rerun is not installed.
-    """
-    scene = make_scene(detection, shape)
-    embed(
-        new_stream(shape.source, _identity(detection, shape)),
-        blueprint(detection, scene, display_scale(scene.stage.diagonal)),
-        lambda stream: _log(stream, detection, shape, scene),
-    )
-
-
-def write(path: Path, stream: Any, layout: Any, log: Callable[[Any], None]) -> None:
-    """Write what `log` logs to a stream, and how it looks when it opens: whole or not at all.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    with whole(path) as draft, _errors_of_the_system():
-        stream.save(draft, default_blueprint=layout)
-        try:
-            log(stream)
-            stream.flush()
-        finally:
-            stream.disconnect()
-        if not draft.exists():
-            raise InputError(f"{path}: rerun wrote nothing; is the environment variable RERUN set to off?")
-
-
-def embed(stream: Any, layout: Any, log: Callable[[Any], None]) -> None:
-    """Show what `log` logs to a stream in the notebook that runs this.
-
-    Raises:
-        SymrefineError: the notebook's half of rerun is not installed.
-    """
-    if find_spec("rerun_notebook") is None:
-        raise SymrefineError('a notebook shows recordings by another package: pip install "symrefine[notebook]"')
-    log(stream)
-    stream.flush()
-    stream.notebook_show(blueprint=layout)
 
 
 def new_stream(name: str, identity: str) -> Any:

@@ -38,22 +38,22 @@ POINT, ARROW = 0.0035, 0.42
 
 def log_story(stream: Any, detection: Detection, shape: Shape, scene: Scene) -> None:
     """Log what changes along the story, and the series of the refinement."""
-    _at(stream, BARE)
-    _say(stream, "the object")
-    _at(stream, MOMENTS)
+    go_to(stream, BARE)
+    say(stream, "the object")
+    go_to(stream, MOMENTS)
     _log_tuples(stream, detection, scene)
-    _say(stream, f"n-tuples {TUPLES[detection.tuples.kind]}")
-    _at(stream, PROPOSED)
+    say(stream, f"n-tuples {TUPLES[detection.tuples.kind]}")
+    go_to(stream, PROPOSED)
     _log_candidates(stream, detection, scene)
-    _say(stream, f"{count(len(detection.candidates), 'candidate')} proposed beside, and given up at a glance")
+    say(stream, f"{count(len(detection.candidates), 'candidate')} proposed beside, and given up at a glance")
     last = detection.history[-1].index if detection.history else 0
     if detection.history:
         _log_refinement(stream, detection, scene)
-    _at(stream, PROPOSED + 2 + last, last)
+    go_to(stream, PROPOSED + 2 + last, last)
     stream.log("object/candidates", rr.Clear(recursive=True))
     _log_found(stream, scene)
     for line in report_lines(detection, shape):
-        _say(stream, line)
+        say(stream, line)
     stream.reset_time()
     _log_series(stream, detection)
 
@@ -64,21 +64,23 @@ def _log_refinement(stream: Any, detection: Detection, scene: Scene) -> None:
     points = rr.Points3D(matched, colors=[MATCHED], radii=[0.6 * POINT * scene.stage.diagonal])
     stream.log("object/refinement/points", points, static=True)
     for before, now in zip((None, *detection.history), detection.history, strict=False):
-        _at(stream, PROPOSED + 1 + now.index, now.index)
+        go_to(stream, PROPOSED + 1 + now.index, now.index)
         stream.log("object/candidates", rr.Clear(recursive=True))
         _log_iterate(stream, detection, scene, before, now)
-    _at(stream, PROPOSED + 2 + now.index, now.index)
+    go_to(stream, PROPOSED + 2 + now.index, now.index)
     stream.log("object/refinement", rr.Clear(recursive=True))
 
 
-def _at(stream: Any, step: int, iteration: int | None = None) -> None:
+def go_to(stream: Any, step: int, iteration: int | None = None) -> None:
+    """What is logged from here on belongs to this step of the story, and to this iteration."""
     stream.reset_time()
     stream.set_time(STORY, sequence=step)
     if iteration is not None:
         stream.set_time(TIMELINE, sequence=iteration)
 
 
-def _say(stream: Any, line: str) -> None:
+def say(stream: Any, line: str) -> None:
+    """A line of the log."""
     stream.log("log", rr.TextLog(line, level="INFO"))
 
 
@@ -132,7 +134,7 @@ def _log_iterate(stream: Any, detection: Detection, scene: Scene, before: Iterat
     _log_misses(stream, detection, scene, now)
     if before is not None:
         _log_pairs(stream, detection, scene, before, now)
-    _say(stream, iteration_line(now, detection))
+    say(stream, iteration_line(now, detection))
 
 
 def _log_misses(stream: Any, detection: Detection, scene: Scene, now: Iterate) -> None:

@@ -18,11 +18,11 @@ def markdown(detection: Detection, shape: Shape) -> str:
     parts = [f"# {headline(d)}", " ".join(said for said in told if said)]
     found = [(r.name, r.kind, r.vector, *_misses(r.residual)) for r in found_rows(d)]
     if found:
-        parts.append(_table(("", "kind", "normal or direction", "mean %", "95 %"), found))
+        parts.append(table(("", "kind", "normal or direction", "mean %", "95 %"), found))
     near = [(r.name, r.kind, *_misses(r.residual), f"{r.score:.2f}") for r in near_miss_rows(d)]
     if near:
         parts.append("**Near misses** (grey, hidden until `near_misses` is switched on)")
-        parts.append(_table(("", "kind", "mean %", "95 %", "times the limit"), near))
+        parts.append(table(("", "kind", "mean %", "95 %", "times the limit"), near))
     pairs = zip(d.tuples.singular_values, d.tuples.significance, strict=True)
     sizes = ", ".join(f"{value:.2g} ({times:.1f} times its noise)" for value, times in pairs)
     meaning = f"The {len(d.vectors.vectors)} n-tuples (yellow arrows) {TUPLES[d.tuples.kind]}"
@@ -33,7 +33,8 @@ def markdown(detection: Detection, shape: Shape) -> str:
     return "\n\n".join([*parts, f"{meaning}. Singular values: {sizes}.", conventions]) + "\n"
 
 
-def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table in Markdown."""
     lines = [heads, ["---"] * len(heads), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
