@@ -13,13 +13,13 @@ if TYPE_CHECKING:
     from symrefine.errors import InputError as InputError
     from symrefine.errors import SymrefineError as SymrefineError
     from symrefine.front.aligned import Alignment as Alignment
-    from symrefine.front.beyond import SubspaceDetection as SubspaceDetection
-    from symrefine.front.completed import Completion as Completion
-    from symrefine.front.exact import Symmetrized as Symmetrized
+    from symrefine.front.derived import Completion as Completion
+    from symrefine.front.derived import Symmetrized as Symmetrized
+    from symrefine.front.elsewhere import PlanarDetection as PlanarDetection
+    from symrefine.front.elsewhere import SubspaceDetection as SubspaceDetection
     from symrefine.front.made import complete as complete
     from symrefine.front.made import export as export
     from symrefine.front.made import symmetrize as symmetrize
-    from symrefine.front.planar import PlanarDetection as PlanarDetection
     from symrefine.front.space import Detection as Detection
     from symrefine.front.verbs import align as align
     from symrefine.front.verbs import detect as detect
@@ -46,11 +46,9 @@ _HOMES = {
     "symrefine.front.verbs": ("detect", "align", "report"),
     "symrefine.front.made": ("symmetrize", "complete", "export"),
     "symrefine.front.space": ("Detection",),
-    "symrefine.front.planar": ("PlanarDetection",),
-    "symrefine.front.beyond": ("SubspaceDetection",),
+    "symrefine.front.elsewhere": ("PlanarDetection", "SubspaceDetection"),
     "symrefine.front.aligned": ("Alignment",),
-    "symrefine.front.exact": ("Symmetrized",),
-    "symrefine.front.completed": ("Completion",),
+    "symrefine.front.derived": ("Symmetrized", "Completion"),
     "symrefine.ntuples.derive": ("derive",),
     "symrefine.poses.canonicalizer": ("Canonicalizer",),
     "symrefine.poses.distance": ("symmetric_distance",),

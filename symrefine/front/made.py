@@ -17,8 +17,7 @@ from symrefine.surface.misses import TOLERANCE
 if TYPE_CHECKING:
     from symrefine.detection.measure import Outliers
     from symrefine.export.packages import Format, Package
-    from symrefine.front.completed import Completion
-    from symrefine.front.exact import Symmetrized
+    from symrefine.front.derived import Completion, Symmetrized
     from symrefine.front.space import Detection
 
 
@@ -45,7 +44,7 @@ def symmetrize(
         InputError: nothing is decided, no symmetry, no such subgroup, or what was found in another object.
         DegenerateShapeError: a few points, of which some have no counterpart.
     """
-    from symrefine.front.exact import Symmetrized
+    from symrefine.front.derived import Symmetrized
     from symrefine.symmetrize import placed_subgroup, symmetrize
 
     shape = shape_of(shape)
@@ -95,7 +94,7 @@ def complete(
             another object.
     """
     from symrefine.complete import check_scan, complete
-    from symrefine.front.completed import Completion
+    from symrefine.front.derived import Completion
     from symrefine.front.verbs import detect
 
     shape, clock = shape_of(shape, viewpoint=viewpoint), Clock()

@@ -20,8 +20,7 @@ from symrefine.surface.misses import TOLERANCE
 if TYPE_CHECKING:
     from symrefine.detection.measure import Outliers
     from symrefine.front.aligned import Alignment
-    from symrefine.front.beyond import SubspaceDetection
-    from symrefine.front.planar import PlanarDetection
+    from symrefine.front.elsewhere import PlanarDetection, SubspaceDetection
     from symrefine.front.space import Detection
     from symrefine.geometry import Array
 
@@ -98,11 +97,11 @@ def detect(
             f"{shape.source}: points have {shape.dim} coordinates; {name} for objects in space, leave them out"
         )
     if shape.dim == 2:
-        from symrefine.front.planar import PlanarDetection
+        from symrefine.front.elsewhere import PlanarDetection
         from symrefine.plane import detect_planar
 
         return PlanarDetection.of(detect_planar(shape, tolerance=used, seed=seed), shape=shape, options=options)
-    from symrefine.front.beyond import SubspaceDetection
+    from symrefine.front.elsewhere import SubspaceDetection
     from symrefine.ndim import detect_nd
 
     return SubspaceDetection.of(detect_nd(shape, tolerance=used, seed=seed), shape=shape, options=options)
