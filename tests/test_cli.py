@@ -165,9 +165,9 @@ def test_no_symmetry_is_an_answer(run: Run, data: Path) -> None:
 
 def test_files_are_written_together(run: Run, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "symrefine.viewer", viewer := ModuleType("symrefine.viewer"))
-    monkeypatch.setitem(sys.modules, "symrefine.report", report := ModuleType("symrefine.report"))
+    monkeypatch.setitem(sys.modules, "symrefine.report.page", page := ModuleType("symrefine.report.page"))
     viewer.record = lambda detection, _, path: path.write_text(detection.point_group)  # type: ignore[attr-defined]
-    report.write_html = lambda _, shape, path: path.write_text(shape.source)  # type: ignore[attr-defined]
+    page.html_page = lambda _, shape: shape.source  # type: ignore[attr-defined]
     names = {"--json": "a.json", "--bop": "b.json", "--recording": "c.rrd", "--report": "d.html"}
     options = [str(x) for option, name in names.items() for x in (option, tmp_path / name)]
     status, out, err = run("detect", data / "box.ply", *options, "--bop-id", 7, "--bop-scale", 10)
@@ -183,7 +183,7 @@ def test_files_are_written_together(run: Run, data: Path, tmp_path: Path, monkey
         raise OSError(28, "No space left on device", str(path))
 
     before = {name: (tmp_path / name).read_text() for name in names.values()}
-    report.write_html = fail  # type: ignore[attr-defined]
+    viewer.record = fail  # type: ignore[attr-defined]
     assert_refused(run("detect", data / "scalene.ply", *options), "No space left on device")
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == before
 
@@ -344,8 +344,8 @@ def test_a_full_disk_is_told_with_the_file(run: Run, data: Path, monkeypatch: py
         with whole(Path(given[-1])):
             raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(import_module("symrefine.report"), "write_html", fail)
-    assert_refused(run("detect", data / "box.ply", "--report", data / "b.html"), f"{data / 'b.html'}: cannot be writ")
+    monkeypatch.setattr(import_module("symrefine.viewer"), "record", fail)
+    assert_refused(run("detect", data / "box.ply", "--recording", data / "b.rrd"), f"{data / 'b.rrd'}: cannot be writ")
 
 
 # --- help, version, package -------------------------------------------------------------------------------------------

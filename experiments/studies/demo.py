@@ -17,7 +17,8 @@ from symrefine.files import json_text
 from symrefine.geometry import Array, Plane, line_angle_rad
 from symrefine.load import load
 from symrefine.picture.words import count, headline
-from symrefine.report import draw, write_html
+from symrefine.report import draw
+from symrefine.report.page import html_page
 from symrefine.shape import Shape
 from symrefine.viewer import record
 
@@ -112,7 +113,7 @@ def write_results(detection: Detection, shape: Shape, out: Path) -> None:
     (out / "report.json").write_text(report, encoding="utf-8")
     draw(detection, shape, out / "picture.png")
     record(detection, shape, out / "recording.rrd")
-    write_html(detection, shape, out / "report.html")
+    (out / "report.html").write_text(html_page(detection, shape), encoding="utf-8", newline="")
 
 
 def directions(out: Path) -> list[str]:

@@ -6,7 +6,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from symrefine.align.alignment import Alignment as BareAlignment
-from symrefine.files import Writer
+from symrefine.files import Writer, text_writer
 from symrefine.front import lines
 from symrefine.front.answers import Answer, Options, Pictured
 from symrefine.shape import Shape
@@ -78,9 +78,9 @@ class Alignment(Pictured, BareAlignment):
         return Pictured.kinds(self) | {".html": self._page, ".rrd": self._recording}
 
     def _page(self) -> Writer:
-        from symrefine.report import write_pair_html
+        from symrefine.report.page import pair_html
 
-        return partial(write_pair_html, self, self._pair, self.options)
+        return text_writer(pair_html(self, self._pair, self.options))
 
     def _recording(self) -> Writer:
         from symrefine.viewer import record_pair

@@ -3,7 +3,6 @@
 import base64
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
 
@@ -164,9 +163,9 @@ class Found(Pictured):
         return super().kinds() | {".html": self._page}
 
     def _page(self) -> Writer:
-        from symrefine.report import write_html
+        from symrefine.report.page import html_page
 
-        return partial(write_html, cast("BareFound", self), self.shape)
+        return text_writer(html_page(cast("BareFound", self), self.shape))
 
 
 def check_kind(path: Path) -> None:
