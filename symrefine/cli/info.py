@@ -61,18 +61,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _record(args: argparse.Namespace, shape: "Shape", found: "Survey") -> dict[str, Any]:
-    from importlib.metadata import version
-
     from symrefine.export.numbers import number, numbers
+    from symrefine.export.records import opening
     from symrefine.load import IMAGES, suffix_of
     from symrefine.survey import doubts
 
     size = float((found.high - found.low).max())
     return {
-        "schema": SCHEMA,
-        "source": shape.source,
-        "version": version("symrefine"),
-        "options": reading_options(args),
+        **opening(SCHEMA, reading_options(args), source=shape.source),
         "kind": "picture" if shape.dim == 2 and suffix_of(Path(shape.source)) in IMAGES else found.kind,
         "dimension": shape.dim,
         "points": found.points,

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from symrefine.export.numbers import matrix, number, numbers, seconds
-from symrefine.export.records import Record, opening
+from symrefine.export.records import Record, opening_of
 from symrefine.shape import Shape
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def symmetrized_record(
         load_s: seconds that reading took.
     """
     return {
-        **opening(SYMMETRIZED_SCHEMA, source, options),
+        **opening_of(SYMMETRIZED_SCHEMA, options, source),
         "found": found.point_group,
         "confidence": number(found.confidence),
         "point_group": made.group.name,
@@ -73,7 +73,7 @@ def completed_record(
     """
     d = made.detection
     return {
-        **opening(COMPLETED_SCHEMA, source, options),
+        **opening_of(COMPLETED_SCHEMA, options, source),
         "point_group": d.point_group,
         "at_least": bool(d.at_least),
         "confidence": number(d.confidence),

@@ -43,7 +43,7 @@ def detection_record(
     """
     d, scale = detection, detection.diagonal
     return {
-        **opening(SCHEMA, shape, options),
+        **opening_of(SCHEMA, options, shape),
         "classes": _classes(shape),
         **_answer(d),
         "at_least": bool(d.at_least),
@@ -135,7 +135,7 @@ def planar_record(
     d, scale, turns = detection, detection.diagonal, detection.rotation
     nowhere = {"normal": None, "offset": None}
     return {
-        **opening(PLANAR_SCHEMA, shape, options),
+        **opening_of(PLANAR_SCHEMA, options, shape),
         **_answer(d),
         "lines": [_placed(found.line, scale) | _held(found) for found in d.lines],
         "rotation": None if turns is None else {"order": _order(turns.order), **_held(turns)},
@@ -185,7 +185,7 @@ def subspace_record(
         return _placed(found.plane, d.diameter) | figures
 
     return {
-        **opening(SUBSPACE_SCHEMA, shape, options),
+        **opening_of(SUBSPACE_SCHEMA, options, shape),
         "dimension": shape.dim,
         "center": numbers(d.center, d.diameter),
         "diameter": number(d.diameter),
@@ -199,15 +199,14 @@ def subspace_record(
     }
 
 
-def opening(schema: str, shape: Shape, options: Mapping[str, Any]) -> Record:
-    """How every record of a detection begins: what it is, of what, by which version, and what was asked."""
-    return {
-        "schema": schema,
-        "source": shape.source,
-        "version": version("symrefine"),
-        "options": dict(options),
-        "measure": shape.measure,
-    }
+def opening(schema: str, options: Mapping[str, Any], **sources: str) -> Record:
+    """How every record begins: what it is, of what, by which version, and what was asked."""
+    return {"schema": schema, **sources, "version": version("symrefine"), "options": dict(options)}
+
+
+def opening_of(schema: str, options: Mapping[str, Any], shape: Shape) -> Record:
+    """How every record of one object begins, with what counts of it."""
+    return {**opening(schema, options, source=shape.source), "measure": shape.measure}
 
 
 def _answer(d: "Detection | PlanarDetection") -> Record:
@@ -239,11 +238,7 @@ def alignment_record(
     size = float(np.abs(target.points).max())
     start = time.perf_counter()
     record = {
-        "schema": ALIGNMENT_SCHEMA,
-        "source": source.source,
-        "target": target.source,
-        "version": version("symrefine"),
-        "options": dict(options),
+        **opening(ALIGNMENT_SCHEMA, options, source=source.source, target=target.source),
         "status": a.status,
         "misfit": bool(a.is_misfit),
         "confidence": number(a.confidence),
