@@ -4,9 +4,7 @@ import math
 from collections.abc import Iterable, Mapping
 
 from symrefine.geometry import Array
-
-# Digits that are kept: what lies beyond differs between processors.
-_DIGITS = 12
+from symrefine.rounding import twelve_digits
 
 
 def number(value: float, scale: float = 0.0) -> float | str | None:
@@ -16,7 +14,7 @@ def number(value: float, scale: float = 0.0) -> float | str | None:
         return None
     if math.isinf(value):
         return str(value)
-    return 0.0 if abs(value) <= 10.0**-_DIGITS * scale else float(f"{value:.{_DIGITS}g}")
+    return twelve_digits(value, scale)
 
 
 def numbers(values: Iterable[float], scale: float) -> list[float | str | None]:

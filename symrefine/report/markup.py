@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from symrefine.rounding import twelve_digits
+
 # What shows nothing of its own but acts on text: control and format characters (those that turn the direction of
 # writing among them), halves of pairs, private ones, separators of lines and paragraphs.
 _ACTING = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
-# Digits that are kept, as in the JSON report: what lies beyond differs between processors.
-_DIGITS = 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,10 +55,8 @@ def island(data: Mapping[str, Any]) -> str:
 
 
 def rounded(values: ArrayLike, scale: float = 1.0) -> Any:
-    """Numbers as nested lists, to twelve digits, 0 where they are nothing beside `scale`."""
-    array = np.asarray(values, dtype=np.float64)
-    kept = np.where(np.abs(array) <= 10.0**-_DIGITS * scale, 0.0, array)
-    return np.vectorize(lambda v: float(f"{v:.{_DIGITS}g}"), otypes=[float])(kept).tolist()
+    """Numbers as nested lists, as in the JSON report: to twelve digits, 0 where they are nothing beside `scale`."""
+    return np.vectorize(twelve_digits, otypes=[float])(values, scale).tolist()
 
 
 def prose(text: str) -> str:
