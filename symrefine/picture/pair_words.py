@@ -4,7 +4,7 @@ import math
 
 from symrefine.align.alignment import OPEN, Alignment
 from symrefine.picture.pair import Pair, Way
-from symrefine.picture.words import percent
+from symrefine.picture.words import percent, sentence
 
 
 def answer(found: Alignment, pair: Pair) -> tuple[str, str]:
@@ -27,7 +27,7 @@ def named(way: Way) -> tuple[str, str]:
 def summary(found: Alignment, pair: Pair) -> str:
     """How well the answer holds, or why there is none, as sentences."""
     if found.is_misfit or found.status.startswith(OPEN):
-        return f"{found.status[:1].upper()}{found.status[1:].rstrip('.')}."
+        return sentence(found.status)
     one, other = pair.shares(0)
     others = "" if pair.equivalents == 1 else f" It is one of {pair.equivalents} maps that do equally well."
     if len(found.coset.free):

@@ -56,6 +56,11 @@ NO_FLOOR = "no floor was found: no plane has all else to one side of it and reac
 _KINDS = {"plane": "mirror plane", "axis": "rotation", "improper": "rotoreflection", "inversion": "inversion"}
 
 
+def sentence(text: str) -> str:
+    """A message as a sentence."""
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
+
+
 def headline(detection: Detection) -> str:
     """The result in one line: the group with its meaning, or why there is none."""
     if detection.undetermined:

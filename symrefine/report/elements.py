@@ -14,7 +14,7 @@ from symrefine.picture.palette import AXIS, MISS
 from symrefine.picture.rows import Row, found_rows, near_miss_rows
 from symrefine.picture.scene import SAME_LINE_RAD, Line, Quad, Scene
 from symrefine.picture.words import body_name, length, order_name, percent
-from symrefine.report.markup import rounded
+from symrefine.report.markup import homogeneous_rows, rounded
 
 # Cosine of the angle up to which two axes are one line.
 SAME_LINE = math.cos(SAME_LINE_RAD)
@@ -77,9 +77,7 @@ class Element(ReadOnly):
         """4x4 of the operation in input units, an axis turning by the smallest angle; None for revolution."""
         if math.isinf(self.order):
             return None
-        motion = self.motion(2.0 * math.pi / max(self.order, 1.0))
-        rows = [[*rounded(m), rounded(s, diagonal)] for m, s in zip(motion.matrix, motion.shift, strict=True)]
-        return [*rows, [0.0, 0.0, 0.0, 1.0]]
+        return homogeneous_rows(self.motion(2.0 * math.pi / max(self.order, 1.0)), diagonal)
 
 
 def space_elements(detection: Detection, scene: Scene) -> list[Element]:

@@ -21,13 +21,14 @@ from symrefine.picture.words import (
     order_name,
     percent,
     planar_headline,
+    sentence,
     turns_name,
 )
 from symrefine.plane.detection import PlanarDetection
 from symrefine.plane.raster import Raster
 from symrefine.report.charts import decision_chart
 from symrefine.report.listing import Group, Heads, Row, listing, stage
-from symrefine.report.markup import Page, facts, head, plain, rounded, section, sentence, table
+from symrefine.report.markup import Page, facts, head, homogeneous_rows, plain, rounded, section, table
 from symrefine.report.space import reproduce
 from symrefine.shape import Shape
 from symrefine.surface.misses import LIMITS, Deviation
@@ -182,7 +183,6 @@ def _moved(
         c, s = math.cos(angle), math.sin(angle)
         motion = Isometry.about(middle, [[c, -s], [s, c]])
     endless = isinstance(element, float) and math.isinf(element)
-    rows = [[*rounded(m), rounded(s, d.diagonal)] for m, s in zip(motion.matrix, motion.shift, strict=True)]
     return {
         "title": title,
         "kind": "line" if isinstance(element, Plane) else "turn",
@@ -190,7 +190,7 @@ def _moved(
         "axis": rounded(axis),
         "point": np.round(point, 4).tolist(),
         "angle": rounded(angle),
-        "matrix": None if endless else [*rows, [0.0, 0.0, 1.0]],
+        "matrix": None if endless else homogeneous_rows(motion, d.diagonal),
     }
 
 

@@ -1,5 +1,6 @@
 """The stage, where the object is shown, and beside it the list of what was found: a line for each kind that opens."""
 
+import base64
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,6 +11,8 @@ from symrefine.surface.misses import Deviation
 
 # Groups of up to so many rows are open from the start, if those above them are.
 OPEN = 5
+# Size of the picture that stands in for the model, in pixels.
+WIDTH, HEIGHT = 1200, 900
 # What a bar holds, in limits.
 FULL = 1.25
 _SHOW_ALL = '<button type="button" id="clear">Show all</button>'
@@ -79,6 +82,14 @@ def stage(
         '<div class="legend"><i></i><span id="least"></span><span id="most"></span></div>'
         f'<p class="actions"><button type="button" id="copy">Copy matrix</button>{actions}</p></div></div>'
         f'<div class="list">{listed}</div></div>'
+    )
+
+
+def still(png: bytes, alt: str) -> str:
+    """A picture of the object, for where no model can turn."""
+    data = base64.b64encode(png).decode("ascii")
+    return (
+        f'<img class="still" width="{WIDTH}" height="{HEIGHT}" src="data:image/png;base64,{data}" alt="{plain(alt)}">'
     )
 
 

@@ -1,6 +1,5 @@
 """The page of an alignment: both objects before and after, what each place of either says, and the equivalent maps."""
 
-import base64
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -16,7 +15,7 @@ from symrefine.picture.pair_png import pair_png
 from symrefine.picture.pair_words import answer, headline, named, summary
 from symrefine.picture.palette import OUTLIER, plane_colour
 from symrefine.picture.words import coordinates, percent
-from symrefine.report.listing import chooser, stage
+from symrefine.report.listing import HEIGHT, WIDTH, chooser, stage, still
 from symrefine.report.markup import Page, copy_button, facts, head, plain, prose, rounded, section
 from symrefine.report.model import DEEPEST, MOST_MISSES, heat, outline, packed
 from symrefine.report.space import again
@@ -35,24 +34,19 @@ def page(found: Alignment, pair: Pair, options: Mapping[str, Any]) -> Page:
     source, target = pair.sides
     title, beside = answer(found, pair)
     listed = _list(found, pair) + _facts(found, pair)
+    alt = f"Both objects before and after. {headline(found, pair)}"
+    picture = still(pair_png(pair, "", width=WIDTH, height=HEIGHT), alt)
     return Page(
         title=f"{plain(title)} · {plain(source.name)} onto {plain(target.name)}",
         sections=(
             head(f"{source.name} onto {target.name}", title, beside, summary(found, pair)),
-            stage(_still(found, pair), _hint(found, pair), listed, way="from before to after", actions=_BUTTONS),
+            stage(picture, _hint(found, pair), listed, way="from before to after", actions=_BUTTONS),
             _matrix(found, pair),
             _reproduce(pair, options),
         ),
         data=_data(pair),
         turns=True,
     )
-
-
-def _still(found: Alignment, pair: Pair) -> str:
-    """The picture, for where no model can turn."""
-    data = base64.b64encode(pair_png(pair, "", width=1200, height=900)).decode("ascii")
-    alt = plain(f"Both objects before and after. {headline(found, pair)}")
-    return f'<img class="still" width="1200" height="900" src="data:image/png;base64,{data}" alt="{alt}">'
 
 
 def _hint(found: Alignment, pair: Pair) -> str:

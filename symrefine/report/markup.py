@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from symrefine.geometry import Isometry
 from symrefine.rounding import twelve_digits
 
 # What shows nothing of its own but acts on text: control and format characters (those that turn the direction of
@@ -59,14 +60,15 @@ def rounded(values: ArrayLike, scale: float = 1.0) -> Any:
     return np.vectorize(twelve_digits, otypes=[float])(values, scale).tolist()
 
 
+def homogeneous_rows(motion: Isometry, scale: float) -> Any:
+    """The homogeneous matrix of a motion as nested lists; a shift is 0 where it is nothing beside `scale`."""
+    rows = [[*rounded(m), rounded(s, scale)] for m, s in zip(motion.matrix, motion.shift, strict=True)]
+    return [*rows, [0.0] * len(rows) + [1.0]]
+
+
 def prose(text: str) -> str:
     """Plain text in which no line ends between a number and its percent sign."""
     return plain(text).replace(" %", "\N{NO-BREAK SPACE}%")
-
-
-def sentence(text: str) -> str:
-    """A message as a sentence."""
-    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
 
 
 def schoenflies(name: str) -> str:

@@ -2,18 +2,15 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from symrefine.geometry import Array, Isometry, toward_positive
 from symrefine.ndim.detection import Hyperplane, SubspaceDetection
-from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.picture.projections import Projection, projections
-from symrefine.picture.words import coordinates, direction, length, subspace_headline
-from symrefine.report.charts import bar_chart
-from symrefine.report.markup import Page, code, copy_button, facts, head, plain, rounded, section, sentence, table
-from symrefine.report.space import reproduce
+from symrefine.picture.words import coordinates, direction, length, sentence, subspace_headline
+from symrefine.report.markup import Page, code, copy_button, facts, head, homogeneous_rows, plain, section, table
+from symrefine.report.space import reproduce, said_first
 from symrefine.shape import Shape
 
 HALF = 200.0
@@ -23,7 +20,8 @@ def page(detection: SubspaceDetection, shape: Shape) -> Page:
     """What the page says of points in many dimensions."""
     d = detection
     name, _, means = subspace_headline(d).partition(": ")
-    every = [*d.hyperplanes, *d.rejected]
+    mirrors = [Isometry.reflection(h.plane) for h in (*d.hyperplanes, *d.rejected)]
+    matrices = [{"matrix": homogeneous_rows(mirror, d.diameter)} for mirror in mirrors]
     told, about = "Turns are not looked for in so many dimensions.", f"Symmetry of {shape.source}"
     summary = f"There may be more: {d.incomplete}. {told}" if d.incomplete else told
     return Page(
@@ -37,15 +35,8 @@ def page(detection: SubspaceDetection, shape: Shape) -> Page:
             _tuples(d),
             reproduce(d, shape),
         ),
-        data={"kind": "projected", "elements": [{"matrix": _matrix(h, d)} for h in every]},
+        data={"kind": "projected", "elements": matrices},
     )
-
-
-def _matrix(hyperplane: Hyperplane, d: SubspaceDetection) -> Any:
-    """The reflection as a matrix with one more row and column than there are dimensions."""
-    motion = Isometry.reflection(hyperplane.plane)
-    rows = [[*rounded(m), rounded(s, d.diameter)] for m, s in zip(motion.matrix, motion.shift, strict=True)]
-    return [*rows, [0.0] * len(d.center) + [1.0]]
 
 
 def _views(shown: Sequence[Projection]) -> str:
@@ -112,13 +103,8 @@ def _hyperplanes(title: str, listed: Sequence[Hyperplane], first: int, diameter:
 
 
 def _tuples(d: SubspaceDetection) -> str:
-    rows = [
-        (f"σ{k}", float(s), f"size {v:.2g}, {s:.1f} times its noise", s > SIGNIFICANT)
-        for k, (s, v) in enumerate(zip(d.fixed.significance, d.fixed.singular_values, strict=True), start=1)
-    ]
     told = (
         "Vectors made of moments (n-tuples) turn with the points, so each lies in the subspace that all symmetries "
         f"leave in place. Here they span {d.fixed.rank} of {len(d.center)} dimensions, within their noise."
     )
-    chart = bar_chart("Singular values of the n-tuples over their noise", rows, SIGNIFICANT, "significant from here")
-    return section("What the moments said first", told, chart)
+    return said_first(told, d.fixed, [str(k) for k in range(1, len(d.fixed.significance) + 1)])

@@ -1,9 +1,8 @@
 """The page of an object in space."""
 
-import base64
 import math
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.metadata import version
 from itertools import groupby
 from pathlib import Path
@@ -25,13 +24,14 @@ from symrefine.picture.words import (
     meaning,
     percent,
     scanned,
+    sentence,
     symbol,
     verdicts_told,
 )
 from symrefine.report.charts import bar_chart, decision_chart, line_chart
 from symrefine.report.elements import Element, drawn, space_elements
-from symrefine.report.listing import Group, Heads, Row, listing, stage
-from symrefine.report.markup import Page, facts, head, plain, section, sentence
+from symrefine.report.listing import HEIGHT, WIDTH, Group, Heads, Row, listing, stage, still
+from symrefine.report.markup import Page, facts, head, plain, section
 from symrefine.report.model import DEEPEST, model
 from symrefine.shape import Shape
 from symrefine.surface.misses import LIMITS
@@ -46,12 +46,13 @@ def page(detection: Detection, shape: Shape) -> Page:
     scene = make_scene(detection, shape)
     elements = space_elements(detection, scene)
     made = model(detection, shape, scene, elements)
-    picture = picture_png(detection, shape, title=False)
+    alt = f"The shape with what was found. {headline(detection)}"
+    picture = still(picture_png(detection, shape, title=False, width=WIDTH, height=HEIGHT), alt)
     return Page(
         title=f"{plain(symbol(detection.point_group))} · {plain(shape.source)}",
         sections=(
             _head(detection, shape),
-            stage(_fallback(detection, picture), _hint(detection, elements, made.told), _list(detection, elements)),
+            stage(picture, _hint(detection, elements, made.told), _list(detection, elements)),
             _facts(detection, shape),
             _decision(detection),
             _convergence(detection),
@@ -73,13 +74,6 @@ def _head(d: Detection, shape: Shape) -> str:
     if d.textured is not None:
         summary += f" With its texture it is {symbol(d.textured.point_group)}."
     return head(f"Symmetry of {shape.source}", title, below, summary, group=group)
-
-
-def _fallback(d: Detection, picture: bytes) -> str:
-    """The picture, for where no model can turn."""
-    data = base64.b64encode(picture).decode("ascii")
-    alt = plain(f"The shape with what was found. {headline(d)}")
-    return f'<img class="still" width="1200" height="900" src="data:image/png;base64,{data}" alt="{alt}">'
 
 
 def _hint(d: Detection, elements: Sequence[Element], left_out: str) -> str:
@@ -222,15 +216,20 @@ def _chart(title: str, values: Sequence[float], unit: str, name: str, *, log: bo
 
 
 def _tuples(d: Detection) -> str:
-    rows = [
-        (f"σ{'₁₂₃'[k]}", float(s), f"size {v:.2g}, {s:.1f} times its noise", s > SIGNIFICANT)
-        for k, (s, v) in enumerate(zip(d.tuples.significance, d.tuples.singular_values, strict=True))
-    ]
     told = (
         f"{len(d.vectors.vectors)} vectors made of moments (n-tuples) turn with the shape, so a symmetry leaves all of "
         f"them in place. Here they {TUPLES[d.tuples.kind]}. The bars are their singular values over the noise "
         "that sampling leaves."
     )
+    return said_first(told, d.tuples, "₁₂₃")
+
+
+def said_first(told: str, tuples: Any, marks: Iterable[str]) -> str:
+    """What the n-tuples told, in words and as bars: their singular values, each marked in its own way."""
+    rows = [
+        (f"σ{mark}", float(s), f"size {v:.2g}, {s:.1f} times its noise", s > SIGNIFICANT)
+        for mark, s, v in zip(marks, tuples.significance, tuples.singular_values, strict=False)
+    ]
     chart = bar_chart("Singular values of the n-tuples over their noise", rows, SIGNIFICANT, "significant from here")
     return section("What the moments said first", told, chart)
 
