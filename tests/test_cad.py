@@ -13,7 +13,7 @@ import trimesh
 from experiments.objects.cylinder_step import STEP
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
-from symrefine.load import load, step
+from symrefine.load import apart, load, step
 from symrefine.shape import Shape
 
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
@@ -187,7 +187,7 @@ def test_step_that_is_refused(tmp_path: Path, old: str, new: str, message: str) 
 
 @pytest.mark.usefixtures("opencascade")
 def test_a_step_file_that_never_ends_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(step, "LONGEST_S", 5.0)
+    monkeypatch.setattr(apart, "LONGEST_S", 5.0)
     message = refusal(tmp_path, STEP.replace("(20.,0.,0.)", "(nan,0.,0.)").encode(), "a.step")
     assert "cannot be made into triangles within 5 s" in message or "as OpenCASCADE says" in message
 

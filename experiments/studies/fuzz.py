@@ -28,7 +28,7 @@ from experiments.studies.fuzz_cases import TARGETS, TYPED, Case, attempt, case
 from experiments.studies.fuzz_seeds import SUFFIXES, seeds
 from experiments.studies.pages import check, put
 from symrefine.errors import InputError, SymrefineError
-from symrefine.load import scans, step
+from symrefine.load import apart
 
 # Too long for a file of a few kilobytes, in seconds of the processor, and too much.
 LONGEST_S, MOST_MIB = 5.0, 1024.0
@@ -121,7 +121,7 @@ def work(pipe: Connection, seed: int) -> None:
         os.dup2(null, number)  # native code complains there
     signal.signal(signal.SIGPROF, _over)
     # Other programs work there, and are given up by the readers themselves.
-    step.LONGEST_S = scans.LONGEST_S = LONGEST_S - 1.0
+    apart.LONGEST_S = LONGEST_S - 1.0
     with tempfile.TemporaryDirectory(prefix="fuzz-", dir=FOLDER) as name:
         folder = Path(name)
         for suffix in SUFFIXES:  # what libraries take for themselves is no case's fault

@@ -4,9 +4,6 @@ Lengths are in the unit of the file, metres as a rule; offsets and poses are app
 """
 
 import io
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +11,7 @@ import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
+from symrefine.load.apart import apart
 from symrefine.load.content import Content, Values
 from symrefine.load.extras import library
 from symrefine.load.packed import allowance, on_disk
@@ -22,7 +20,6 @@ from symrefine.shape import CAMERAS
 
 # lazrs believes every size that a compressed file tells, and where there is no memory for it, ends the process. So it
 # works in a process of its own, whose memory is bounded.
-LONGEST_S = 120.0
 _UNPACK = """
 import io, sys, laspy
 try:
@@ -61,16 +58,20 @@ def read_las(data: bytes) -> Content:
             points = np.array(cloud.xyz, dtype=np.float64)
             fields = _las_fields(cloud)
             expected = reader.header.point_count
-    except (InputError, MemoryError):
-        raise
-    except BaseException as error:
-        # What lazrs, in Rust, raises where it panics is no Exception.
-        if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
-            raise
-        raise InputError(f"not a whole LAS file: {shorten(str(error), 80)}") from None
+    except BaseException as error:  # noqa: BLE001 (raised again, as one of ours where it is no other)
+        raise las_fault(error) from None
     if len(points) != expected:
         raise InputError(f"the header declares {count(expected, 'point')}; {len(points)} are there")
     return Content(points=points, point_fields=fields)
+
+
+def las_fault(error: BaseException) -> BaseException:
+    """What laspy and lazrs raise, as one of ours; what lazrs, in Rust, raises where it panics is no Exception."""
+    if isinstance(error, InputError | MemoryError) or (
+        not isinstance(error, Exception) and type(error).__name__ != "PanicException"
+    ):
+        return error
+    return InputError(f"not a whole LAS file: {shorten(str(error), 80)}")
 
 
 def _check_records(data: bytes) -> None:
@@ -96,13 +97,7 @@ def _unpacked(data: bytes) -> bytes:
             f"the header declares {count(points, 'point')}, {needed:,} bytes once they are read; at most {most:,} of a "
             f"file of {len(data):,}"
         )
-    try:
-        done = subprocess.run(
-            [sys.executable, "-c", _UNPACK, str(2**30 + 4 * most)], input=data, capture_output=True,
-            timeout=LONGEST_S, check=False, env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
-        )  # fmt: skip
-    except subprocess.TimeoutExpired:
-        raise InputError(f"cannot be unpacked within {LONGEST_S:g} s; the file may be damaged") from None
+    done = apart(_UNPACK, data, str(2**30 + 4 * most), doing="unpacked")
     if done.returncode != 0:
         said = done.stderr.decode("utf-8", errors="replace").strip().splitlines()
         told = shorten(said[-1], 80) if said and done.returncode > 0 else "it asks for more than there is"

@@ -1,23 +1,21 @@
 """STEP, the solids of CAD, made into triangles by OpenCASCADE (cascadio); lengths are in metres, whatever the file has.
 
 OpenCASCADE says on the terminal which parts of a damaged file it leaves out, goes on, and may never end. So it works in
-a process of its own, whose every complaint is a refusal, and which is stopped after `LONGEST_S`.
+a process of its own (`apart`), whose every complaint is a refusal.
 """
 
 import re
-import subprocess
-import sys
 import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 
 from symrefine.errors import InputError
+from symrefine.load.apart import apart
 from symrefine.load.content import Content
 from symrefine.load.extras import missing
 from symrefine.load.gltf import read_glb
 from symrefine.load.text import shorten
 
-LONGEST_S = 120.0
 # Of the triangles: how far they may lie from the surface, as a share of the length of edges, and turn from one to the
 # next; both far below the misses that count as symmetric.
 _WITHIN, _TURN_RAD = 1e-3, 0.1
@@ -45,25 +43,16 @@ def read_step(data: bytes, path: Path) -> Content:
         raise InputError(f"not a STEP file: begins with {data[:13]!a}; expected {_MAGIC!a}")
     with tempfile.TemporaryDirectory(prefix="symrefine-") as folder:
         made = Path(folder, "made.glb")
-        try:
-            done = subprocess.run(
-                [sys.executable, "-c", _WORK, str(made)],
-                input=data,
-                capture_output=True,
-                timeout=LONGEST_S,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            raise InputError(f"cannot be made into triangles within {LONGEST_S:g} s; the file may be damaged") from None
-        _check_silence(done)
+        done = apart(_WORK, data, str(made), doing="made into triangles")
+        _check_silence(done.stdout + b"\n" + done.stderr)
         glb = made.read_bytes() if made.exists() else b""
     if done.returncode != 0 or not glb:
         raise InputError("OpenCASCADE found nothing in it that it could make into triangles; the file may be damaged")
     return read_glb(glb, path)
 
 
-def _check_silence(done: "subprocess.CompletedProcess[bytes]") -> None:
-    said = (done.stdout + b"\n" + done.stderr).decode("utf-8", errors="replace")
-    complaint = next((line for line in _COLOUR.sub("", said).splitlines() if _COMPLAINT.search(line)), None)
+def _check_silence(said: bytes) -> None:
+    lines = _COLOUR.sub("", said.decode("utf-8", errors="replace")).splitlines()
+    complaint = next((line for line in lines if _COMPLAINT.search(line)), None)
     if complaint is not None:
         raise InputError(f"damaged, as OpenCASCADE says: {shorten(complaint.strip(' *'), 120)}")

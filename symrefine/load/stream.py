@@ -18,7 +18,7 @@ from symrefine.load.extras import library
 from symrefine.load.packed import suffix_of
 from symrefine.load.ply_body import Values, row_type
 from symrefine.load.ply_header import parse_header
-from symrefine.load.scans import check_room
+from symrefine.load.scans import check_room, las_fault
 from symrefine.load.text import count, shorten
 from symrefine.shape import LARGEST
 from symrefine.stream import CHUNK, Stream
@@ -158,7 +158,7 @@ def _las(file: Path) -> tuple[int, _Chunks] | None:
                     some = reader.read_points(CHUNK)
                     xyz = np.column_stack([some.x, some.y, some.z]).astype(np.float64)
                 except BaseException as error:  # noqa: BLE001 (raised again, as one of ours where it is no other)
-                    raise _las_fault(error) from None
+                    raise las_fault(error) from None
                 if not len(xyz):
                     return
                 yield xyz
@@ -175,18 +175,9 @@ def _las_opened(laspy: Any, file: Path) -> Iterator[Any]:
         except OSError:
             raise
         except BaseException as error:  # noqa: BLE001 (raised again, as one of ours where it is no other)
-            raise _las_fault(error) from None
+            raise las_fault(error) from None
         with reader:
             yield reader
-
-
-def _las_fault(error: BaseException) -> BaseException:
-    """What laspy and lazrs raise, as one of ours; what lazrs, in Rust, raises where it panics is no Exception."""
-    if isinstance(error, MemoryError) or (
-        not isinstance(error, Exception) and type(error).__name__ != "PanicException"
-    ):
-        return error
-    return InputError(f"not a whole LAS file: {shorten(str(error), 80)}")
 
 
 _READERS = {".npy": _npy, ".ply": _ply, ".las": _las, ".laz": _las}
