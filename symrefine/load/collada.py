@@ -1,6 +1,5 @@
 """COLLADA, read by trimesh once nothing in it would be left out; coordinates are rounded to float32 by pycollada."""
 
-import io
 import math
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
@@ -8,7 +7,7 @@ from xml.etree import ElementTree as ET
 from symrefine.errors import InputError
 from symrefine.load.content import Content
 from symrefine.load.extras import library
-from symrefine.load.scene import flattened
+from symrefine.load.scene import flattened, opened
 from symrefine.load.text import NATURAL, is_number, shorten
 
 if TYPE_CHECKING:
@@ -37,14 +36,7 @@ def read_dae(data: bytes) -> Content:
     """
     _check_tree(_parse(data))
     library("collada", "cad")
-    import trimesh  # here, for it takes half a second
-
-    try:
-        scene = trimesh.load_scene(io.BytesIO(data), file_type="dae", ignore_broken=False, process=False)
-    except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
-        reason = str(error) or "its parts contradict one another"
-        raise InputError(f"COLLADA cannot be read: {type(error).__name__}: {shorten(reason, 80)}") from None
-    return flattened(scene)
+    return flattened(opened("COLLADA", data, "dae", ignore_broken=False))
 
 
 def _parse(data: bytes) -> "Element":

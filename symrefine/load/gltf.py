@@ -1,17 +1,16 @@
 """glTF 2.0, as .gltf with its buffers or as one .glb, read by trimesh once nothing in it would be left out."""
 
-import io
 import json
 import os
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 from urllib.parse import unquote
 
 from symrefine.errors import InputError, about
 from symrefine.files import ask, file_bytes
 from symrefine.load.content import Content
 from symrefine.load.image import LARGEST_FILE
-from symrefine.load.scene import flattened
+from symrefine.load.scene import flattened, opened
 from symrefine.load.text import shorten
 
 _MAGIC = b"glTF"
@@ -52,18 +51,7 @@ def _read(data: bytes, text: bytes, kind: str, path: Path, *, texture: bool) -> 
         ask(path.parent / name)
     if texture:
         _check_textures(tree, path.parent)
-    import trimesh  # here, for it takes half a second
-
-    try:
-        scene = trimesh.load_scene(
-            io.BytesIO(data), file_type=kind, resolver=cast("Any", _Beside(path.parent, tree)),
-            process=False, skip_materials=not texture,
-        )  # fmt: skip
-    except InputError:
-        raise
-    except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
-        reason = str(error) or "its parts contradict one another"
-        raise InputError(f"glTF cannot be read: {type(error).__name__}: {shorten(reason, 80)}") from None
+    scene = opened("glTF", data, kind, resolver=_Beside(path.parent, tree), skip_materials=not texture)
     if texture:
         _check_images(tree, scene)
     return flattened(scene, texture=texture)
@@ -98,8 +86,7 @@ def _check_tree(tree: Json) -> None:
             raise InputError(f"accessor {number} is sparse, which is not supported; save it in full")
         if not _is_whole(accessor.get("count"), 1):
             raise InputError(f"accessor {number} has count {accessor.get('count')!r}; expected a whole number from 1")
-    primitives = [p for mesh in _objects(tree, "meshes") for p in _objects(mesh, "primitives")]
-    for primitive in primitives:
+    for primitive in _primitives(tree):
         _check_primitive(primitive, tree)
 
 
@@ -184,7 +171,7 @@ def _check_textures(tree: Json, folder: Path) -> None:
                 f"material {number} places its image by other coordinates; save it with TEXCOORD_0 as it is"
             )
     accessors = _objects(tree, "accessors")
-    for primitive in (p for mesh in _objects(tree, "meshes") for p in _objects(mesh, "primitives")):
+    for primitive in _primitives(tree):
         place = primitive["attributes"].get("TEXCOORD_0")
         if isinstance(place, int) and place < len(accessors) and accessors[place].get("componentType") != _FLOAT:
             raise InputError(f"accessor {place} holds texture coordinates, but not as floats")
@@ -193,11 +180,16 @@ def _check_textures(tree: Json, folder: Path) -> None:
 def _check_images(tree: Json, scene: Any) -> None:
     """Refuse images that trimesh could not open, and left out without a word."""
     shown = [("baseColorTexture" in (m.get("pbrMetallicRoughness") or {})) for m in _objects(tree, "materials")]
-    primitives = [p for mesh in _objects(tree, "meshes") for p in _objects(mesh, "primitives")]
-    asked = sum(isinstance(m := p.get("material"), int) and m < len(shown) and shown[m] for p in primitives)
+    used = [primitive.get("material") for primitive in _primitives(tree)]
+    asked = sum(isinstance(m, int) and m < len(shown) and shown[m] for m in used)
     materials = [getattr(getattr(part, "visual", None), "material", None) for part in scene.geometry.values()]
     if sum(getattr(m, "baseColorTexture", None) is not None for m in materials) < asked:
         raise InputError("an image of its textures cannot be read; expected .png or .jpg, whole")
+
+
+def _primitives(tree: Json) -> list[Json]:
+    """What all meshes are made of."""
+    return [p for mesh in _objects(tree, "meshes") for p in _objects(mesh, "primitives")]
 
 
 def _objects(owner: Json, key: str) -> list[Json]:

@@ -1,5 +1,6 @@
 """Scenes of trimesh, as one object in one frame."""
 
+import io
 from typing import Any
 
 import numpy as np
@@ -8,8 +9,30 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.content import Content, Paint, Polygons, Values
 from symrefine.load.paint import decoded
-from symrefine.load.text import count
+from symrefine.load.text import count, shorten
 from symrefine.shape import Index
+
+
+def opened(what: str, data: bytes, kind: str, **options: Any) -> Any:
+    """A scene as trimesh reads it, its vertices as they are.
+
+    Args:
+        what: the format, as messages call it.
+        kind: the same, as trimesh calls it.
+        options: of its reader.
+
+    Raises:
+        InputError: whatever it stumbles over.
+    """
+    import trimesh  # here, for it takes half a second
+
+    try:
+        return trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False, **options)
+    except InputError:
+        raise
+    except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
+        reason = str(error) or "its parts contradict one another"
+        raise InputError(f"{what} cannot be read: {type(error).__name__}: {shorten(reason, 80)}") from None
 
 
 def flattened(scene: Any, *, texture: bool = False) -> Content:
