@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from symrefine.cli.inputs import FRAMES, STDIN, Object, expanded, loaded, objects
-from symrefine.cli.outputs import check_outputs, json_writer, shown, shown_writers, tell, write_all
+from symrefine.cli.outputs import add_outputs, check_outputs, json_writer, shown, shown_writers, tell, write_all
 from symrefine.cli.rows import MAP_HEAD, map_line
 from symrefine.cli.several import UNDETERMINED, Many, check_alone
 from symrefine.cli.signs import counting
@@ -40,14 +40,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "target", metavar="B", nargs="+", help="meshes or point clouds to move it onto, or patterns; - is stdin"
     )
     parser.add_argument("--format", metavar="SUFFIX", help="what stdin holds where A or a B is -: ply, xyz, csv, ...")
-    parser.add_argument(
-        "--json",
-        metavar="FILE|-",
-        help="write the whole result as JSON, of several B an array; - is stdout, with no table",
+    add_outputs(
+        parser,
+        json="write the whole result as JSON, of several B an array; - is stdout, with no table",
+        picture="write a picture of both before and after",
+        recording="write before, after and the equivalents, for `view`",
+        report="write a page with a model that turns",
     )
-    parser.add_argument("--picture", metavar="FILE.png", help="write a picture of both before and after")
-    parser.add_argument("--recording", metavar="FILE.rrd", help="write before, after and the equivalents, for `view`")
-    parser.add_argument("--report", metavar="FILE.html", help="write a page with a model that turns")
     parser.add_argument("--scale", action="store_true", help="let the size differ too: b = s M a + t")
     others = {"source": "there has to be one", "target": "each of them"}
     for name, letter in (("source", "A"), ("target", "B")):

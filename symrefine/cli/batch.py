@@ -9,9 +9,9 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from symrefine.cli.fleet import add_fleet_options, check_table_option, executor, write_rows
+from symrefine.cli.fleet import add_fleet_options, executor, write_rows
 from symrefine.cli.outputs import (
-    check_beside,
+    check_bop,
     check_outputs,
     complain,
     is_quiet,
@@ -136,8 +136,7 @@ def _jobs(args: argparse.Namespace) -> tuple[list["Job"], dict[str, int]]:
     outputs = {"--out": args.out, "--bop": args.bop, "--table": args.table}
     manifests = () if args.manifest is None else (args.manifest,)
     check_outputs(outputs, (Path(name) for name in chain(manifests, (source.path for source in found))))
-    check_table_option(args)
-    check_beside("--bop", args.bop, {"--bop-scale": args.bop_scale})
+    check_bop(args.bop, {"--bop-scale": args.bop_scale})
     numbers = {} if args.bop is None else _numbered(args, found)
     options = detection_options(args)
     scale = None if args.bop is None else args.bop_scale or 1.0

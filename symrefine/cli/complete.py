@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from symrefine.cli.inputs import loaded, read_scan
-from symrefine.cli.outputs import check_outputs, json_writer, note, shown, shown_writers, tell, write_all
+from symrefine.cli.outputs import add_outputs, check_outputs, json_writer, note, shown, shown_writers, tell, write_all
 from symrefine.cli.signs import waiting
 from symrefine.cli.values import add_depth_options, add_detection_options, add_path, add_scan_options, detection_options
 from symrefine.errors import InputError
@@ -21,12 +21,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_path(parser, "point cloud")
     parser.add_argument("-o", "--out", required=True, metavar="OUT", help="file to write: .ply or .npz")
-    parser.add_argument("--json", metavar="FILE|-", help="write the figures as JSON; - is stdout, with no table")
-    parser.add_argument("--picture", metavar="FILE.png", help="write a picture of the scan and what was found")
-    parser.add_argument(
-        "--report",
-        metavar="FILE.html",
-        help="write a page with a model that turns: what was seen, inferred and contradicted",
+    add_outputs(
+        parser,
+        json="write the figures as JSON; - is stdout, with no table",
+        picture="write a picture of the scan and what was found",
+        report="write a page with a model that turns: what was seen, inferred and contradicted",
     )
     add_scan_options(parser)
     add_depth_options(parser)

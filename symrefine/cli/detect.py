@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from symrefine.cli.inputs import STDIN, TEXTURE, Object, expanded, objects, scans
 from symrefine.cli.outputs import (
-    check_beside,
+    add_outputs,
+    check_bop,
     check_outputs,
     complain,
     is_quiet,
@@ -62,12 +63,11 @@ DESCRIPTION = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_path(parser, "meshes, clouds, molecules, volumes or pictures, or patterns of them", several=True)
-    parser.add_argument(
-        "--json",
-        metavar="FILE|-",
-        help="write the whole report as JSON, of several objects an array; - is stdout, with no table",
+    add_outputs(
+        parser,
+        json="write the whole report as JSON, of several objects an array; - is stdout, with no table",
+        picture="write a picture of the shape and what was found",
     )
-    parser.add_argument("--picture", metavar="FILE.png", help="write a picture of the shape and what was found")
     parser.add_argument("--bop", metavar="FILE", help="put the symmetries into this models_info.json of BOP")
     parser.add_argument("--bop-id", type=natural, metavar="N", help=f"number of the object there {NUMBERED}")
     parser.add_argument(
@@ -76,8 +76,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="X",
         help="millimetres in one unit of PATH: 1000 if it is in metres (default: 1)",
     )
-    parser.add_argument("--recording", metavar="FILE.rrd", help="write the iterations, for `symrefine view`")
-    parser.add_argument("--report", metavar="FILE.html", help="write a page with pictures and tables")
+    add_outputs(
+        parser,
+        recording="write the iterations, for `symrefine view`",
+        report="write a page with pictures and tables",
+    )
     parser.add_argument(
         "--threshold",
         type=grey,
@@ -137,7 +140,7 @@ def run(args: argparse.Namespace) -> int:
 def _check(args: argparse.Namespace, paths: Sequence[str]) -> None:
     """Refuse, before any work, outputs that cannot be written or do not fit together, and what is for one file."""
     check_outputs({"--json": args.json} | _of_one(args), [Path(path) for path in paths if path != STDIN])
-    check_beside("--bop", args.bop, {"--bop-id": args.bop_id, "--bop-scale": args.bop_scale})
+    check_bop(args.bop, {"--bop-id": args.bop_id, "--bop-scale": args.bop_scale})
     if len(paths) > 1:
         if STDIN in paths:
             raise InputError("-: stdin is one file; name no others beside it")

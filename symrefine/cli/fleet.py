@@ -4,7 +4,6 @@ import argparse
 import re
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from symrefine.cli.outputs import note, print_lines, write_all
@@ -110,18 +109,6 @@ def executor(args: argparse.Namespace) -> "Executor":
     if args.dask != LOCAL and args.workers is not None:
         raise InputError(f"--workers {args.workers}: is for this machine; --dask {args.dask} has workers of its own")
     return Dask(address=args.dask, workers=args.workers or 1, limits=limits, tell=note)
-
-
-def check_table_option(args: argparse.Namespace) -> None:
-    """Refuse, before any work, a table that cannot be written.
-
-    Raises:
-        InputError: another format.
-    """
-    if args.table is not None:
-        from symrefine.fleet.table import check_table
-
-        check_table(Path(args.table))
 
 
 def write_rows(name: str | None, rows: "Sequence[Row]") -> None:

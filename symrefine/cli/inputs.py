@@ -193,9 +193,9 @@ def scans(path: str, options: dict[str, Any], *, in_chunks: bool = False, **pict
     return Frames(found.what, len(found), lambda k: _seen(found[k], viewpoint))
 
 
-def read_scan(path: str, options: dict[str, Any], *, in_chunks: bool = False, **picture: Any) -> Any:
-    """The one shape in a file as `detection_options` say, and `picture`; with a camera, what that saw; see `scans`."""
-    frames = scans(path, options, in_chunks=in_chunks, **picture)
+def read_scan(path: str, options: dict[str, Any]) -> Any:
+    """The one shape in a file as `detection_options` say; with a camera, what that saw; see `scans`."""
+    frames = scans(path, options)
     with about(path):
         frames.check(None)
     return frames[0]

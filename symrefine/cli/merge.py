@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from symrefine.cli.fleet import add_table_option, check_table_option, table_writer, tell_table
+from symrefine.cli.fleet import add_table_option, table_writer, tell_table
 from symrefine.cli.outputs import check_outputs, print_lines, write_all
 from symrefine.errors import InputError
 from symrefine.files import check_target, naming, pieces_writer
@@ -46,8 +46,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"{args.out}: is there already; name another one with --out")
     if studies and args.table:
         raise InputError(f"--table {args.table}: is for parts of `batch`; `symrefine run` writes the table of a study")
-    check_outputs({"--table": args.table} | ({} if studies else {"--out": args.out}), files)
-    check_table_option(args)
+    check_outputs(({} if studies else {"--out": args.out}) | {"--table": args.table}, files)
     rows = merged({str(path): _rows(path, is_study=bool(studies)) for path in files})
     with naming(str(out)):
         out.parent.mkdir(exist_ok=True)

@@ -59,7 +59,11 @@ def check_outputs(outputs: dict[str, str | None], inputs: Iterable[Path]) -> Non
 
 
 def _check_name(option: str, path: Path) -> None:
-    """Refuse to write a report where an object is likely to be: `--json *.ply` names one."""
+    """Refuse a table of an unknown format, and a report where an object is likely to be: `--json *.ply` names one."""
+    if option == "--table":
+        from symrefine.fleet.table import check_table
+
+        check_table(path)
     if option not in _REPORTS:
         return
     from symrefine.load import SUFFIXES, suffix_of
@@ -80,15 +84,22 @@ def _may_be_json(path: Path) -> bool:
         return stream.read(2**10).lstrip()[:1] in (b"", b"{", b"[")
 
 
-def check_beside(option: str, name: str | None, details: dict[str, object]) -> None:
-    """Refuse details of an output that is not asked for, which would be ignored.
+def check_bop(name: str | None, details: dict[str, object]) -> None:
+    """Refuse details of an entry of BOP that is not asked for, which would be ignored.
 
     Args:
         details: option to value, None where it is not given.
     """
     given = [detail for detail, value in details.items() if value is not None]
     if name is None and given:
-        raise InputError(f"{given[0]}: says how to write {option} FILE, which is not given; add it or leave this out")
+        raise InputError(f"{given[0]}: says how to write --bop FILE, which is not given; add it or leave this out")
+
+
+def add_outputs(parser: "argparse.ArgumentParser", **told: str) -> None:
+    """Options that say where an answer goes, `json` or one of `SHOWN`, each with its help."""
+    for name, help_text in told.items():
+        kind = "FILE|-" if name == "json" else f"FILE{SHOWN[name]}"
+        parser.add_argument(f"--{name}", metavar=kind, help=help_text)
 
 
 def shown(args: "argparse.Namespace") -> dict[str, str | None]:

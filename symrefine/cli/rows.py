@@ -44,6 +44,8 @@ def row_line(name: str, row: Record) -> str:
 
 def map_line(name: str, row: Record) -> str:
     """The map onto one of many targets, or what was wrong with it; of a misfit nothing that looks like an answer."""
+    from symrefine.groups.orthogonal import turn_rad
+
     if row["error"] is not None:
         return _failed(name, row["error"])
     status, fits = row["status"], not row["misfit"]
@@ -53,7 +55,7 @@ def map_line(name: str, row: Record) -> str:
     told = (
         f"{row['confidence']:.2f}",
         f"{row['determinant']:+d}",
-        f"{math.degrees(_turn_rad(row['matrix'])):.2f}",
+        f"{math.degrees(turn_rad(row['matrix'])):.2f}",
         shift,
         percentage(row["rms"]),
         met,
@@ -62,12 +64,6 @@ def map_line(name: str, row: Record) -> str:
     shown = told if fits else ("", "", "", "", told[4], "", "")
     reason = "" if status == "ok" else f": {one_line(status)}"
     return _MAP_ROW.format(word, *shown, seconds(row), f"{one_line(name)}{reason}")
-
-
-def _turn_rad(matrix: list[list[float]]) -> float:
-    from symrefine.groups.orthogonal import turn_rad
-
-    return turn_rad(matrix)
 
 
 def _failed(name: str, error: str) -> str:

@@ -6,7 +6,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from symrefine.cli.fleet import add_fleet_options, check_table_option, executor, write_rows
+from symrefine.cli.fleet import add_fleet_options, executor, write_rows
 from symrefine.cli.outputs import check_outputs, complain, is_quiet, note, print_lines, say_lines
 from symrefine.cli.signs import progress
 from symrefine.cli.values import count
@@ -64,7 +64,6 @@ def run(args: argparse.Namespace) -> int:
         return 0
     folder = Path(args.out or plan.study.out)
     check_outputs({"--table": args.table}, [])
-    check_table_option(args)
     with naming(str(folder)):
         outcome = run_study(
             plan,

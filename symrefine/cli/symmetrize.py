@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from symrefine.cli.export import detected
-from symrefine.cli.outputs import check_outputs, json_writer, note, shown, shown_writers, tell, write_all
+from symrefine.cli.outputs import add_outputs, check_outputs, json_writer, note, shown, shown_writers, tell, write_all
 from symrefine.cli.signs import waiting
 from symrefine.cli.values import add_detection_options, add_frame_option, add_path, detection_options
 
@@ -27,12 +27,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="file to write: .ply .obj .off .stl .npz; of points also .csv .txt .xyz .pcd .npy",
     )
     parser.add_argument("--group", metavar="NAME", help="make only this subgroup of what was found exact, such as Cs")
-    parser.add_argument("--json", metavar="FILE|-", help="write the figures as JSON; - is stdout, with no table")
-    parser.add_argument("--picture", metavar="FILE.png", help="write a picture of the exact shape")
-    parser.add_argument(
-        "--report",
-        metavar="FILE.html",
-        help="write a page with a model that turns: the shape as it was, and what was found in it",
+    add_outputs(
+        parser,
+        json="write the figures as JSON; - is stdout, with no table",
+        picture="write a picture of the exact shape",
+        report="write a page with a model that turns: the shape as it was, and what was found in it",
     )
     add_frame_option(parser)
     add_detection_options(parser)
