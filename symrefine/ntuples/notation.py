@@ -9,11 +9,10 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
-from symrefine.errors import InputError
 from symrefine.geometry import Array
 
 Exponents = tuple[int, ...]
@@ -213,30 +212,6 @@ def to_json(basis: NTupleBasis) -> str:
         "note": basis.note,
     }
     return json.dumps({**head, "tuples": tuples}, separators=(",", ":")) + "\n"
-
-
-def from_json(text: str) -> NTupleBasis:
-    """The basis that `to_json` wrote.
-
-    Raises:
-        InputError: not JSON, or not of that form.
-    """
-    try:
-        data = json.loads(text)
-        return NTupleBasis(
-            dim=int(data["dim"]),
-            orders=tuple(int(p) for p in data["orders"]),
-            tuples=tuple(tuple(_component(c) for c in ntuple) for ntuple in data["tuples"]),
-            kinds=tuple(data["kinds"]),
-            det_power=int(data["det_power"]),
-            note=str(data["note"]),
-        )
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"not a JSON list of n-tuples as `to_json` writes it: {error!r}") from None
-
-
-def _component(terms: list[Any]) -> Component:
-    return tuple((int(c), tuple(tuple(int(p) for p in e) for e in monomial)) for c, monomial in terms)
 
 
 # --- LaTeX ------------------------------------------------------------------------------------------------------------

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from symrefine.errors import InputError
 from symrefine.ntuples.affine import derive_affine
-from symrefine.ntuples.notation import from_json, law, to_json, to_text
+from symrefine.ntuples.notation import law, to_json, to_text
+from tests.ntuples.test_derive import from_json
 
 CASES = [
     (2, (1,)), (2, (2, 3)), (2, (3, 4)), (2, (4, 5)), (2, (2, 2, 3)), (2, (2, 3, 4)), (2, (2, 2, 5)), (3, (2, 2, 3)),
