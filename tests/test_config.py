@@ -6,7 +6,8 @@ import pytest
 
 from experiments.studies.accuracy import DEFAULT, Config
 from symrefine.errors import InputError
-from symrefine.study.typed import read_config
+from symrefine.study.document import read_document
+from symrefine.study.typed import typed
 
 
 def edited(tmp_path: Path, old: str, new: str) -> Path:
@@ -18,7 +19,7 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
 
 
 def test_shipped_config_is_read() -> None:
-    config = read_config(DEFAULT, Config)
+    config = typed(read_document(DEFAULT), Config)
     assert config.table.points == [20000, 5000]
     assert config.table.target_deg[1] == [2 * t for t in config.table.target_deg[0]]
 
@@ -37,15 +38,15 @@ def test_shipped_config_is_read() -> None:
 )
 def test_mistakes_are_named(tmp_path: Path, old: str, new: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as caught:
-        read_config(edited(tmp_path, old, new), Config)
+        typed(read_document(edited(tmp_path, old, new)), Config)
     assert "\n" not in str(caught.value)
 
 
 def test_missing_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such config file"):
-        read_config(tmp_path / "none.yaml", Config)
+        typed(read_document(tmp_path / "none.yaml"), Config)
 
 
 def test_numbers_in_exponent_notation_are_numbers(tmp_path: Path) -> None:
-    config = read_config(edited(tmp_path, "noise_rel: [0.0, 0.01]", "noise_rel: [0, 1e-2]"), Config)
+    config = typed(read_document(edited(tmp_path, "noise_rel: [0.0, 0.01]", "noise_rel: [0, 1e-2]")), Config)
     assert config.shapes.noise_rel == [0.0, 0.01]

@@ -15,8 +15,9 @@ from symrefine.cli import invoke
 from symrefine.errors import InputError
 from symrefine.geometry import Plane, rotation
 from symrefine.study import runner
+from symrefine.study.document import read_document
 from symrefine.study.plan import make_plan
-from symrefine.study.typed import read_config
+from symrefine.study.typed import typed
 from symrefine.surface.misses import miss_distances
 
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -220,7 +221,7 @@ def test_markers_must_stand_once_and_in_order(text: str) -> None:
 
 
 def test_every_study_of_the_report_is_there() -> None:
-    config = read_config(reproduce.CONFIG, reproduce.Config)
+    config = typed(read_document(reproduce.CONFIG), reproduce.Config)
     assert set(config.fetched) < set(config.configs)
     # The cases of the others can be made only where the meshes have been fetched.
     for name in set(config.configs) - set(config.fetched):

@@ -14,7 +14,8 @@ from experiments.objects.poses import Pose
 from experiments.objects.shapes import SHAPES, mirror_normals, sample
 from experiments.studies.measure import score_planes
 from symrefine.detection.story import detect
-from symrefine.study.typed import read_config
+from symrefine.study.document import read_document
+from symrefine.study.typed import typed
 
 DEFAULT = Path(__file__).parents[2] / "configs" / "accuracy.yaml"
 
@@ -110,7 +111,7 @@ def main() -> None:
     parser.add_argument("config", nargs="?", type=Path, default=DEFAULT)
     parser.add_argument("--seeds", type=int, help="instead of the number in the config")
     options = parser.parse_args()
-    config = read_config(options.config, Config)
+    config: Config = typed(read_document(options.config), Config)
     seeds = options.seeds or config.seeds
     print_table(config.table, seeds)
     print_shapes(config.shapes, seeds)

@@ -71,9 +71,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     from symrefine.fleet.limits import one_thread_each
 
     one_thread_each()  # before anything heavy is imported
-    from symrefine.study.typed import read_config
+    from symrefine.study.document import read_document
+    from symrefine.study.typed import typed
 
-    config = read_config(options.config, Config)
+    config: Config = typed(read_document(options.config), Config)
     without = missing_models()
     parts = []
     for name in config.configs:

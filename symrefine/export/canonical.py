@@ -20,7 +20,7 @@ from symrefine.groups.standard import GOLDEN
 from symrefine.moments.quadrature import mesh_nodes
 from symrefine.shape import Shape
 
-_X, _Y, _Z = np.eye(3)
+_X, _, _Z = np.eye(3)
 _FLIP = rotation(_X, math.pi)
 # From the standard placement of I and Ih, two-fold axes on x, y, z, to a five-fold axis on z.
 _FIVE_UP = rotation(_X, math.atan2(1.0, GOLDEN))

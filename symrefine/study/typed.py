@@ -3,24 +3,13 @@
 import math
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
-from pathlib import Path
 from types import NoneType, UnionType
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, get_args, get_origin, get_type_hints
 
 from symrefine.errors import meant
-from symrefine.study.document import Node, read_document
+from symrefine.study.document import Node
 
-T = TypeVar("T")
 Scalar = int | float | str | bool
-
-
-def read_config(path: Path, kind: type[T]) -> T:
-    """The config in a YAML file as an instance of the dataclass `kind`.
-
-    Raises:
-        InputError: no such file, not YAML, an unknown or a missing key, a value of the wrong type.
-    """
-    return typed(read_document(path), kind)
 
 
 def typed(node: Node, kind: Any) -> Any:
