@@ -28,6 +28,8 @@ MARK = 0.05
 MAX_MARKS = 3
 # Planes without an axis in common that can be seen at once.
 MOST_SHEETS = 8
+# Points that a shape is known by in a scene, about.
+MOST_POINTS = 20_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -217,10 +219,10 @@ def _scan(detection: Detection, shape: Shape) -> Scan:
     )
 
 
-def make_stage(detection: Detection, shape: Shape, most: int = 20000) -> Stage:
-    """Where the shape stands: up to `most` of its points, outliers left out, and a frame with the main axis upright."""
+def make_stage(detection: Detection, shape: Shape) -> Stage:
+    """Where the shape stands: some of its points, outliers left out, and a frame with the main axis upright."""
     own = np.delete(shape.points, detection.outliers, axis=0)
-    relative: Array = own[:: max(1, len(own) // most)] - detection.center
+    relative: Array = own[:: max(1, len(own) // MOST_POINTS)] - detection.center
     if shape.faces is None:
         relative = main_part(relative)
     diagonal = detection.diagonal or float(np.linalg.norm(np.ptp(relative, axis=0)))

@@ -61,18 +61,18 @@ def verdict_rows(verdicts: Sequence[Verdict]) -> list[Row]:
     ]
 
 
-def claims_table(verdicts: Sequence[Verdict], *, source: bool = True) -> str:
+def claims_table(verdicts: Sequence[Verdict]) -> str:
     """A Markdown table: the claim, the paper's figure, ours, those of others, and whether ours holds."""
     peers = list({name: None for v in verdicts for name in v.peers})
-    head = ["claim", *(["where"] if source else []), "paper", "ours", *peers, *(["as expected"] if source else [])]
-    return grid(head, [_line(v, peers, source=source) for v in verdicts])
+    head = ["claim", "where", "paper", "ours", *peers, "as expected"]
+    return grid(head, [_line(v, peers) for v in verdicts])
 
 
-def _line(verdict: Verdict, peers: Sequence[str], *, source: bool) -> list[str]:
+def _line(verdict: Verdict, peers: Sequence[str]) -> list[str]:
     claim = verdict.claim
     figures = [verdict.peers[name].text if name in verdict.peers else "" for name in peers]
     word = "" if verdict.met is None else f"{'yes' if verdict.met else '**no**'} ({verdict.expected})"
     unit = f" {claim.unit}" if claim.unit else ""
     shown = [text + unit if text not in ("", EMPTY) else text for text in (verdict.ours.text, *figures)]
     paper = claim.paper if isinstance(claim.paper, str) else short(claim.paper) + unit
-    return [claim.claim, *([claim.source] if source else []), paper, *shown, *([word] if source else [])]
+    return [claim.claim, claim.source, paper, *shown, word]
