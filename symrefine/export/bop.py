@@ -157,7 +157,7 @@ def number_of(name: str) -> int | None:
     return int(match[1]) if match else None
 
 
-def number_for(source: str, asked: int | None = None) -> int:
+def number_for(source: str, asked: int | None) -> int:
     """The number of the object in a file: what is asked for, or that of its name as BOP gives them, or 1."""
     from symrefine.load import stem_of
 
@@ -165,7 +165,7 @@ def number_for(source: str, asked: int | None = None) -> int:
     return 1 if found is None else found
 
 
-def models_of(folder: Path, known: Mapping[str, int] | None = None) -> tuple[dict[int, Path], bool]:
+def models_of(folder: Path, known: Mapping[str, int]) -> tuple[dict[int, Path], bool]:
     """The models of a folder by their number, and whether their names tell it.
 
     Where a name is as BOP gives them, object 1 is obj_000001.ply, the numbers are theirs, and what else is there stays.
@@ -189,10 +189,9 @@ def models_of(folder: Path, known: Mapping[str, int] | None = None) -> tuple[dic
     if is_told := bool(numbers):
         paths = list(numbers)
     else:
-        had = known or {}
-        numbers = {path: had[path.name] for path in paths if path.name in had}
+        numbers = {path: known[path.name] for path in paths if path.name in known}
         new = (path for path in paths if path not in numbers)
-        numbers |= {path: number for number, path in enumerate(new, max(had.values(), default=0) + 1)}
+        numbers |= {path: number for number, path in enumerate(new, max(known.values(), default=0) + 1)}
     models: dict[int, Path] = {}
     for path in paths:
         other = models.setdefault(numbers[path], path)

@@ -32,7 +32,7 @@ _GROUPS = ("_symmetry_space_group_name_H-M", "_space_group_name_H-M_alt", "_spac
 _Table = dict[str, list[str]]
 
 
-def read_cif(data: bytes, named: Collection[str] = ()) -> Frames[Content]:
+def read_cif(data: bytes, named: Collection[str]) -> Frames[Content]:
     """Atoms of each model of each block, counted through; elements are labels.
 
     Args:

@@ -39,7 +39,7 @@ def read_glb(data: bytes, path: Path, *, texture: bool = False) -> Content:
     return _read(data, data[20 : 20 + json_length], "glb", path, texture=texture)
 
 
-def read_gltf(data: bytes, path: Path, *, texture: bool = False) -> Content:
+def read_gltf(data: bytes, path: Path, *, texture: bool) -> Content:
     """Content of a .gltf file: the default scene, every node in its place; buffers and images are found beside it."""
     return _read(data, data, "gltf", path, texture=texture)
 

@@ -19,7 +19,7 @@ _IGNORED = frozenset("vt o g s usemap mtllib lod".split())
 _CORNERS = re.compile(r"(\s+[+-]?[0-9]{1,18}(/[+-]?[0-9]*){0,2})+")
 
 
-def read_obj(data: bytes, path: Path | None = None) -> Content:
+def read_obj(data: bytes, path: Path | None) -> Content:
     """Content of an OBJ file.
 
     Fields are `color`, behind the coordinates of the points, and `material`, the name after `usemtl` for each face.

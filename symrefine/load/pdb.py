@@ -21,7 +21,7 @@ _DECIMAL = re.compile(r" *-?[0-9]+\.[0-9]{3}")
 _COORDINATES = {"x": slice(30, 38), "y": slice(38, 46), "z": slice(46, 54)}
 
 
-def read_pdb(data: bytes, named: Collection[str] = ()) -> Frames[Content]:
+def read_pdb(data: bytes, named: Collection[str]) -> Frames[Content]:
     """Atoms of each model; elements are labels, and chain, residue, name and occupancy can be.
 
     Args:

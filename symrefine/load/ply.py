@@ -20,7 +20,7 @@ _TEXTURE = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _PLACE = frozenset({*_COORDINATES, *_NORMAL})
 
 
-def read_ply(data: bytes, path: Path | None = None) -> Content:
+def read_ply(data: bytes, path: Path | None) -> Content:
     """Content of a PLY file; edges and camera data are not part of a shape.
 
     Fields are the properties of vertices and faces that are no coordinates, normals or lists, and `color` for red,

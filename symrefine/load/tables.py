@@ -56,7 +56,7 @@ def _cloud(lines: list[Line]) -> Content:
     return Content(points=table[:, :3], normals=normals, point_lines=[number for number, _ in lines])
 
 
-def read_table(data: bytes, named: Collection[str] = ()) -> Content:
+def read_table(data: bytes, named: Collection[str]) -> Content:
     """Points of n-space, one a line, between semicolons, commas, tabs or white space, as the first line has them.
 
     `#` begins a remark. Between semicolons decimals may have a comma. A first line of names may say which columns are
@@ -145,7 +145,7 @@ def read_npy(data: bytes) -> Content:
     return Content(points=points)
 
 
-def read_npz(data: bytes, named: Collection[str] = ()) -> Content:
+def read_npz(data: bytes, named: Collection[str]) -> Content:
     """Arrays named as the fields of a shape: points, and normals, weights or faces [F, 3] if there are any.
 
     Args:

@@ -92,8 +92,8 @@ def with_points(lines: Sequence[Line]) -> list[Line]:
 def parse_table(
     lines: Sequence[Line],
     *,
-    columns: Collection[int] = (),
-    layout: str = "one row of numbers a line",
+    columns: Collection[int],
+    layout: str,
     delimiter: str | None = None,
 ) -> Array:
     """Rows of numbers as [N, n] float64, each as precise as it is written.

@@ -61,7 +61,7 @@ def look_at(scene: Scene, *, aspect: float, fov_rad: float, fill: float = 0.92) 
     return seen_from(back, points, scene.stage.frame[2], aspect=aspect, fov_rad=fov_rad, fill=fill)
 
 
-def seen_from(back: Array, points: Array, up: Array, *, aspect: float, fov_rad: float, fill: float = 0.92) -> Camera:
+def seen_from(back: Array, points: Array, up: Array, *, aspect: float, fov_rad: float, fill: float) -> Camera:
     """Camera in the direction `back` [3] from points [N, 3], all of which it has in view; the rest as of `look_at`."""
     frame = _frame(back, up)
     corners = points @ frame.T

@@ -50,7 +50,7 @@ class Line(ReadOnly):
     name: str
     colour: Colour
     order: float
-    mark: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    mark: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
