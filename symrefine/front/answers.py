@@ -83,10 +83,12 @@ class Answer:
         """
         path = Path(path)
         with about(str(path)):
-            write = self.writer(path.suffix.lower())
+            make = self._maker(path.suffix.lower())
         check_target(path)
         for name in self._read():
             check_other(path, name)
+        with about(str(path)):
+            write = make()  # pages and pictures take a while, so after all that may be refused
         write_all({str(path): write})
 
     def _read(self) -> tuple[str, ...]:
@@ -99,13 +101,17 @@ class Answer:
         Raises:
             InputError: a kind of file that there is not for this kind of answer.
         """
+        return self._maker(suffix)()
+
+    def _maker(self, suffix: str) -> Callable[[], Writer]:
+        """What makes such a writer."""
         kinds = self.kinds()
         if suffix not in kinds:
             raise InputError(
                 f"a {type(self).__name__} cannot be written as {suffix or 'a file without suffix'}; expected a name "
                 f"that ends in {', '.join(kinds)}"
             )
-        return kinds[suffix]()
+        return kinds[suffix]
 
     def kinds(self) -> dict[str, Callable[[], Writer]]:
         """What makes the writer of each kind of file that there is, by its suffix."""
