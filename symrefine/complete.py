@@ -9,9 +9,9 @@ from symrefine.detection.measure import Outliers, is_few
 from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
-from symrefine.fit.finite import TURNS
 from symrefine.fit.placed import Placed
 from symrefine.geometry import Array
+from symrefine.groups.names import TURNS
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.tree import Tree

@@ -14,6 +14,8 @@ Measure = Literal["points", "surface", "solid"]
 Index = NDArray[np.integer[Any]]
 # Views of an object that are told apart.
 CAMERAS = 64
+# Masses of atoms that differ by more than this fraction are masses of different kinds.
+SAME_MASS = 0.01
 # Squares of areas between such points are still numbers; no unit of length asks for more.
 LARGEST = 1e60
 

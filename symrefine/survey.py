@@ -186,7 +186,7 @@ def _cloud(shape: Shape) -> Cloud:
         floor=points_of_floor(shape),
         parts=count_parts(kept, np.random.default_rng(0)),
         even=found.shares is None,
-        volume=found.solid and fills_volume(kept, Tree(kept), np.random.default_rng(0)),
+        volume=found.solid and fills_volume(kept, Tree(kept)),
     )
 
 

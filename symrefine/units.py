@@ -14,7 +14,7 @@ METRES: Mapping[str, float] = {
     "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "A": 1e-10, "in": 0.0254,
 }  # fmt: skip
 # Millimetres in one unit of a file, at least and at most: beyond what anybody measures, and far from overflow.
-LEAST_MM, MOST_MM = 1e-12, 1e12
+SCALES_MM = (1e-12, 1e12)
 # What a length in units of the file is written with, whatever these are.
 OF_FILE = "u"
 # Things that people scan, model and grasp measure 5 mm to 5 m: as numbers, millimetres and metres do not overlap.
@@ -29,10 +29,10 @@ def check_scale(scale: float) -> None:
     Raises:
         InputError: it is not positive, or far from all that there is.
     """
-    if not LEAST_MM <= scale <= MOST_MM:
+    if not SCALES_MM[0] <= scale <= SCALES_MM[1]:
         raise InputError(
-            f"scale is {scale}; expected millimetres in one unit of the file, such as 1 or 1000, from {LEAST_MM:g} to "
-            f"{MOST_MM:g}"
+            f"scale is {scale}; expected millimetres in one unit of the file, such as 1 or 1000, from "
+            f"{SCALES_MM[0]:g} to {SCALES_MM[1]:g}"
         )
 
 

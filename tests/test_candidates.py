@@ -18,7 +18,7 @@ from symrefine.moments.moments import central_moments
 from symrefine.ntuples.contract import ntuples
 from symrefine.ntuples.rank import fixed_subspace
 from symrefine.propose.candidates import (
-    APART_RAD,
+    START_ERROR,
     Evidence,
     about,
     apart,
@@ -107,7 +107,7 @@ def test_proposals_stand_about_the_centroid_and_start_with_the_likeliest_axes(na
     principal = np.linalg.eigh(seen(name, 0)[0].moments.covariance)[1].T
     likeliest = [seen(name, 0)[0].tuples.directions[0], *principal]
     assert line_angle_rad(first[0], likeliest[0]) < 1e-9
-    assert all(min(line_angle_rad(d, u) for u in first) <= APART_RAD + 1e-12 for d in likeliest)
+    assert all(min(line_angle_rad(d, u) for u in first) <= START_ERROR + 1e-12 for d in likeliest)
 
 
 @pytest.mark.parametrize("name", OBJECTS)
@@ -134,8 +134,8 @@ def test_directions_apart_keep_the_first_of_each():
     assert len(kept) <= 60
     assert np.array_equal(kept[0], directions[0])
     for i, a in enumerate(kept):
-        assert all(line_angle_rad(a, b) >= APART_RAD - 1e-12 for b in kept[:i])
-    assert all(min(line_angle_rad(d, k) for k in kept) <= APART_RAD for d in directions)
+        assert all(line_angle_rad(a, b) >= START_ERROR - 1e-12 for b in kept[:i])
+    assert all(min(line_angle_rad(d, k) for k in kept) <= START_ERROR for d in directions)
     assert apart(kept)[-1] is kept[-1]
 
 

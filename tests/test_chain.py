@@ -17,7 +17,6 @@ from experiments.studies import groups
 from experiments.studies.boundary import Case, look
 from symrefine.decide.chain import _best, _excluded, _holding, _told_apart, _with, chain, explore
 from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted
-from symrefine.decide.looks import START_ERROR
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import Link, decide
 from symrefine.detection.measure import gather, measure
@@ -25,6 +24,7 @@ from symrefine.detection.story import detect
 from symrefine.fit.placed import Placed, joined
 from symrefine.geometry import frame_with_z, line_angle_rad, random_orthogonal, rotation
 from symrefine.groups import is_subgroup, point_group
+from symrefine.propose.candidates import START_ERROR
 from symrefine.shape import Shape
 from symrefine.surface.misses import LIMITS
 

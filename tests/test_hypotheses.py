@@ -10,11 +10,12 @@ from hypothesis import strategies as st
 
 from experiments.objects.shapes import bottle, box, join, mug, sample, stool, table
 from symrefine.decide.hypotheses import NOTHING, Element, Hypothesis, fitted, single
-from symrefine.decide.looks import START_ERROR, glances, looked_at
+from symrefine.decide.looks import glances, looked_at
 from symrefine.fit.placed import Placed, elements, joined
 from symrefine.geometry import frame_with_z, line_angle_rad, random_orthogonal, rotation, tight_diagonal, unit
 from symrefine.groups import close, is_subgroup, point_group
 from symrefine.moments.moments import shape_moments
+from symrefine.propose.candidates import START_ERROR
 from symrefine.surface.misses import TOLERANCE, Deviation, noise_distances
 from symrefine.surface.skin import isolated_points, local_planes
 from symrefine.surface.surface import Coverage, Surface

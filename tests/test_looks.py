@@ -10,12 +10,14 @@ import pytest
 from experiments.objects import damage
 from experiments.objects.shapes import box, join, mug, sample, table
 from symrefine.decide import chain, looks
-from symrefine.decide.looks import ASIDE, LOOK, SHORT, START_ERROR, glances, looked_at, start_error
+from symrefine.decide.looks import ASIDE, glances, looked_at, start_error
 from symrefine.detection.measure import gather, measure
 from symrefine.fit.placed import Placed
-from symrefine.fit.refine import refine
+from symrefine.fit.refine import SHORT, refine
 from symrefine.geometry import Axis, Isometry, frame_with_z, random_orthogonal
 from symrefine.groups import PointGroup
+from symrefine.propose.candidates import START_ERROR
+from symrefine.samples import LOOK
 from symrefine.shape import Shape
 from symrefine.surface.clumps import Clump
 from symrefine.surface.openings import Openings
@@ -106,13 +108,16 @@ def test_what_asks_to_believe_in_as_much_as_was_seen_is_not_slid(monkeypatch):
     assert look.needs == as_told(surface, look.placed, LOOK)[1] > 0.5 * surface.tolerance
 
 
-def test_what_is_missed_by_more_than_it_may_be_off_ends_early():
+def test_what_is_missed_by_more_than_it_may_be_off_ends_early(monkeypatch):
     """Misses end where hardly any candidate is worth more, so that a handle on one side needs little less than fits."""
     surface, center = surface_of("mug")
     across = Placed(group=PointGroup(name="Cs", frame=frame_with_z(np.eye(3)[0])), center=center)
-    whole, early = (looked_at(surface, across, np.inf, useful=most) for most in (np.inf, 1.5 * surface.tolerance))
-    assert len(early.history) == SHORT + 1 < len(whole.history)
-    assert whole.needs > 1.5 * surface.tolerance
+    steps: list[int] = []
+    monkeypatch.setattr(looks, "refine", lambda *args, **given: (steps.append(1) or i for i in refine(*args, **given)))
+    looked_at(surface, across, np.inf, useful=1.5 * surface.tolerance)
+    assert len(steps) == SHORT + 1
+    assert looked_at(surface, across, np.inf).needs > 1.5 * surface.tolerance
+    assert len(steps) > 2 * (SHORT + 1)
 
 
 @pytest.mark.parametrize("evident", [False, True])

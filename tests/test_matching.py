@@ -405,7 +405,7 @@ def test_points_of_a_volume_are_told_from_those_of_a_surface(make, filled):
     """Under noise of a spacing and more only wide neighbourhoods tell."""
     for seed in (1, 2):
         points = normalised(make(np.random.default_rng(seed)))
-        assert fills_volume(points, Tree(points), np.random.default_rng(seed)) == filled
+        assert fills_volume(points, Tree(points)) == filled
 
 
 # Classes and weights

@@ -11,36 +11,29 @@ from functools import cached_property
 
 import numpy as np
 
-from symrefine.align.polish import Polished, Similarity, polish
+from symrefine.align.polish import COARSE, Polished, Similarity, polish
 from symrefine.align.shown import Shown
 from symrefine.decide.maps import Merit, ahead, as_good, score, well_met
 from symrefine.decide.posterior import LEAST
 from symrefine.fit.matching import AGREE
 from symrefine.fit.refine import MAX_OUTER
 from symrefine.geometry import Array, Isometry, Mask, householder
-from symrefine.groups.orthogonal import chord_angles
 from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.propose.maps import WITHIN, maps_between, maps_onto_itself
 from symrefine.propose.votes import mirror_votes
+from symrefine.samples import FOLLOWED
 from symrefine.shape import Index
 from symrefine.surface.misses import LIMITS, disc_distances
 from symrefine.surface.surface import HOPELESS
 
-# One in so many local planes is asked by the looks at maps that are proposed, or polished.
-LOOK = 3
-# Maps of each determinant that are polished, if they meet at least such a share of what the best does.
-POLISHED, WORTH = 4, 0.5
-# Maps nearer than this, radians and diagonals, are one.
-APART = (0.17, 0.04)
+# Share of what meets under the best map that has to meet under one that is polished.
+WORTH = 0.5
 # Maps that are looked at where many do as well: as many as the rotations of a cube, and their images, would be 48.
 MOST_MAPS = 16
-# Local planes that vote for the mirrors of what meets under a map, and of either side, and how many of the densest
-# spots are looked at. Mirrors of whole chairs and beds are among the first four; 300 planes do not tell them.
-VOTERS, MIRRORS = 500, 12
+# Densest spots of votes for mirrors that are looked at. Mirrors of whole chairs and beds are among the first four.
+MIRRORS = 12
 # Share of what meets that has to meet in a mirror, as it was voted for, lest the polish is wasted.
 ITS_OWN = 0.8
-# A turn and a shift so small that what they do to points is linear in them.
-SMALL = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -115,11 +108,11 @@ class Judge:
         count = [int(self.meets(m).sum()) for m in every]
         order = [i for i in np.argsort(-np.array(count), kind="stable") if count[i] >= max(WORTH * max(count), 1.0)]
         signs = [float(np.sign(np.linalg.det(every[i].matrix))) for i in order]
-        return [every[i] for k, i in enumerate(order) if signs[:k].count(signs[k]) < POLISHED]
+        return [every[i] for k, i in enumerate(order) if signs[:k].count(signs[k]) < FOLLOWED]
 
     def meets(self, motion: Similarity) -> Mask:
         """Which of every so many local planes of the source meet others of the target, as they stand."""
-        every = slice(None, None, LOOK)
+        every = slice(None, None, COARSE)
         some, classes = self.source.cloud.chosen(every), self.source.cloud.classes(every)
         away, met = self.target.cloud.met_by(motion.apply(some.points), classes)
         facing = np.abs(np.einsum("ij,ij->i", motion.turn(some.normals), met.normals)) > AGREE
@@ -136,7 +129,7 @@ class Judge:
         Of many equal matches few agree on any one map, so that others as good need not be among those proposed.
         """
         meets, motion = self.meets(best.motion), best.motion
-        some = self.source.cloud.chosen(slice(None, None, LOOK)).chosen(meets)
+        some = self.source.cloud.chosen(slice(None, None, COARSE)).chosen(meets)
         planes = _mirrors(motion.apply(some.points), motion.turn(some.normals))
         return [s for s in (p.after(motion) for p in planes) if self.meets(s).sum() >= ITS_OWN * meets.sum()]
 
@@ -203,7 +196,7 @@ class Judge:
 
     def within_reach(self, motion: Similarity) -> float:
         """What a map scores at best, as every so many local planes tell it: nobody looked where nothing is met."""
-        every, found = slice(None, None, LOOK), []
+        every, found = slice(None, None, COARSE), []
         ways = (self.source, self.target, motion), (self.target, self.source, motion.inverse)
         for here, there, way in ways:
             misses = self.misses(there, way.apply(here.cloud.points[every]), here.cloud.classes(every))
@@ -229,9 +222,9 @@ class Judge:
         The score is the bound `within_reach` where that leaves less doubt than is worth telling.
         """
         worst = np.linalg.eigh(met.covariance)[1][:, -1]
-        points = self.source.moving.points
-        travel = np.linalg.norm(met.motion.moved(SMALL * worst).apply(points) - met.motion.apply(points), axis=1).mean()
-        step = SMALL * APART[1] * self.diagonal / travel * worst
+        arms = met.motion.turn(self.source.moving.points)
+        travel = np.linalg.norm(np.cross(worst[:3], arms) + worst[3:], axis=1).mean()
+        step = WITHIN * self.diagonal / travel * worst
         moved = [met.motion.moved(x) for x in (step, -step)]
         scores = [self.within_reach(m) for m in moved]
         if ahead(met.score, scores) <= 1.0 - LEAST:
@@ -281,8 +274,9 @@ class Judge:
 
     def same(self, one: Similarity, other: Similarity) -> bool:
         """Whether two maps are one."""
-        turned = float(chord_angles(one.matrix, other.matrix))
-        return turned < APART[0] and float(np.linalg.norm(one.shift - other.shift)) < APART[1] * self.diagonal
+        points = self.source.cloud.points[::COARSE]
+        away = np.linalg.norm(one.apply(points) - other.apply(points), axis=1)
+        return float(away.mean()) < WITHIN * self.diagonal
 
     def closed(self, found: Sequence[Met], best: Met) -> list[Met]:
         """With the maps that what leads from the best to another as good makes of those as good, until none is new.
@@ -304,8 +298,5 @@ class Judge:
 
 def _mirrors(points: Array, normals: Array) -> list[Similarity]:
     """The mirrors that local planes [N, 3] vote for; none where there are too few of them."""
-    if len(points) < VOTERS // 10:
-        return []
-    some = slice(None, None, -(-len(points) // VOTERS))
-    votes = mirror_votes(points[some], normals[some], np.random.default_rng(0), told=MIRRORS)
+    votes = mirror_votes(points, normals, np.random.default_rng(0), told=MIRRORS)
     return [Similarity.of(Isometry.about(v.foot, householder(v.direction))) for v in votes]

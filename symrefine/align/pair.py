@@ -16,6 +16,7 @@ from symrefine.moments.moments import Moments, central_moments
 from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import ntuples
 from symrefine.propose.folds import azimuthal_spectrum
+from symrefine.samples import COUNT, LOOK
 from symrefine.shape import Shape
 from symrefine.surface.misses import disc_distances, needs
 from symrefine.surface.neighbourhoods import NEIGHBOURS
@@ -23,14 +24,8 @@ from symrefine.surface.sampling import Sampling, sampling
 from symrefine.surface.skin import FEW, LocalPlanes, Patches, Skin, isolated_points, make_skin
 from symrefine.surface.surface import Surface
 
-# Local planes of the source that the polish moves: with so many the median error of 120 pairs is .010 degrees, with 800
-# .009, with 1,200 .008. Those that are judged, and those of the target that judge them.
-MOVED, SOURCE_PLANES, TARGET_PLANES = 600, 800, 2000
 # Flatness of thin sheets and edges without noise (0.13 at most at the lower quartile); noise of 0.2 % makes it 0.17.
 THIN = 0.15
-
-# Points that tell whether a side has strays or is uneven; of 2,000 a cloud of 40 % strays may look like a volume.
-ASKED = 3000
 # Spacings that a plane reaches.
 REACH = 3.0
 
@@ -54,7 +49,7 @@ class Side:
         """Which of the points of a cloud belong to a surface, and how evenly these were sampled."""
         if self.known is not None:
             return self.known
-        return sampling(self.shape.points, np.random.default_rng(0), outliers=True, groups=False, asked=ASKED)
+        return sampling(self.shape.points, np.random.default_rng(0), outliers=True, groups=False)
 
     def evened(self) -> "Side":
         """The same cloud, each point weighted by the area its neighbours leave it, unless the weights are given."""
@@ -151,13 +146,8 @@ class Evidence:
 
     @cached_property
     def moving(self) -> Patches:
-        """Local planes of the source that are polished, or its points where they stand for themselves."""
-        return self._planes(0, MOVED)
-
-    @cached_property
-    def _judged(self) -> LocalPlanes:
-        """Local planes of the source that are judged, or its points where they stand for themselves."""
-        return self._planes(0, SOURCE_PLANES).surface
+        """Local planes of the source that are polished and judged, or its points where they stand for themselves."""
+        return self._planes(0, LOOK)
 
     @cached_property
     def met(self) -> Skin | LocalPlanes:
@@ -171,10 +161,10 @@ class Evidence:
         Its noise is what sampling alone explains: each surface against itself, and what only one of the two blurs.
         Local planes merge the two faces of a thin sheet, or follow each, as the density of the points has it.
         """
-        target = self._planes(1, TARGET_PLANES).surface
+        target = self._planes(1, COUNT).surface
         diagonal = tight_diagonal(target.points)
-        own = [disc_distances(s, s.points, s.labels, skip_self=True) for s in (self._judged, target)]
-        blurred = abs(float(self._judged.thickness.mean() - target.thickness.mean()))
+        own = [disc_distances(s, s.points, s.labels, skip_self=True) for s in (self.moving.surface, target)]
+        blurred = abs(float(self.moving.surface.thickness.mean() - target.thickness.mean()))
         return Surface(cloud=target, diagonal=diagonal, noise=(np.concatenate(own) + blurred) / diagonal)
 
     def misses(self, motion: Isometry) -> Array:
@@ -182,14 +172,14 @@ class Evidence:
 
         They end at the diagonal.
         """
-        moved, size = motion.apply(self._judged.points), self.judge.diagonal
-        return disc_distances(self.judge.cloud, moved, self._judged.labels, bound=size) / size
+        moved, size = motion.apply(self.moving.surface.points), self.judge.diagonal
+        return disc_distances(self.judge.cloud, moved, self.moving.surface.labels, bound=size) / size
 
     def misses_back(self, motion: Similarity) -> Array:
         """Distances from the target to the moved source, fractions of the diagonal."""
         cloud, size = self.judge.cloud, self.judge.diagonal
         moved, bound = motion.inverse.apply(cloud.points), size / motion.scale
-        back = disc_distances(self._judged, moved, cloud.labels, bound=bound)
+        back = disc_distances(self.moving.surface, moved, cloud.labels, bound=bound)
         return motion.scale * back / size
 
     def excess(self, motion: Similarity, *, both: bool = False) -> float:

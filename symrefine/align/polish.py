@@ -12,17 +12,16 @@ import numpy as np
 
 from symrefine.align.moment_fit import LONGEST
 from symrefine.fit.matching import SCALE_FLOOR, Contact, each_coordinate, geman_mcclure, meet, robust_scale, worth
-from symrefine.fit.refine import MAX_OUTER, SETTLED, WITHIN_NOISE
+from symrefine.fit.refine import MAX_OUTER, SETTLED, SHORT, WITHIN_NOISE
 from symrefine.fit.residual import SIZE, design_rows, gram, turn_frame
 from symrefine.geometry import Array, Isometry, cross_matrix
 from symrefine.propose.consensus import Proposal
+from symrefine.samples import GLANCE
+from symrefine.surface.misses import RIM
 from symrefine.surface.skin import LocalPlanes, Patches, Skin
 
-# One in so many of the planes of the source moves until the motion changes by less than the spacing, of sources with
-# more planes than so many for each.
-COARSE, ENOUGH = 4, 100
-# Outer iterations that settle what can be settled soon.
-SOON = 3
+# One in so many of the planes of the source moves until the motion changes by less than the spacing.
+COARSE = 4
 # What small turns about the three axes add to a vector.
 TURNS = np.stack([cross_matrix(axis) for axis in np.eye(3)])
 
@@ -112,7 +111,7 @@ def polish(
     prior = prior if scale else prior[:6, :6]
     x, reach = np.zeros(len(prior)), error
     covariance: Array = np.linalg.pinv(prior, rcond=1e-12, hermitian=True)
-    few = COARSE if len(source.points) > COARSE * ENOUGH else 1
+    few = COARSE if len(source.points) > COARSE * GLANCE else 1
     for index in range(1, MAX_OUTER + 1):
         contact = meet(source, target, start.moved(x), reach, stride=few)
         met = _Met.of(contact, target, source.redundancy)
@@ -126,13 +125,13 @@ def polish(
             step, inverse, sigmas = _step(*_normal_equations(met, phi, squares, scale_now, prior, x))
             x, covariance, length = x + step, inverse, float(np.linalg.norm(step))
             settled = scale_now > reach and (length < SETTLED or sigmas < WITHIN_NOISE)
-            reach = min(reach, 4.0 * length)
+            reach = min(reach, RIM * length)
             if settled:
                 break
         moved = float(np.linalg.norm(x - before))
         if settled and few == 1 and moved < SCALE_FLOOR * target.spacing:
             return _ended(start.moved(x), covariance, contact, index, converged=True)
-        if index == SOON and worthwhile is not None and not worthwhile(start.moved(x)):
+        if index == SHORT and worthwhile is not None and not worthwhile(start.moved(x)):
             return _ended(start.moved(x), covariance, contact, index, converged=False, given_up=True)
         if settled and moved < target.spacing:
             few = 1

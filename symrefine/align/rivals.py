@@ -18,14 +18,14 @@ from symrefine.align.moment_fit import LONGEST, MISFIT, Fits, as_good, best_fits
 from symrefine.align.pair import Evidence, few
 from symrefine.align.polish import Polished, Similarity, polish
 from symrefine.geometry import Array, frame_with_z, rotation
+from symrefine.groups.names import CLOSED_FOLD
 from symrefine.moments.action import FLOOR
 from symrefine.ntuples.rank import SIGNIFICANT
-from symrefine.propose.folds import BINS_PER_ORDER, MAX_FOLD
+from symrefine.propose.folds import BINS_PER_ORDER
+from symrefine.samples import FOLLOWED
 from symrefine.surface.misses import LIMITS
 from symrefine.surface.skin import LocalPlanes, Skin
 
-# Hills of the landscape that are climbed, and rivals judged, for each determinant.
-RIVALS = 4
 # Share of the limits by which the misses of true maps differ: clean samples show 0.16 at most, mirror images 0.2; a
 # wheel off by four degrees misses by 0.27, the wrong hand of a posed ant by 0.6 more.
 GOOD = 0.25
@@ -123,7 +123,7 @@ def candidates(evidence: Evidence, determinants: tuple[int, ...]) -> Fits:
         if misfit(pair, fitted) < MISFIT:
             return fitted
     scores = dict(zip((1, -1), landscape(evidence.source.moments, evidence.target.moments), strict=True))
-    climbed = [hills(scores[d], d, count=RIVALS) for d in determinants]
+    climbed = [hills(scores[d], d, count=FOLLOWED) for d in determinants]
     return best_fits(pair, np.concatenate([starts, *climbed]))
 
 
@@ -144,7 +144,7 @@ def _judged(evidence: Evidence, rivals: Fits, covariance: Array, *, brief: bool)
     best: dict[int, tuple[Similarity, float]] = {}
     for det in dict.fromkeys(int(sign) for sign in rivals.signs):  # by cost
         of_det = rivals.matrices[rivals.signs == det]
-        every = of_det[:1] if brief else chain(of_det[:RIVALS], _phases(evidence, of_det[0], rivals))
+        every = of_det[:1] if brief else chain(of_det[:FOLLOWED], _phases(evidence, of_det[0], rivals))
         best[det] = _first_good(evidence, every, covariance)
     return best
 
@@ -195,12 +195,12 @@ def _phases(evidence: Evidence, matrix: Array, rivals: Fits) -> Iterator[Array]:
     axis = np.linalg.eigh(rivals.hessians[0])[1][:, 0]
     frame = frame_with_z(axis)
     source, target = evidence.source.azimuths(frame @ matrix), evidence.target.azimuths(frame)
-    circle = BINS_PER_ORDER * MAX_FOLD
+    circle = BINS_PER_ORDER * CLOSED_FOLD
     spectrum = np.zeros(circle, complex)
     spectrum[1 : len(source)] = (np.conj(target) * source).sum(axis=1)[1:]
     score = np.fft.ifft(spectrum).real
     peaks = np.flatnonzero((score > np.roll(score, 1)) & (score >= np.roll(score, -1)))
-    for i in peaks[np.argsort(-score[peaks])][:RIVALS]:
+    for i in peaks[np.argsort(-score[peaks])][:FOLLOWED]:
         yield rotation(axis, 2.0 * np.pi * i / circle) @ matrix
 
 

@@ -9,13 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.align.judge import POLISHED, Judge
+from symrefine.align.judge import Judge
 from symrefine.align.pair import Evidence
 from symrefine.align.polish import Similarity, polish
 from symrefine.align.shown import Shown
 from symrefine.decide.maps import said_by_both
 from symrefine.geometry import tight_diagonal
 from symrefine.propose.maps import WITHIN
+from symrefine.samples import FOLLOWED
 
 # Sizes of the source that are tried, over that at which both spread alike: what is missing of a half changes its spread
 # by less than 2. From one to the next no point of a part that both share moves by more than matches may be apart.
@@ -52,7 +53,7 @@ def size_of_parts(evidence: Evidence) -> Size | None:
         here = judge(float(factor))
         tried += [(here.shared(start), here, start) for start in here.promising()]
     best, size = -np.inf, None
-    for _, here, start in sorted(tried, key=lambda t: -t[0])[:POLISHED]:
+    for _, here, start in sorted(tried, key=lambda t: -t[0])[:FOLLOWED]:
         error, known = WITHIN * here.diagonal, np.zeros((6, 6))
         done = polish(here.source.moving, target.cloud, start, error=error, known=known, scale=True)
         factor = done.motion.scale * here.source.cloud.spacing / own.cloud.spacing

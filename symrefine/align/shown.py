@@ -61,7 +61,7 @@ class Shown:
             shape, weights, solid = shape.chosen(seen.even), seen.shares, seen.solid
         local, normals, views = (shape.points - side.moments.center) / unit, shape.normals, shape.viewpoint
         skin = make_skin(local, rng, normals=normals, labels=shape.labels, thin=THIN)
-        if solid and normals is None and fills_volume(local, skin.tree, np.random.default_rng(0)):
+        if solid and normals is None and fills_volume(local, skin.tree):
             return None
         cloud, near = _planes(skin, drawn(len(local), planes, rng, weights))
         if cloud.spacing == 0.0:

@@ -5,7 +5,7 @@ import math
 from typing import Any, Literal
 
 from symrefine.errors import InputError
-from symrefine.units import LARGEST_TOLERANCE, LEAST_MM, METRES, MOST_MM, TOLERANCE, read_length
+from symrefine.units import LARGEST_TOLERANCE, METRES, SCALES_MM, TOLERANCE, read_length
 
 # Of options that number an object.
 NUMBERED = "(default: 7 of obj_000007.ply, 1 of any other name)"
@@ -207,9 +207,9 @@ def positive(text: str) -> float:
 def millimetres(text: str) -> float:
     """Millimetres in one unit of a file."""
     value = _float(text)
-    if not LEAST_MM <= value <= MOST_MM:
+    if not SCALES_MM[0] <= value <= SCALES_MM[1]:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not a number of millimetres from {LEAST_MM:g} to {MOST_MM:g}, such as 1000"
+            f"{text!r} is not a number of millimetres from {SCALES_MM[0]:g} to {SCALES_MM[1]:g}, such as 1000"
         )
     return value
 

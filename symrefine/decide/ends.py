@@ -9,6 +9,7 @@ import numpy as np
 from symrefine.decide.hypotheses import Hypothesis, judged, seen_to_end
 from symrefine.decide.looks import few_motions
 from symrefine.geometry import Array, Isometry, Mask
+from symrefine.samples import GLANCE, LOOK
 from symrefine.surface.misses import SURE
 from symrefine.surface.openings import MOST, TELLING
 from symrefine.surface.surface import Surface
@@ -19,8 +20,6 @@ from symrefine.surface.tree import Tree
 KEPT = 0.5
 # Mirrors or axes of a group from which on a hole often lies on one of them by chance, and its border is kept by that.
 PLACES = 3
-# Places where a hole is tried, and local planes that tell its rim: a share of one in three is told to a fifteenth.
-HOLES, RIMS = 50, 1000
 
 
 def ends_there(surface: Surface, found: Hypothesis) -> bool:
@@ -114,7 +113,7 @@ def _goes_on(surface: Surface, hidden: Sequence[tuple[Isometry, Mask]]) -> bool:
 
 
 def _motions(found: Hypothesis) -> list[Isometry]:
-    return [m for e in found.elements for m in e.operations.motions(e.center)]
+    return [m for e in found.elements for m in e.motions]
 
 
 def often_kept(surface: Surface, found: Hypothesis, share: float) -> bool:
@@ -123,8 +122,8 @@ def often_kept(surface: Surface, found: Hypothesis, share: float) -> bool:
     So does the mirror that lies in a plate, wherever the hole is: what it says of one border is chance.
     """
     every = surface.cloud.points
-    some = every[:: -(-len(every) // RIMS)]
-    places, width = some[:: -(-len(some) // HOLES)], surface.cloud.beside
+    some = every[:: -(-len(every) // LOOK)]
+    places, width = some[:: -(-len(some) // GLANCE)], surface.cloud.beside
 
     def away(points: Array) -> Array:
         """Distances [P, N] of points [N, 3] from the places."""

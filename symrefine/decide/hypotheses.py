@@ -11,21 +11,23 @@ from itertools import pairwise
 
 import numpy as np
 
-from symrefine.decide.looks import COARSE, GLANCE, SHORT, START_ERROR, Look, exact_need, mended, seems, slid
+from symrefine.decide.looks import COARSE, exact_need, mended, seems, slid
 from symrefine.decide.place import is_told, least_elsewhere
 from symrefine.decide.posterior import EVEN, EVEN_MIRROR, certain
 from symrefine.fit.placed import FITTED, Operations, Placed, elements, joined
-from symrefine.fit.refine import Iterate, refine
+from symrefine.fit.refine import SHORT, Iterate, refine
 from symrefine.geometry import Array, Axis, Isometry, frame_with_z, rotation
 from symrefine.groups import PointGroup, is_subgroup
+from symrefine.propose.candidates import START_ERROR
 from symrefine.propose.folds import fold_candidates
+from symrefine.samples import COUNT, GLANCE
 from symrefine.surface.misses import Deviation
 from symrefine.surface.skin import Skin
 from symrefine.surface.surface import Coverage, Surface
 from symrefine.surface.wedge import Wedge
 
-# Local planes that are moved in a fit and when judged by all together (a quarter of that by each at most), and when
-# judged by each at least: 0.6 % of fewer are no sample.
+# Local planes that are moved in a fit and when judged by all together, and when judged by each at least: 0.6 % of fewer
+# are no sample.
 MOVED, MOVED_EACH = 12000, 1200
 # Elements nearer than this (radians) are the same.
 SAME_RAD = np.radians(4.0)
@@ -40,6 +42,11 @@ class Element:
     deviation: Deviation
     need: float
     coverage: Coverage
+
+    @property
+    def motions(self) -> tuple[Isometry, ...]:
+        """Its operations where it stands."""
+        return self.operations.motions(self.center)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -197,11 +204,6 @@ def seen_to_end(surface: Surface, found: Hypothesis) -> float:
     return _seen_judged(surface, parts, *_met(surface, parts), found.placed.motions())[1]
 
 
-def roughly_judged(surface: Surface, look: Look, *, before: int = 0) -> Hypothesis:
-    """A group judged where a look put it, by as few points of each element as a fit moves."""
-    return _placed(surface, look.placed, look.history, before, GLANCE)
-
-
 def _placed(
     surface: Surface, placed: Placed, history: tuple[Iterate, ...], before: int, least: int = MOVED_EACH
 ) -> Hypothesis:
@@ -264,7 +266,7 @@ def _closely_judged(surface: Surface, found: tuple[Element, ...], need: float) -
 def _telling(element: Element, wedge: Wedge) -> tuple[Isometry, ...]:
     """The operations that tell of an element; of what is round about the axis of a wedge, one that swaps its halves."""
     if math.isfinite(element.operations.order):
-        return element.operations.motions(element.center)
+        return element.motions
     return (Isometry.about(element.center, rotation(element.operations.direction, 0.5 * wedge.pitch)),)
 
 
@@ -337,7 +339,7 @@ def belief_in_as_much(surface: Surface, placed: Placed) -> float:
 
 
 def _moved_each(operations: int, least: int) -> int:
-    return min(max(least, MOVED // operations), MOVED // 4)
+    return min(max(least, MOVED // operations), COUNT)
 
 
 def _judged(surface: Surface, parts: _Parts, misses: Array, drifts: Array) -> tuple[tuple[Element, ...], float]:

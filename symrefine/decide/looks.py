@@ -11,27 +11,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symrefine.fit.placed import Placed, elements
-from symrefine.fit.refine import SPREAD, Iterate, refine
+from symrefine.fit.refine import SHORT, refine
 from symrefine.fit.vertices import ROUNDED
 from symrefine.geometry import Array, Isometry
+from symrefine.propose.candidates import START_ERROR
 from symrefine.propose.votes import AGREE_RAD
-from symrefine.surface.misses import LIMITS
+from symrefine.samples import GLANCE, LOOK
+from symrefine.surface.misses import LIMITS, RIM
 from symrefine.surface.surface import Surface
 
-# Local planes that are moved: at a glance by each operation, in a fit at least; in a look by all together.
-GLANCE, LOOK = 120, 600
 # A fit that is not settled may need so many times what it does then.
 COARSE = 3.5
-# Steps of a look after which those that will not come near end.
-SHORT = 2
 # A glance allows for the worst of the operations of a group that it takes: without, the share that details may have
 # (0.6 %) is less than one of its points, and a single stray among them turns down every candidate.
 GLANCED = 4
 # Steps to either side that a group is moved: of 0.02 RMS radii, some four to a valley at the usual tolerance. Of one
 # that is narrower its slopes tell as much.
 ASIDE = 7
-# How far the moments may put a start wrong (radians, RMS radii; 0.04 was the most of 698 true ones).
-START_ERROR = 0.05
 
 
 def glances(surface: Surface, starts: Sequence[Placed], most: float = math.inf) -> list[float]:
@@ -39,13 +35,9 @@ def glances(surface: Surface, starts: Sequence[Placed], most: float = math.inf) 
     each = [few_motions(s) for s in starts]
     owner = np.repeat(np.arange(len(starts)), [len(motions) for motions in each])
     every, found = [m for motions in each for m in motions], np.zeros(len(starts))
-    # Most candidates are hopeless, and seen to be so without a wide search; of an open surface none is made.
-    for limit in LIMITS[-1:] if surface.is_open else (LIMITS[1], LIMITS[-1]):
-        asked = np.flatnonzero(found[owner] < most)
-        if asked.size:
-            motions, bound = [every[i] for i in asked], limit * most
-            needs = surface.needs(motions, sources=GLANCE, bound=bound, discs=1, tests=GLANCED)
-            np.maximum.at(found, owner[asked], needs)
+    if every:
+        needs = surface.needs(every, sources=GLANCE, bound=LIMITS[-1] * most, discs=1, tests=GLANCED)
+        np.maximum.at(found, owner, needs)
     return found.tolist()
 
 
@@ -60,14 +52,8 @@ class Look:
     """A group where a fit on a few points put it, what it needs by them, and how far off it may stand (radians)."""
 
     placed: Placed
-    history: tuple[Iterate, ...]
     needs: float
     error_rad: float
-
-    @property
-    def settled(self) -> bool:
-        """Whether the fit came to its end."""
-        return self.history[-1].converged
 
 
 def looked_at(
@@ -84,10 +70,9 @@ def looked_at(
     asks to believe in is needed as well, and one that asks for more than that, or needs more wherever it is moved
     sideways, stays where the fit put it.
     """
-    state, error, history = start.roughly_framed(), start_error(surface), []
+    state, error = start.roughly_framed(), start_error(surface)
     stride = surface.stride(max(GLANCE, LOOK // len(state.standard)), matched=True)
     for iterate in refine(surface.cloud, state, start_error_rad=error, stride=stride):
-        history.append(iterate)
         if iterate.converged or iterate.index < SHORT:
             continue
         here = start.moved(iterate.state)
@@ -96,7 +81,7 @@ def looked_at(
             break
         if iterate.index == SHORT:
             # No image is farther off than by twice what the group may be, as of a mirror.
-            reach = 2.0 * min(error, SPREAD * iterate.step) / surface.diagonal
+            reach = 2.0 * min(error, RIM * iterate.step) / surface.diagonal
             needs, asked, least = _told(surface, here, GLANCE, reach)
             if needs > most or least > useful:
                 break
@@ -105,14 +90,14 @@ def looked_at(
         # Where noise is as thick as a surface it may draw a fit away, step by step.
         if not iterate.converged and (stayed := seems(surface, start)) < needs:
             aside, needs = slid(surface, start, stayed, useful)
-            return Look(placed=aside, history=tuple(history[:1]), needs=needs, error_rad=error)
+            return Look(placed=aside, needs=needs, error_rad=error)
     off = max(iterate.step, math.sqrt(max(float(np.diag(iterate.covariance).max()), 0.0)))
     aside = start.moved(iterate.state)
     # Where it asks to believe in too much it is not worth a search, and where little is missing most of it tells.
     if asked <= useful and surface.lacks_much:
         aside, needs = slid(surface, aside, needs, useful)
     needs = math.hypot(needs, asked)
-    return Look(placed=aside, history=tuple(history), needs=needs, error_rad=min(error, SPREAD * off))
+    return Look(placed=aside, needs=needs, error_rad=min(error, RIM * off))
 
 
 def slid(surface: Surface, placed: Placed, needs: float, useful: float = math.inf) -> tuple[Placed, float]:

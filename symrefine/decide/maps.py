@@ -13,9 +13,9 @@ import numpy as np
 from symrefine.geometry import Array, Mask
 
 # Quantile of what sampling alone misses by up to which a local plane is well met, and what it costs that others meet
-# less well, or nothing. Chosen on 252 pairs of ten objects, where all of 1 to 2 and 1 to 3 do about as well; see
+# nothing, where meeting less well costs one. Chosen on 252 pairs of ten objects, where 1 to 3 all do about as well; see
 # `experiments.studies.partial_alignment`.
-WELL, LESS_WELL, NOTHING = 0.9, 1.0, 3.0
+WELL, NOTHING = 0.9, 3.0
 # Of four logistic curves over logarithms: where half of the maps are right, and how fast they become more, by the lead
 # over the best rival, by the share that is well met, by what part of all that is met is met less well, of true maps a
 # tenth by definition of "well", of thin leaves a quarter, and by what meets nothing over what is met: of 214 true maps
@@ -46,11 +46,11 @@ class Merit:
     @property
     def score(self) -> float:
         """The more the better."""
-        return self.well - LESS_WELL * self.less - NOTHING * self.nothing
+        return self.well - self.less - NOTHING * self.nothing
 
     def sigma(self, count: int) -> float:
         """Standard deviation of the score as so many local planes, drawn at random, would tell it."""
-        squares = self.well + LESS_WELL**2 * self.less + NOTHING**2 * self.nothing
+        squares = self.well + self.less + NOTHING**2 * self.nothing
         return float(np.sqrt(max(squares - self.score**2, 0.0) / count))
 
     @property

@@ -9,12 +9,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from symrefine.decide.looks import GLANCE, GLANCED, LOOK, exact_need, few_motions, start_error
+from symrefine.decide.looks import GLANCED, exact_need, few_motions, start_error
 from symrefine.fit.freedom import freest
 from symrefine.fit.placed import Operations, Placed, joined
 from symrefine.fit.refine import Framed
 from symrefine.geometry import Array
 from symrefine.groups import is_subgroup
+from symrefine.samples import GLANCE, LOOK
 from symrefine.surface.surface import Surface
 
 # Share of a surface that has to be carried onto itself for anything to be said of an operation.

@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, has_all
-from symrefine.decide.looks import START_ERROR
+from symrefine.decide.posterior import ALIKE
 from symrefine.fit.placed import Placed
 from symrefine.groups import PointGroup, is_subgroup
 from symrefine.groups.elements import DIRECTION_ERROR_RAD
+from symrefine.propose.candidates import START_ERROR
 
-# Needs within this factor are the same, as the elements of a true group miss alike.
-ALIKE = 1.5
 # Groups of points that no other one but that of a ball contains.
 MAXIMAL = ("Oh", "Ih")
 

@@ -22,6 +22,9 @@ T = TypeVar("T", bound=Any)
 EVEN, STEEPNESS = 0.8, 8.0
 # The same of a lone mirror: bodies and devices that are meant to have just one are made less exactly than others.
 EVEN_MIRROR = 1.2
+# Needs within this factor are the same, as the elements of a true group miss alike; so groups that need no more than
+# the tolerance by that are asked for.
+ALIKE = 1.5
 # A mirror is no lone one if a larger group needs less than so many times as much: the best of several mirrors that one
 # part out of place breaks misses by half of what the worst does, or more, in two of five directions of the shift. With
 # 3 a few more of such are told, and an ant that is posed is for certain no symmetric body.
@@ -43,8 +46,6 @@ UNKNOWN, BLURRED = 0.7, 2.0
 BROKEN = (0.015, 0.085, 0.48)
 # Alternatives that are told of, and the least probability that is worth telling.
 NEAR, LEAST = 8, 0.01
-# Groups that need up to so many tolerances are asked for.
-BEYOND = 1.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

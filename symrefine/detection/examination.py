@@ -9,10 +9,10 @@ import numpy as np
 
 from symrefine.clock import Clock
 from symrefine.decide.chain import chain, explore
-from symrefine.decide.hypotheses import MOVED, SAME_RAD, Hypothesis
-from symrefine.decide.looks import LOOK, few_motions
+from symrefine.decide.hypotheses import SAME_RAD, Hypothesis
+from symrefine.decide.looks import few_motions
 from symrefine.decide.pool import Pool
-from symrefine.decide.posterior import BEYOND, Alternative, Decision, Link, decide, meant, odd
+from symrefine.decide.posterior import ALIKE, Alternative, Decision, Link, decide, meant, odd
 from symrefine.detection.measure import Measured, Outliers, doubt, floor_under, gather, measure
 from symrefine.detection.sketch import Sample, Sketch, is_large, sampled, set_apart, sketched
 from symrefine.fit.placed import SAMPLED, Placed, common_center
@@ -20,15 +20,13 @@ from symrefine.fit.vertices import OnVertices, exact_symmetry, on_vertices
 from symrefine.geometry import Array, Mask, check_tolerance
 from symrefine.groups import PointGroup, is_subgroup
 from symrefine.propose.candidates import Evidence
+from symrefine.samples import COUNT, FOLLOWED, LOOK
 from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import CLUMP, COUNTERPART, Clump, clump_among
 from symrefine.surface.floor import Floor
 from symrefine.surface.misses import SHARES, TOLERANCE, disc_distances
 from symrefine.surface.surface import Surface
 from symrefine.surface.tree import Tree
-
-# Larger groups that are asked what speaks against them, the ones that need least first.
-RIVALS = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -112,6 +110,10 @@ class Examined:
         """How likely it is that no part of the object was taken for a clump, if that alone speaks against a group."""
         return 1.0 if self.denied is None or self.denied.holds(found.placed) else 1.0 - odd(found.group)
 
+    def link(self, tolerance: float) -> Hypothesis:
+        """The likeliest group of the chain at a tolerance, where it stands."""
+        return self.links[self.decided(tolerance).index]
+
     def choices(self, tolerance: float) -> tuple[Alternative, ...]:
         """Every group of the chain, C1 first, as likely as at a tolerance."""
         found = zip(self.links, self.decided(tolerance).probabilities, strict=True)
@@ -121,7 +123,7 @@ class Examined:
         """Order of the group that is decided, and of what stands for it if that is infinite; 0 if none is."""
         if self.doubt(tolerance):
             return 0.0, 0.0
-        return _size(self.links[self.decided(tolerance).index].group)
+        return _size(self.link(tolerance).group)
 
     def rivals(self, tolerance: float) -> list[Hypothesis]:
         """Larger groups than the one that is decided, the ones that need least first."""
@@ -223,7 +225,7 @@ def _likeliest(
             without = examine(apart=False, foreign=others)
             own, _ = _told_apart(without, tolerance)
         if not own and without.size(tolerance) > found.size(tolerance):
-            return replace(without, denied=found.links[found.decided(tolerance).index])
+            return replace(without, denied=found.link(tolerance))
     return replace(found, hides=hides)
 
 
@@ -239,17 +241,16 @@ def _strangers(found: Examined, points: Array, tolerance: float) -> tuple[Index,
     surface, measured = found.surface, found.measured
     if surface.skin is None or measured.views or found.doubt(tolerance):
         return ()
-    if not (rivals := found.rivals(tolerance)[:RIVALS]):
+    if not (rivals := found.rivals(tolerance)[:FOLLOWED]):
         return ()
     few = [r for r in rivals if 0.0 < _unmet(surface, r.placed, LOOK).mean() <= CLUMP]
     if not few:
         return ()
     own = np.setdiff1d(np.arange(len(points)), np.concatenate(measured.apart), assume_unique=True)
     local = (points[own] - measured.moments.center) / measured.moments.scale
-    some = MOVED // 4
-    nearest = Tree(surface.cloud.points[:: surface.stride(some)]).nearest(local)[1]
+    nearest = Tree(surface.cloud.points[:: surface.stride(COUNT)]).nearest(local)[1]
     for rival in few:
-        unmet = _unmet(surface, rival.placed, some)
+        unmet = _unmet(surface, rival.placed, COUNT)
         if (group := clump_among(local, unmet[nearest])).size:
             return (own[group],)
     return ()
@@ -299,7 +300,7 @@ def _examined(
         # Where the tolerance asked for is too small to decide anything, the ladder is told from the first that is not.
         steps = [t for t in sorted({tolerance, *ladder}) if t >= tolerance and not doubt(measured, surface, t)]
         pool = explore(surface, evidence, steps[0], min(tolerance, *ladder, 1.0)) if steps else Pool()
-        links = chain(surface, pool, BEYOND * max((tolerance, *ladder)))
+        links = chain(surface, pool, ALIKE * max((tolerance, *ladder)))
     return Examined(
         measured=measured,
         surface=surface,
@@ -319,8 +320,8 @@ def _has_counterparts(found: Examined, blob: Array, tolerance: float) -> bool:
     """
     surface, cloud, moments = found.surface, found.surface.cloud.of_one_class(), found.measured.moments
     points, margin = (blob - moments.center) / moments.scale, surface.far * surface.diagonal
-    elements = found.links[found.decided(tolerance).index].elements
-    motions = [m for element in elements for m in element.operations.motions(element.center)]
+    elements = found.link(tolerance).elements
+    motions = [m for element in elements for m in element.motions]
     if not motions or found.doubt(tolerance):
         return False
     moved = np.concatenate([m.apply(points) for m in motions])
@@ -335,8 +336,8 @@ def _replaces(found: Examined, clump: Array, tolerance: float) -> bool:
     surface, cloud, moments = found.surface, found.surface.cloud.of_one_class(), found.measured.moments
     there, margin = Clump.of((clump - moments.center) / moments.scale), surface.far * surface.diagonal
     own, hidden = cloud.points, [0.0]
-    for element in found.links[found.decided(tolerance).index].elements:
-        for motion in element.operations.motions(element.center):
+    for element in found.link(tolerance).elements:
+        for motion in element.motions:
             moved = motion.apply(own)
             under = moved[there.covers(moved)]
             hidden.append(float((disc_distances(cloud, under) > margin).sum()) if len(under) else 0.0)
@@ -368,8 +369,8 @@ def _belongs(found: Examined, clump: Array, tolerance: float) -> bool:
     beside = disc_distances(cloud, points) > margin
     points = points[beside] if beside.any() else points  # what lies in the surface is carried with it
     own, carried = Tree(points), []
-    for element in found.links[found.decided(tolerance).index].elements:
-        moved = np.concatenate([m.apply(points) for m in element.operations.motions(element.center)])
+    for element in found.link(tolerance).elements:
+        moved = np.concatenate([m.apply(points) for m in element.motions])
         off = (disc_distances(cloud, moved) > margin) & (own.nearest(moved)[0] > margin)
         for camera in () if surface.openings is None else surface.openings.cameras:
             off &= camera.sees_through(moved, margin)

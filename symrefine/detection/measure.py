@@ -17,7 +17,8 @@ from symrefine.moments.quadrature import mesh_nodes, sample_surface
 from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import FixedSubspace, fixed_subspace
 from symrefine.propose.candidates import Evidence
-from symrefine.shape import Index, Shape
+from symrefine.samples import COUNT
+from symrefine.shape import SAME_MASS, Index, Shape
 from symrefine.surface.cameras import Camera, cameras, outwards
 from symrefine.surface.clumps import Clump
 from symrefine.surface.drift import Drift
@@ -27,7 +28,7 @@ from symrefine.surface.neighbourhoods import fills_volume
 from symrefine.surface.openings import NEIGHBOURS, openings
 from symrefine.surface.sampling import sampling
 from symrefine.surface.skin import FEW, LocalPlanes, Skin, drawn, isolated_points, make_skin
-from symrefine.surface.surface import WINDOWS, Surface
+from symrefine.surface.surface import Surface
 from symrefine.surface.tree import Tree, side_by_side
 
 Outliers = Literal["auto", "floor", "none"]
@@ -35,8 +36,6 @@ Outliers = Literal["auto", "floor", "none"]
 ORDER = 8
 # Local planes of a cloud; points that a volume is known by, and planes of a mesh, whose normals are exact.
 PLANES, SAMPLES = 8000, 20000
-# Masses of atoms that differ by more than this fraction are masses of different kinds.
-SAME_MASS = 0.01
 # Share of the points of a scan that others hide from the cameras given, from which on these are wrong: of true views,
 # rough ones too, up to 0.027 seem to be; of whole objects, half of which is hidden, 0.12 to 0.22 are found to be. Half
 # way between the two, as ratios go.
@@ -312,7 +311,7 @@ def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLE
     )
     if is_few(shape):
         return evidence, Surface(cloud=isolated_points(local, labels), diagonal=tight_diagonal(local))
-    if measured.solid and normals is None and fills_volume(local, Tree(local), np.random.default_rng(0)):
+    if measured.solid and normals is None and fills_volume(local, Tree(local)):
         return evidence, _volume(local, labels, tolerance, rng)
     return evidence, _surface(measured, local, normals, weights, labels, tolerance, rng)
 
@@ -370,7 +369,7 @@ def _surface(
     # Where density differs, as between what cameras saw from far and near or where a clump adds to it, a window and its
     # image hold more of chance than one window and itself.
     if whole.noisy and uneven is None and not (views or measured.clumps):
-        surface = replace(surface, drift=Drift.of(local, whole.tree, WINDOWS, rng))
+        surface = replace(surface, drift=Drift.of(local, whole.tree, COUNT, rng))
     return surface
 
 
@@ -384,7 +383,7 @@ def _volume(points: Array, labels: Index | None, tolerance: float, rng: np.rando
     diagonal = tight_diagonal(points)
     noise = noise_distances(len(points), some_of, rng)
     cloud = some_of(np.arange(len(points)))
-    drift = Drift.of(points, Tree(points) if labels is not None else cloud.tree, WINDOWS, rng)
+    drift = Drift.of(points, Tree(points) if labels is not None else cloud.tree, COUNT, rng)
     return Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, drift=drift, tolerance=tolerance)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from symrefine.clock import Clock
 from symrefine.decide.hypotheses import MOVED_EACH, NOTHING, SAME_RAD, Element, Hypothesis, judged
 from symrefine.decide.looks import exact_need, few_motions
-from symrefine.decide.posterior import BEYOND
+from symrefine.decide.posterior import ALIKE
 from symrefine.decide.subgroups import subgroup_chain
 from symrefine.detection.examination import Examined, examined
 from symrefine.detection.measure import PLANES, SAMPLES
@@ -54,7 +54,7 @@ def textured(found: Examined, shape: Shape, *, tolerance: float, limit: float, s
         for placed in [*(_chain(found, painted, few[-1]) if few else []), *many]:
             link = _told(found, painted, placed)
             links.append(replace(link, need=max(link.need, links[-1].need)))
-    return replace(found, links=_within(links, BEYOND * limit), pool=replace(found.pool, small=()))
+    return replace(found, links=_within(links, ALIKE * limit), pool=replace(found.pool, small=()))
 
 
 def _painted(found: Examined, shape: Shape, rng: np.random.Generator) -> Painted:
@@ -71,7 +71,7 @@ def _painted(found: Examined, shape: Shape, rng: np.random.Generator) -> Painted
 def _chain(found: Examined, painted: Painted, whole: Placed) -> list[Placed]:
     """Subgroups of a finite group, each inside the next, in the order of what their operations need."""
     motions, shape_needs = zip(*(_known(found, whole, matrix) for matrix in whole.group.operations()), strict=True)
-    colour_needs = needed(painted.misses(motions, sources=MOVED_EACH, bound=BEYOND * found.surface.tolerance))
+    colour_needs = needed(painted.misses(motions, sources=MOVED_EACH, bound=ALIKE * found.surface.tolerance))
     chain = subgroup_chain(whole.group, np.maximum(shape_needs, colour_needs))
     return [Placed(group=group, center=whole.center) for group, _ in chain]
 
@@ -97,7 +97,7 @@ def _told(found: Examined, painted: Painted, placed: Placed) -> Hypothesis:
 
 def _element(painted: Painted, element: Element, bound: float) -> Element:
     motions = element.operations.motions(element.center)
-    misses = painted.misses(motions, sources=MOVED_EACH, bound=BEYOND * bound)
+    misses = painted.misses(motions, sources=MOVED_EACH, bound=ALIKE * bound)
     deviation = reduce(Deviation.at_least, map(Deviation.of, misses), element.deviation)
     return replace(element, need=max(element.need, float(needed(misses).max())), deviation=deviation)
 

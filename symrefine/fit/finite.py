@@ -7,18 +7,15 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from symrefine.errors import InputError
+from symrefine.fit.anchors import PROBES
 from symrefine.geometry import Array, rotation, unit
-from symrefine.groups import MAX_FOLD, PointGroup, is_subgroup, point_group
+from symrefine.groups import MAX_FOLD, TURNS, PointGroup, is_subgroup, point_group
 from symrefine.rounding import SINGLE
 from symrefine.shape import Index
 
-# Turns that stand for a continuous axis where the points themselves show no fold, and the fewest of them.
-TURNS, FEWEST_TURNS = 64, 8
-# A copied sector keeps at least so many points.
-SECTOR = 30
-# Folds tried on the rings of a lathed mesh, on so many of its points; how near they must come, in spacings, and a
-# larger fold is taken although it misses by more, up to ALIKE times more, or LAX times where that is next to nothing.
-PROBES, NEAR, ALIKE, LAX, CLEAN = 200, 0.25, 1.3, 3.0, 0.2
+# How near folds that are tried on the rings of a lathed mesh must come, in spacings; a larger fold is taken although it
+# misses by more, up to ALIKE times more, or LAX times where that is next to nothing.
+NEAR, ALIKE, LAX, CLEAN = 0.25, 1.3, 3.0, 0.2
 
 
 def placed_subgroup(group: PointGroup, name: str) -> PointGroup:
@@ -47,12 +44,12 @@ def _frames(group: PointGroup) -> Iterator[Array]:
             yield np.stack([x, np.cross(z, x), z])
 
 
-def finite_group(group: PointGroup, points: Array, *, copied: bool) -> PointGroup:
-    """The group itself, or a finite part of a continuous one: the fold of the rings, else `TURNS`; Ih for a sphere.
+def finite_group(group: PointGroup, points: Array, turns: int = TURNS) -> PointGroup:
+    """The group itself, or a finite part of a continuous one: the fold of the rings, else so many turns; Ih of a ball.
 
     Args:
         points: [N, 3] distinct points relative to the centre.
-        copied: one sector will be copied to all others, so that it should hold some points.
+        turns: that stand for a continuous axis where the points themselves show no fold.
     """
     if group.is_finite:
         return group
@@ -61,10 +58,7 @@ def finite_group(group: PointGroup, points: Array, *, copied: bool) -> PointGrou
     fold = _ring_fold(points, group.frame[2])
     if fold:
         group = PointGroup(name=group.name, frame=_on_rings(points, group.frame, fold))
-    else:
-        sectors = len(group.sampled(1).operations())
-        fold = min(TURNS, max(FEWEST_TURNS, len(points) // (SECTOR * sectors) // 2 * 2)) if copied else TURNS
-    return group.sampled(fold)
+    return group.sampled(fold or turns)
 
 
 def _ring_fold(points: Array, axis: Array) -> int:
@@ -76,7 +70,7 @@ def _ring_fold(points: Array, axis: Array) -> int:
     near = NEAR * float(np.median(tree.query(off, k=2)[0][:, 1]))
     folds = np.arange(3, min(MAX_FOLD, len(off)) + 1)
     # A few probes turn nearly all down: by other folds rings miss by half a spacing.
-    for probes in (PROBES // 10, PROBES):
+    for probes in PROBES[1:]:
         index = np.arange(0, len(off), max(1, len(off) // probes))
         misses = _misses(off, tree, axis, folds, index)
         folds, misses = folds[misses < near], misses[misses < near]

@@ -19,8 +19,8 @@ FREE_TURNS = 2.0 * np.pi * np.array([0.0823, 0.1381966, 0.2360680, 0.4270510])
 # Fold of what stands for all turns about an axis, evenly; a prime, so that few finite groups have any of its turns.
 SAMPLED = 7
 # Operations of one kind that are fitted together: more add points, but no knowledge. Of the mirrors through an axis all
-# are, each with its own angle, up to so many.
-FITTED, BUNDLE = 8, 60
+# are, each with its own angle.
+FITTED = 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -33,7 +33,7 @@ class Placed(ReadOnly):
     def framed(self) -> Framed:
         """The operations that are fitted, in the frame of the group: together they leave no unknown of it free."""
         group = PointGroup(name=self.group.name)
-        if group.symbol.family == "Cv" and group.symbol.fold <= BUNDLE:
+        if group.symbol.family == "Cv" and group.is_finite:
             return mirror_bundle(int(group.symbol.fold), self.group.frame, self.center)
         matrices = fitted_matrices(group)
         return Framed(standard=np.stack(matrices), frame=self.group.frame, center=self.center)

@@ -21,20 +21,20 @@ from symrefine.fit.residual import (
     turn_frame,
 )
 from symrefine.geometry import Array, Isometry, Plane, ReadOnly, frame_with_z, householder
+from symrefine.rounding import DOUBLE
+from symrefine.surface.misses import RIM
 from symrefine.surface.skin import LocalPlanes
 
 # Outer iterations at most; two or three settle what can be settled.
 MAX_OUTER = 10
+# Those after which what will not come near is given up.
+SHORT = 2
 # An outer iteration that moves nothing by more than this (radians, RMS radii) ends the refinement ...
 SETTLED = 2e-4
 # ... and so does one that moves everything by less than this share of what the noise leaves uncertain.
 WITHIN_NOISE = 0.22
-# What a state is off by at most, in lengths of the last step or standard deviations.
-SPREAD = 4.0
 # Largest ratio of successive steps that is extrapolated.
 LONGEST = 0.7
-# Share of the largest eigenvalue of the pairs up to which a motion is one that they do not see, but for rounding.
-UNSEEN = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -149,7 +149,7 @@ def refine(
         pairs=(), inner_steps=0, converged=False,
     )  # fmt: skip
     for index in range(1, max_outer + 1):
-        uncertainty = min(start_error_rad, SPREAD * step)
+        uncertainty = min(start_error_rad, RIM * step)
         pairs = match(cloud, state.motions, uncertainty, stride=stride, robust=robust)
         grams = np.stack([pair_gram(cloud, p) for p in pairs])
         theta = _thetas(grams, state) if state.bundle else np.zeros(0)
@@ -226,7 +226,7 @@ def _solve(grams: Array, state: Framed, theta: float) -> tuple[Solution, Array, 
 
     here = model(np.zeros(6))
     values, vectors = np.linalg.eigh(here.hessian)
-    seen = values > UNSEEN * values[-1]
+    seen = values > DOUBLE * values[-1]
     basis = vectors[:, seen]
 
     def within(full: Linearisation) -> Linearisation:

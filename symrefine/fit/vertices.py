@@ -13,20 +13,18 @@ from symrefine.fit.action import generators, mean_back, permutations
 from symrefine.fit.anchors import LARGEST, permuting_group
 from symrefine.fit.finite import finite_group
 from symrefine.fit.placed import Placed
+from symrefine.fit.refine import MAX_OUTER
 from symrefine.geometry import Array, orthogonal_factor, tight_diagonal
 from symrefine.groups import PointGroup
 from symrefine.groups.standard import GOLDEN
 from symrefine.rounding import DOUBLE, SINGLE
+from symrefine.samples import GLANCE
 from symrefine.shape import Index, Shape
 
-# Rounds that fit a group's place to points that correspond, at most.
-ROUNDS = 30
 # An exact shape misses the place that detection found by no more than this.
 NEAR = 2e-3
 # A shape is exact where no vertex misses its counterpart by more than what rounding to five digits leaves.
 ROUNDED = 1e-5
-# Vertices that are asked first, and rounds of these: where they have no counterparts the others are not asked.
-ASKED, GLANCES = 200, 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -120,7 +118,7 @@ def on_vertices(
         return None
     diagonal = diagonal or tight_diagonal(shape.points)
     own = Distinct.of(shape, center, diagonal, weld=SINGLE)
-    place = Placed(group=finite_group(group, own.points, copied=False), center=np.zeros(3))
+    place = Placed(group=finite_group(group, own.points), center=np.zeros(3))
     if place.group.order * len(own.rows) > LARGEST:
         return None
     glanced = _glanced(own, place, within)
@@ -150,7 +148,7 @@ def _on(
 def settled(points: Array, images: Index, place: Placed) -> Placed:
     """The place that moves points [N, 3] least, given the counterparts [K, N] of each under each operation."""
     last = np.inf
-    for _ in range(ROUNDS):
+    for _ in range(MAX_OUTER):
         local = points - place.center
         wanted = place.center + mean_back((local[image] for image in images), place.group.operations())
         nearer, step = towards(place, points, wanted)
@@ -171,11 +169,11 @@ def towards(place: Placed, points: Array, wanted: Array) -> tuple[Placed, float]
 
 def _glanced(own: Distinct, place: Placed, within: float) -> Placed | None:
     """The place that some of the points know already, if they have counterparts; several rounds, as none is matched."""
-    some = own.points[:: max(1, len(own.points) // ASKED)]
+    some = own.points[:: max(1, len(own.points) // GLANCE)]
     if len(some) == len(own.points):
         return place
     tree = cKDTree(own.points)
-    for _ in range(GLANCES):
+    for _ in range(MAX_OUTER):
         operations, local = place.group.operations(), some - place.center
         found = [tree.query(local @ g.T + place.center) for g in operations]
         miss = max(float(distance.max()) for distance, _ in found)

@@ -15,13 +15,10 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.groups.axial import axial_operations
 from symrefine.groups.identify import POLYHEDRAL, has_alike, identify, polyhedral_start
-from symrefine.groups.names import MAX_FOLD, parse
+from symrefine.groups.names import CLOSED_FOLD, MAX_FOLD, parse
 from symrefine.groups.orthogonal import Index, nearest_orthogonal, register
 from symrefine.groups.point_group import PointGroup
 from symrefine.groups.standard import standard_operations
-
-# Folds of groups that operations are closed to, unless more are asked for.
-DEFAULT_MAX_FOLD = 120
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,7 +40,7 @@ def close(
     tolerance_rad: float,
     *,
     orders: Sequence[int] | None = None,
-    max_fold: int = DEFAULT_MAX_FOLD,
+    max_fold: int = CLOSED_FOLD,
 ) -> Closure:
     """The smallest finite group that contains every generator up to `tolerance_rad`.
 

@@ -9,6 +9,10 @@ from symrefine.errors import InputError
 
 # The largest fold that a group may have: beyond it nobody tells a polygon from round.
 MAX_FOLD = 360
+# Folds of groups that operations are closed to, unless more are asked for, and that azimuths tell, a fundamental and
+# its octave: so many turns as half of it stand for a continuous axis.
+CLOSED_FOLD = 128
+TURNS = CLOSED_FOLD // 2
 _AXIAL = {"C", "Cv", "Ch", "S", "D", "Dh", "Dd"}
 _CONTINUOUS = {"C", "Cv", "Ch", "D", "Dh"}
 _FIXED = ("T", "Td", "Th", "O", "Oh", "I", "Ih", "K", "Kh")

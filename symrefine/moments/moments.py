@@ -101,18 +101,13 @@ def raw_moments(points: Array, weights: Array, order: int) -> Array:
     return raw_moments_of_parts(points, weights, order, [0, len(points)])[0]
 
 
-def raw_moments_of_parts(
-    points: Array, weights: Array, order: int, ends: Sequence[int], *, width: int = BLOCK
-) -> Array:
-    """Raw moments [P, K] of points [N, n] that stand part by part: where each begins, and where the last ends [P + 1].
-
-    `width` is how many points are added up in one product, at most a block of them.
-    """
+def raw_moments_of_parts(points: Array, weights: Array, order: int, ends: Sequence[int]) -> Array:
+    """Raw moments [P, K] of points [N, n] part by part: `ends` [P + 1] tells where each begins, and the end."""
     a, b, lead = _split(points.shape[1], order)
     totals = np.zeros((len(ends) - 1, a.max() + 1, b.max() + 1))
     # One place for all blocks: memory that is asked for anew comes page by page, which takes longer than the sums.
     room = [np.empty((min(BLOCK, len(points)), count)) for count in totals.shape[1:]]
-    for pieces in _blocks(ends, min(width, BLOCK)):
+    for pieces in _blocks(ends):
         start, end = pieces[0][1].start, pieces[-1][1].stop
         block, (left, right) = points[start:end], (whole[: end - start].reshape(-1, end - start) for whole in room)
         left = monomials(block[:, :lead], order, left, times=weights[start:end])
@@ -123,12 +118,12 @@ def raw_moments_of_parts(
     return totals[:, a, b]
 
 
-def _blocks(ends: Sequence[int], width: int) -> Iterator[list[tuple[int, slice]]]:
-    """Pieces of at most `width` points, each with its part, as many together as a block has room for."""
+def _blocks(ends: Sequence[int]) -> Iterator[list[tuple[int, slice]]]:
+    """Pieces of at most a block of points, each with its part, as many together as a block has room for."""
     block: list[tuple[int, slice]] = []
     for part, (begin, end) in enumerate(pairwise(ends)):
-        for start in range(begin, end, width):
-            piece = slice(start, min(start + width, end))
+        for start in range(begin, end, BLOCK):
+            piece = slice(start, min(start + BLOCK, end))
             if block and piece.stop - block[0][1].start > BLOCK:
                 yield block
                 block = []

@@ -14,10 +14,6 @@ from symrefine.errors import DegenerateShapeError
 from symrefine.geometry import Array
 from symrefine.moments.moments import Moments, dealt, exponents, raw_moments_of_parts, recentred, shifted
 
-# Points to a product: larger ones (2^18 multiplications at order 8) OpenBLAS deals out to threads, which on a busy
-# machine wait for one another twenty times as long as they work; einsum, unlike a product with a vector, never does.
-WIDTH = 512
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Sums:
@@ -40,7 +36,7 @@ class _Sums:
         local -= center
         scale = _radius(float(np.einsum("i,ij,ij->", own, local, local)), mass)
         local /= scale
-        values = raw_moments_of_parts(local, own, order, ends, width=WIDTH)
+        values = raw_moments_of_parts(local, own, order, ends)
         return cls(values=values, center=center, scale=scale, order=order)
 
     @property

@@ -15,12 +15,8 @@ from symrefine.fit.refine import MAX_OUTER
 from symrefine.geometry import Array, ReadOnly
 from symrefine.moments.moments import BLOCK
 from symrefine.ndim.roots import MOST
+from symrefine.shape import SAME_MASS
 
-# Points whose masses differ by more than this fraction are no images of each other.
-MASS = 0.1
-# Candidates that miss by more than this fraction of the diameter before they are refined must not miss by more than the
-# tolerance.
-LOOSE = 0.1
 # Points that candidates are tried on, far ones, as these tell most.
 FIRST = 16
 
@@ -37,7 +33,7 @@ class Points(ReadOnly):
     def foreign(self) -> Array:
         """[N, N] infinite between points that are no images of each other, else 0."""
         a, b = self.masses[:, None], self.masses[None, :]
-        return np.where(np.abs(a - b) > MASS * np.maximum(a, b), np.inf, 0.0)
+        return np.where(np.abs(a - b) > SAME_MASS * np.maximum(a, b), np.inf, 0.0)
 
     @property
     def free(self) -> Array:
@@ -83,7 +79,7 @@ class Points(ReadOnly):
         apart = 4.0 * tolerance
         normals = self._differences(apart)
         misses = self._misses(normals, np.argsort(-np.linalg.norm(self.points, axis=1), kind="stable")[:FIRST])
-        best = np.argsort(misses, kind="stable")[: int(np.count_nonzero(misses <= max(tolerance, min(apart, LOOSE))))]
+        best = np.argsort(misses, kind="stable")[: int(np.count_nonzero(misses <= apart))]
         return distinct(normals[best], same, MOST)
 
     def _differences(self, apart_rel: float) -> Array:

@@ -14,10 +14,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from symrefine.decide.hypotheses import MOVED
-from symrefine.decide.looks import LOOK
 from symrefine.geometry import Array
 from symrefine.moments.moments import Moments, tensor_index
 from symrefine.ntuples.rank import SIGNIFICANT
+from symrefine.samples import LOOK
 from symrefine.surface.misses import LIMITS
 
 # Orders of the moments that are asked first, and of those that look closer.

@@ -7,14 +7,15 @@ from functools import reduce
 
 import numpy as np
 
-from symrefine.decide.looks import LOOK, START_ERROR, exact_need, hopeless
-from symrefine.decide.pool import ALIKE
-from symrefine.decide.posterior import NEAR
+from symrefine.decide.looks import exact_need, hopeless
+from symrefine.decide.posterior import ALIKE, NEAR
 from symrefine.fit.vertices import ROUNDED
 from symrefine.geometry import Array
 from symrefine.groups.elements import DIRECTION_ERROR_RAD
 from symrefine.plane.outline import NOISES, Outlines
 from symrefine.plane.placed import Placed, fitted
+from symrefine.propose.candidates import START_ERROR
+from symrefine.samples import LOOK
 from symrefine.surface.misses import NO_MISS, Deviation
 
 # The largest fold that is looked for.

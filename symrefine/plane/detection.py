@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
 from symrefine.decide.doubts import on_a_line, set_by_strays
-from symrefine.decide.posterior import BEYOND, NEAR, PICTURE, Alternative, Decision, Link, alternatives, decide
+from symrefine.decide.posterior import ALIKE, NEAR, PICTURE, Alternative, Decision, Link, alternatives, decide
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance, toward_positive
 from symrefine.groups import PointGroup2D
@@ -130,8 +130,8 @@ def detect_planar(
     flaw = _flaw(shape, frame, outlines)
     with clock("search"):
         hint = None if doublets.kind == "centre" else doublets.angle_rad
-        pool = () if flaw else explore(outlines, hint, BEYOND * tolerance)
-        links = chain(outlines, pool, BEYOND * tolerance)
+        pool = () if flaw else explore(outlines, hint, ALIKE * tolerance)
+        links = chain(outlines, pool, ALIKE * tolerance)
     with clock("decide"):
         decision, hopeless = _decided(links, tolerance)
         reason = flaw or ("" if hopeless else _doubt(outlines, tolerance))

@@ -9,8 +9,9 @@ import numpy as np
 
 from symrefine.geometry import Array, Isometry
 from symrefine.plane.raster import Raster, between, coarser, outlines, raster_of
+from symrefine.samples import COUNT
 from symrefine.shape import Index
-from symrefine.surface.misses import ASKED, LIMITS, SHARES, Deviation, disc_distances, miss_distances, noise_distances
+from symrefine.surface.misses import LIMITS, SHARES, Deviation, disc_distances, miss_distances, noise_distances
 from symrefine.surface.neighbourhoods import NEIGHBOURS
 from symrefine.surface.skin import FEW, LocalPlanes, isolated_points, local_planes
 from symrefine.surface.surface import Surface
@@ -117,8 +118,8 @@ def _seen(line: Array, aside: Array, diagonal: float, least: float, rng: np.rand
 
     Of the share of the outline that counts first, corners, at least by `least`.
     """
-    cloud = local_planes(line, ASKED, rng)
-    across = disc_distances(cloud, local_planes(aside, ASKED, rng).points) if _tells(aside) else np.zeros(len(line))
+    cloud = local_planes(line, COUNT, rng)
+    across = disc_distances(cloud, local_planes(aside, COUNT, rng).points) if _tells(aside) else np.zeros(len(line))
     noise = np.sort(across / diagonal)
     corners = noise[int((1.0 - SHARES[0] - SHARES[-1]) * len(noise)) :]
     np.maximum(corners, least, out=corners)
@@ -174,7 +175,7 @@ def _of_points(points: Array, weights: Array | None, rng: np.random.Generator) -
 
 def _sampled(points: Array, diagonal: float, rng: np.random.Generator) -> Surface:
     def lines(some: Index | slice = slice(None)) -> LocalPlanes:
-        return local_planes(points[some], ASKED, rng)
+        return local_planes(points[some], COUNT, rng)
 
     noise = noise_distances(len(points), lines, rng)
     return Surface(cloud=lines(), diagonal=diagonal, noise=noise / diagonal)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symrefine.decide.hypotheses import MOVED, SAME_RAD
-from symrefine.decide.looks import START_ERROR
 from symrefine.fit.gauss_newton import Linearisation, minimise
 from symrefine.fit.matching import match, pair_equations
 from symrefine.fit.placed import FITTED, FREE_TURNS, evenly, wide_angle_rad
@@ -15,6 +14,8 @@ from symrefine.fit.refine import MAX_OUTER, SETTLED
 from symrefine.geometry import Array, Isometry, Plane, ReadOnly
 from symrefine.groups import PointGroup2D
 from symrefine.plane.outline import Outlines
+from symrefine.propose.candidates import START_ERROR
+from symrefine.surface.misses import RIM
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -111,7 +112,7 @@ def fitted(outlines: Outlines, start: Placed) -> Placed:
 
         x = minimise(linearise, np.zeros(3), max_steps=1, tolerance=SETTLED).x
         length = float(np.abs(x).max())
-        placed, error = placed.moved(x), min(START_ERROR, 4.0 * length)
+        placed, error = placed.moved(x), min(START_ERROR, RIM * length)
         if length < SETTLED:
             break
     return placed

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from symrefine.geometry import Array, ReadOnly
+from symrefine.samples import COUNT
 from symrefine.shape import Index
-from symrefine.surface.misses import ASKED
 
 # Points that make a grid, and the share of their weight that must have a neighbour one step away.
 FEWEST, JOINED = 64, 0.9
@@ -59,7 +59,7 @@ def _upright_step(points: Array) -> Array | None:
 
 def _turned_step(points: Array) -> Array | None:
     """The step whose direction and length the nearest neighbours agree on."""
-    some = points[:: max(1, len(points) // ASKED)]
+    some = points[:: max(1, len(points) // COUNT)]
     distance, near = cKDTree(points).query(some, k=2)
     pitch = float(np.median(distance[:, 1]))
     close = np.abs(distance[:, 1] - pitch) < _OFF * pitch

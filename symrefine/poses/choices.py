@@ -19,9 +19,7 @@ from symrefine.groups.names import MAX_FOLD
 from symrefine.groups.orthogonal import Index, about_z
 from symrefine.groups.standard import GOLDEN
 from symrefine.poses.symmetry import Symmetry
-
-# Each step of a golden section leaves 0.618 of the width, 45 of them a billionth of a degree.
-_SECTIONS = 45
+from symrefine.rounding import DOUBLE
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +162,7 @@ def _golden(at: Callable[[Array], Array], low: Array, high: Array) -> Array:
     """Where functions [n] of one variable are lowest between low and high [n], if each has one bottom there."""
     inner, outer = high - (high - low) / GOLDEN, low + (high - low) / GOLDEN
     left, right = at(inner), at(outer)
-    for _ in range(_SECTIONS):
+    while (high - low > DOUBLE).any():
         down = left < right
         low, high = np.where(down, low, inner), np.where(down, outer, high)
         inner, outer = high - (high - low) / GOLDEN, low + (high - low) / GOLDEN

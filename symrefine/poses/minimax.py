@@ -11,9 +11,7 @@ import numpy as np
 from symrefine.geometry import Array, batches
 from symrefine.poses.choices import Choices, choices_of, image
 from symrefine.poses.symmetry import Symmetry
-
-# What rounding leaves between two bounds that are the same, as a share of the largest coordinate.
-_MET = 1e-13
+from symrefine.rounding import DOUBLE
 
 
 def least_largest(symmetry: Symmetry, a: Array, b: Array, vertices: Array, camera: Array | None = None) -> Array:
@@ -36,7 +34,7 @@ def least_depth(poses: Array, vertices: Array) -> float:
 def _bounded(choices: Choices, a: Array, b: Array, vertices: Array) -> Array:
     """The same for a batch [n], the poses b being turned nearest to a already."""
     seen = image(a, vertices, choices.camera)
-    rounding = _MET * np.abs(seen).max(axis=(1, 2), initial=0.0)
+    rounding = DOUBLE * np.abs(seen).max(axis=(1, 2), initial=0.0)
     least = np.full(len(a), np.inf)
     few = np.empty((len(a), 0), dtype=np.intp)
     low: Array = np.zeros(len(a))

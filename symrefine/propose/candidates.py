@@ -13,23 +13,23 @@ import numpy as np
 from symrefine.fit.frame import polish_frame
 from symrefine.fit.placed import Placed
 from symrefine.geometry import Array, frame_with_z
-from symrefine.groups import MAX_FOLD as MAX_ORDER
-from symrefine.groups import PointGroup, close
+from symrefine.groups import MAX_FOLD, PointGroup, close
 from symrefine.groups.identify import POLYHEDRAL
+from symrefine.groups.names import CLOSED_FOLD
 from symrefine.moments.harmonics import harmonic_moments
 from symrefine.moments.moments import Moments
 from symrefine.ntuples.rank import FixedSubspace
-from symrefine.propose.folds import MAX_FOLD, fold_candidates, frames_across
+from symrefine.propose.folds import fold_candidates, frames_across, mirror_through
 from symrefine.propose.maps import WITHIN, maps_onto_itself
 from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candidates, whitened
 from symrefine.propose.votes import AGREE_RAD, meeting, mirror_votes, revolution
 from symrefine.rounding import DOUBLE
+from symrefine.samples import FOLLOWED
 from symrefine.surface.skin import LocalPlanes
 
-# Directions nearer than this to an earlier one are the same start: half of what order 8 resolves is 5.6 degrees.
-APART_RAD = np.radians(3.0)
-# Folds about one axis that are tried.
-FOLDS = 3
+# How far the moments may put a start wrong (radians, RMS radii; 0.04 was the most of 698 true ones): directions nearer
+# than this to an earlier one are the same start.
+START_ERROR = 0.05
 # Primes whose axes the moments tell.
 PRIMES = (2, 3, 5, 7)
 
@@ -89,7 +89,7 @@ def repeated(cloud: LocalPlanes, diagonal: float) -> list[Placed]:
         center = np.linalg.pinv(still, rcond=DOUBLE) @ m.shift
         if np.linalg.norm(m.shift - still @ center) > WITHIN * diagonal or np.linalg.norm(center) > diagonal:
             continue
-        group = close(m.matrix[None], 0.5 * AGREE_RAD, max_fold=MAX_FOLD).group
+        group = close(m.matrix[None], 0.5 * AGREE_RAD, max_fold=CLOSED_FOLD).group
         found += [Placed(group=group, center=center)] if group.order > 1 else []
     return found
 
@@ -120,12 +120,14 @@ def about(evidence: Evidence, direction: Array) -> list[Placed]:
     given = frame_with_z(direction)
     anyway = {2, 3, *_counted(evidence.points, direction)} if evidence.atoms else set(PRIMES)
     turns = {(fold, False): given for fold in anyway}
-    for axis in apart(np.stack([round_frame[2], direction]), 0.2 * APART_RAD):
-        for candidate in fold_candidates(evidence.points, evidence.weights, axis)[:FOLDS]:
+    for axis in apart(np.stack([round_frame[2], direction]), 0.2 * START_ERROR):
+        normal = mirror_through(evidence.points, evidence.weights, axis)
+        found += [] if normal is None else [placed("Cs", frame_with_z(normal))]
+        for candidate in fold_candidates(evidence.points, evidence.weights, axis)[:FOLLOWED]:
             frame = polish_frame(evidence.harmonics, candidate.frame, candidate.fold)
             found.append(placed(f"C{candidate.fold}v", frame))
             turns[candidate.fold, False] = given
-            if candidate.fold not in anyway and abs(frame[2] @ direction) < np.cos(0.2 * APART_RAD):
+            if candidate.fold not in anyway and abs(frame[2] @ direction) < np.cos(0.2 * START_ERROR):
                 turns.setdefault((candidate.fold, True), frame)  # the axis that told the fold may know it better
     return [*found, *(placed(f"C{fold}", turns[fold, polished]) for fold, polished in sorted(turns, reverse=True))]
 
@@ -134,13 +136,13 @@ def _counted(points: Array, direction: Array) -> set[int]:
     """Orders that atoms allow about a direction: C_n moves all but those on the axis, so n divides their number."""
     away = np.linalg.norm(frame_with_z(direction)[:2] @ points.T, axis=0)
     counts = {int((away > near).sum()) for near in ON_AXIS}
-    return {n for count in counts for n in range(2, min(count, MAX_ORDER) + 1) if count % n == 0}
+    return {n for count in counts for n in range(2, min(count, MAX_FOLD) + 1) if count % n == 0}
 
 
 def turned_over(evidence: Evidence, known: Placed) -> list[Placed]:
     """What turns about an axis with no mirror through it may belong to: Dn, about the centroid."""
     symbol = known.group.symbol
-    if symbol.family not in ("C", "Ch") or not 1 < symbol.fold <= MAX_FOLD:
+    if symbol.family not in ("C", "Ch") or not 1 < symbol.fold <= CLOSED_FOLD:
         return []
     axis = known.group.frame[2]
     beside_centroid = known.center - (known.center @ axis) * axis
@@ -161,9 +163,9 @@ def beside(known: Placed) -> list[Placed]:
     for u, k in main:
         frame = frame_with_z(u)
         found.append(placed("Cinfv", frame, center))
-        found += [placed(f"C{int(p * k)}", frame, center) for p in (2, 3, 5) if 2 * p * k <= MAX_FOLD]
+        found += [placed(f"C{int(p * k)}", frame, center) for p in (2, 3, 5) if 2 * p * k <= CLOSED_FOLD]
         found.append(placed("Cs", frame, center))
-        if 4 * k <= MAX_FOLD:
+        if 4 * k <= CLOSED_FOLD:
             found.append(placed(f"S{int(2 * k)}", group.frame, center))
     if group.name in ("D2", "D2h"):
         # The one pair whose elements do not name all their supergroups: T and Th have the same three.
@@ -182,7 +184,7 @@ def _principal(evidence: Evidence) -> Array:
     return np.asarray(np.linalg.eigh(evidence.moments.covariance)[1].T)
 
 
-def apart(directions: Iterable[Array], angle_rad: float = APART_RAD) -> list[Array]:
+def apart(directions: Iterable[Array], angle_rad: float = START_ERROR) -> list[Array]:
     """The directions without those within an angle of an earlier one."""
     kept: list[Array] = []
     for d in directions:

@@ -14,18 +14,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from symrefine.fit.matching import AGREE
 from symrefine.geometry import Array, Mask, orthogonal_factor
 
 Single = np.ndarray[tuple[int, ...], np.dtype[np.float32]]
 
 # By how much the invariants of compatible pairs may differ: normals of 15 degrees off move them by so much.
-INVARIANT, HANDEDNESS = 0.3, 0.15
+INVARIANT = 0.3
 # Maps that are grown from the best matches for each determinant, how many are told, and rounds that each takes.
 SEEDS, TOLD, ROUNDS = 20, 8, 3
 # Share of the most that a match has in common with a seed, from which on it belongs to it.
 COMMON = 0.3
 # Cosine of the largest angle between normals that agree, and of the angle between matrices that are one map.
-FACING, SAME = 0.7, 0.9
+SAME = 0.9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,7 +60,7 @@ def consensus(matches: Matches, within: float) -> list[Proposal]:
         allowed &= np.abs(a - b) < INVARIANT
     found: list[Proposal] = []
     for det in (1, -1):
-        agree = (allowed & (np.abs(here[-1] - det * there[-1]) < HANDEDNESS)).astype(np.float32)
+        agree = (allowed & (np.abs(here[-1] - det * there[-1]) < 0.5 * INVARIANT)).astype(np.float32)
         found += _grown(matches, agree * (agree @ agree), within, det)
     return sorted(found, key=lambda p: -p.support)
 
@@ -124,7 +125,7 @@ def _settled(matches: Matches, inside: Mask, within: float, det: int) -> tuple[A
         turns = matrices[moving].transpose(0, 2, 1)
         off = matches.source @ turns + shifts[moving, None] - matches.target
         facing = np.abs(np.einsum("kij,ij->ki", matches.source_normals @ turns, matches.target_normals))
-        agree = (np.einsum("kij,kij->ki", off, off) < within**2) & (facing > FACING)
+        agree = (np.einsum("kij,kij->ki", off, off) < within**2) & (facing > AGREE)
         changed = (np.count_nonzero(agree, axis=1) > 2) & (agree != inside[moving]).any(axis=1)
         inside[moving], moving = agree, moving[changed]
         if not moving.size:

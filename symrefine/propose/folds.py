@@ -5,17 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, ReadOnly, frame_with_z, rotation
+from symrefine.groups.names import CLOSED_FOLD
 from symrefine.rounding import DOUBLE
 
-# Folds up to half of this are told: a fundamental and its octave.
-MAX_FOLD = 128
 # Bins of the circle for each order: what a bin blurs is then below a thousandth, and is put right.
 BINS_PER_ORDER = 16
 # Share of surfaces of revolution that may show a fold by chance: the squares are exponential, so their largest is told.
 CHANCE = 0.01
 
 
-def azimuthal_spectrum(points: Array, weights: Array, axis: Array, max_fold: int = MAX_FOLD) -> tuple[Array, Array]:
+def azimuthal_spectrum(points: Array, weights: Array, axis: Array, max_fold: int = CLOSED_FOLD) -> tuple[Array, Array]:
     """Azimuthal coefficients about an axis through the origin.
 
     `c_kq = sum w f_q(rho, h) e^(i k phi)` with the slowly varying f = rho * (1, h, h^2, rho): bounded in k, unlike
@@ -77,6 +76,23 @@ def fold_candidates(points: Array, weights: Array, axis: Array, *, leak_max: flo
             found.append(FoldCandidate(fold=b, frame=phase @ frame_with_z(axis), leak=float(leak)))
     # A divisor of the true fold leaks no more than it: prefer the largest fold among equals.
     return sorted(found, key=lambda f: (round(f.leak, 1), -f.fold))
+
+
+def mirror_through(points: Array, weights: Array, axis: Array) -> Array | None:
+    """Normal [3] of the mirror through an axis that azimuths tell best, whatever else repeats; None if they tell none.
+
+    A mirror at azimuth a makes every c_k e^(-i k a) real, so that the sum of the real parts of c_k^2 e^(-2 i k a) is
+    largest there, of those c_k that stand out of chance.
+    """
+    c, sigma = azimuthal_spectrum(points, weights, axis)
+    told = (c / np.where(sigma > 0.0, sigma, np.inf)) ** 2
+    told[np.abs(told) < np.log(c.size / CHANCE)] = 0.0
+    told[0] = 0.0
+    if not told.any():
+        return None
+    count = BINS_PER_ORDER * len(c)
+    azimuth = np.pi / count * int(np.fft.fft(told.sum(axis=1), count).real.argmax())
+    return np.asarray(rotation([0, 0, 1], -azimuth)[1] @ frame_with_z(axis))
 
 
 def frames_across(points: Array, weights: Array, axis: Array, fold: int) -> list[Array]:

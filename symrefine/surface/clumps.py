@@ -9,25 +9,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, Mask
+from symrefine.samples import GLANCE
 from symrefine.shape import Index
-from symrefine.surface.misses import SHARES
+from symrefine.surface.misses import RIM, SHARES
 from symrefine.surface.neighbourhoods import (
     FLAT,
     NEIGHBOURS,
-    PROBES,
     VOLUME,
     blobness,
     choose_neighbours,
     connected_parts,
     planes_of,
+    renumbered,
 )
 from symrefine.surface.surroundings import AROUND, Surroundings, around_some
 from symrefine.surface.tree import Tree
 
 # A clump holds at most this share of the points, so many that it counts, and has no counterpart: none of half its size.
 CLUMP, COUNTERPART = 0.1, 0.5
-# Standard deviations of a clump that all but 0.1 % of a Gaussian one lie within.
-RIM = 4.0
 # Neighbourhoods as thick as this, over that of points at random in a ball, fill a volume if they do at all these sizes
 # and at one where noise alone makes no surface look so: details of objects do at some sizes, hollow as they are, wires
 # at the smallest. At 0.8 to 0.9 as many of 114 whole objects hold such a part by mistake as by one size alone, and at
@@ -36,9 +35,6 @@ FILLED, SIZES = 0.85, (64, 32, 128)
 # Neighbourhoods of so small parts of what has no counterpart are asked whether it fills a volume: clumps look at least
 # 0.81 times like a ball at all of them, the details of 76 objects at most 0.74, which is the flag of a mailbox at 1 %.
 FRACTIONS = (8, 4, 2)
-# Neighbourhoods that are asked of all: one of so many at first, as those of neighbours hold almost the same points.
-# That leaves nothing of most objects, and of 72 clumps it lost none that all of them find.
-SPARSE = 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -88,7 +84,7 @@ def clump_among(points: Array, unmet: Mask) -> Index:
 
 def _is_filled(points: Array) -> bool:
     """Whether points [N, 3] fill a volume, as neighbourhoods say that are large parts of it."""
-    tree, queries = Tree(points), points[:: max(1, len(points) // PROBES)]
+    tree, queries = Tree(points), points[:: max(1, len(points) // GLANCE)]
     thick = (np.median(_blobness(points, tree, queries, max(len(points) // k, NEIGHBOURS[0]))) for k in FRACTIONS)
     return bool(min(thick) > VOLUME)
 
@@ -123,14 +119,12 @@ def filled(points: Array, around: Surroundings, rng: np.random.Generator) -> lis
     noisy = 2 * choose_neighbours(points, tree, rng, thin=FLAT)
     # Fewer tell nothing of neighbourhoods so large, or are no counterpart of any part that counts.
     enough = max(2 * noisy * len(thick) / len(points), COUNTERPART * least)
-    for step in (SPARSE, 1):
-        part = _parts_of(within, around, enough)
-        # The first turns down most at little cost; the one that noise asks for costs most where it is asked of all.
-        for size in (SIZES[0], noisy, *SIZES[1:]):
-            if (part >= 0).sum() <= least:
-                return []
-            part = _parts_of(_filled_at(size, part >= 0, points, tree, around, step), around, enough)
-        within &= _beside(_beside(part >= 0, around), around)
+    part = _parts_of(within, around, enough)
+    # The first turns down most at little cost; the one that noise asks for costs most where it is asked of all.
+    for size in (SIZES[0], noisy, *SIZES[1:]):
+        if (part >= 0).sum() <= least:
+            return []
+        part = _parts_of(_filled_at(size, part >= 0, points, tree, around), around, enough)
     # One that fills a volume may hold more than one of surface, as long as the rest is no counterpart of it.
     most = COUNTERPART / (1.0 + COUNTERPART)
     grown = (_grown(m, around) for m in _lone(part, most))
@@ -145,25 +139,13 @@ def _parts_of(within: Mask, around: Surroundings, enough: float) -> Index:
     return np.where(np.bincount(part + 1)[part + 1] < enough, -1, part)
 
 
-def _beside(some: Mask, around: Surroundings) -> Mask:
-    """Some points with the neighbours of each."""
-    found = some.copy()
-    found[around.near[some]] = True
-    return found
-
-
-def _filled_at(size: int, within: Mask, points: Array, tree: Tree, around: Surroundings, step: int) -> Mask:
-    """Those `within` around which neighbourhoods of another size fill a volume too, by one of `step` near each."""
+def _filled_at(size: int, within: Mask, points: Array, tree: Tree, around: Surroundings) -> Mask:
+    """Those `within` around which neighbourhoods of another size fill a volume too."""
     near = around.near[within]
-    # Small neighbourhoods of neighbours have less in common.
-    step = max(min(step, size * len(within) // (SPARSE * len(points))), 1)
-    asked = np.zeros(len(within), dtype=bool)
-    asked[near] = near % step == 0
-    asked[near[~asked[near].any(axis=1), 0]] = True
-    thick = np.zeros(len(within))
-    thick[asked] = _blobness(points, tree, around.points[asked], min(size, len(points)))
+    asked, own = renumbered(near, len(within))
+    thick = _blobness(points, tree, around.points[asked], min(size, len(points)))
     found = within.copy()
-    found[within] = thick[near].sum(axis=1) > FILLED * asked[near].sum(axis=1)
+    found[within] = thick[own].mean(axis=1) > FILLED
     return found
 
 

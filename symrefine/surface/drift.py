@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, Isometry, Mask, ReadOnly, rows
+from symrefine.samples import GLANCE
 from symrefine.surface.floor import Floor
-from symrefine.surface.neighbourhoods import NEIGHBOURS, PROBES, in_cells
+from symrefine.surface.neighbourhoods import NEIGHBOURS, in_cells
 from symrefine.surface.tree import Tree
 
 # Cells that a window is put together from, and how far they reach, in standard deviations of its weights.
@@ -92,7 +93,7 @@ class Drift(ReadOnly):
         `tree` is the kd-tree over the points.
         """
         sources = points[np.sort(rng.choice(len(points), min(count, len(points)), replace=False))]
-        some = sources[:: max(1, len(sources) // PROBES)]
+        some = sources[:: max(1, len(sources) // GLANCE)]
         # A disc of radius R holds as many points as a window on it of width R / 2 counts for.
         width = 0.5 * float(np.median(tree.query(some, min(NEIGHBOURS[-1], len(points)))[0][:, -1]))
         cells = _cells(points, width, rng)
@@ -149,7 +150,7 @@ def _cells(points: Array, width: float, rng: np.random.Generator) -> int:
     """Into how many cells points [N, 3] go such that `CELLS` of them fill a window."""
     some, count = points[rng.permutation(len(points))], len(points)
     while count > CELLS:
-        reach = float(np.median(Tree(some[:count]).query(some[:PROBES], CELLS)[0][:, -1])) / (REACH * width)
+        reach = float(np.median(Tree(some[:count]).query(some[:GLANCE], CELLS)[0][:, -1])) / (REACH * width)
         if reach >= 1.0:
             break
         # In a sheet the reach grows with the root of what a cell holds.

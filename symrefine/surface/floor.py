@@ -11,12 +11,12 @@ from scipy.spatial import ConvexHull, QhullError
 
 from symrefine.geometry import Array, Mask, frame_with_z, tight_diagonal
 from symrefine.rounding import SINGLE
-from symrefine.surface.clumps import RIM
-from symrefine.surface.misses import SHARES
+from symrefine.samples import LOOK
+from symrefine.surface.misses import RIM, SHARES
 from symrefine.surface.tree import Tree
 
 # Planes that are tried, and points that they are tried on: of floors that hold a tenth of all, one in 150 is missed.
-TRIALS, SOME = 5000, 1000
+TRIALS = 5000
 # Fits of a plane to the points that lie on the one before: the first starts off by as much as it may be thick.
 FITS = 5
 # How far off its points may lie, of the diagonal: for noise of 0.3 % to 1.25 %.
@@ -78,7 +78,7 @@ def floor_of(points: Array, seen_from: Array | None = None) -> Floor | None:
     flat bottom of an object does not.
     """
     rng = np.random.default_rng(0)
-    some = points[rng.permutation(len(points))[:SOME]]
+    some = points[rng.permutation(len(points))[:LOOK]]
     corners = some[rng.integers(len(some), size=(TRIALS, 3))]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(across, axis=1)

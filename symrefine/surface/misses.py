@@ -12,6 +12,8 @@ from functools import reduce
 import numpy as np
 
 from symrefine.geometry import Array, Isometry, rows
+from symrefine.moments.moments import BLOCK
+from symrefine.samples import COUNT
 from symrefine.shape import Index
 from symrefine.surface.skin import LocalPlanes
 from symrefine.units import TOLERANCE as TOLERANCE
@@ -30,14 +32,13 @@ ATOM_LIMITS = (0.9, 1.3, 1.6)
 # Standard deviations by which what samples show of noise may be off: with one, true elements need 0.4 of the tolerance
 # at 1 % noise; three hide details of 2 % of the surface at 8,000 points.
 SURE = 2.0
+# Standard deviations that all but a thousandth of a Gaussian in space lie within, or lengths of the last step that a
+# fit is off by at most.
+RIM = 4.0
 # Discs around a point that are looked at: at edges the nearest centre need not be that of the nearest disc.
 DISCS = 4
-# Queries whose discs are measured at once: what they need stays in the cache of a core.
-AT_ONCE = 4096
 # Spacing in the halves of a volume over that of the whole.
 HALVES_OF_VOLUME = 2.0 ** (1.0 / 3.0)
-# Points of each half that are asked.
-ASKED = 4000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,7 +158,7 @@ def disc_distances(
     skip = int(skip_self)
     count = min(discs + skip, len(cloud.points))
     away, near = cloud.around(queries, classes, count - skip, skip=skip, bound=bound)
-    rows = [slice(first, first + AT_ONCE) for first in range(0, len(queries), AT_ONCE)]
+    rows = [slice(first, first + BLOCK) for first in range(0, len(queries), BLOCK)]
     apart = [_to_discs(cloud, queries[r], away[r], near[r], None if classes is None else classes[r]) for r in rows]
     return np.minimum(np.concatenate(apart) if apart else np.zeros(0), bound)
 
@@ -193,7 +194,7 @@ def sampling_distances(cloud: LocalPlanes, points: Array, classes: Index | None)
 
     Where samples are free of noise, an object with an exact symmetry differs from its image by no more.
     """
-    some = slice(None, None, max(1, len(points) // (2 * ASKED)))
+    some = slice(None, None, max(1, len(points) // (2 * COUNT)))
     return disc_distances(cloud, points[some], None if classes is None else classes[some])
 
 
@@ -214,7 +215,7 @@ def noise_distances(
     one, other = (planes(half) for half in halves(count, rng))
     across = []
     for here, there in ((one, other), (other, one)):
-        some = slice(None, None, max(1, len(there.points) // ASKED))
+        some = slice(None, None, max(1, len(there.points) // COUNT))
         across.append(disc_distances(here, there.points[some], there.classes(some)))
     return np.concatenate(across) / (HALVES_OF_VOLUME if one.body == "volume" else 1.0)
 

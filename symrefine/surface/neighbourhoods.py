@@ -9,6 +9,7 @@ import numpy as np
 
 from symrefine.geometry import Array, rows
 from symrefine.rounding import SINGLE
+from symrefine.samples import GLANCE, LOOK
 from symrefine.shape import Index
 from symrefine.surface.tree import Tree
 
@@ -18,14 +19,12 @@ NEIGHBOURS = (12, 24, 48, 96, 192)
 WIDEST = 0.2
 # Thickness over width below which a neighbourhood counts as a plane.
 FLAT = 0.3
-# Median flatness of neighbourhoods up to WIDEST_BLOB wide, over that of a blob, from which on points fill a volume.
+# Median flatness of neighbourhoods up to WIDEST_BLOB wide (RMS radii), over that of a blob, from which on points fill a
+# volume.
 VOLUME = 0.8
-# Probes at first, and the doubt that they leave.
-PROBES = 60
-UNCERTAIN = 0.08
 WIDEST_BLOB = 0.5
 # Cells that larger neighbourhoods are put together from: with half as many, the rims alone add a tenth to the noise.
-CELLS = 48
+CELLS = NEIGHBOURS[2]
 
 
 def smallest_eigenvectors(covariance: Array) -> tuple[Array, Array]:
@@ -167,16 +166,14 @@ def renumbered(chosen: Index, count: int) -> tuple[Index, Index]:
     return np.flatnonzero(is_chosen), (np.cumsum(is_chosen) - 1)[chosen]
 
 
-def choose_neighbours(
-    points: Array, tree: Tree, rng: np.random.Generator, *, probes: int = 120, thin: float = 0.0
-) -> int:
+def choose_neighbours(points: Array, tree: Tree, rng: np.random.Generator, *, thin: float = 0.0) -> int:
     """Smallest neighbourhood that looks like a plane, or the one that looks most like it: noise decides, no parameter.
 
     Flatness is compared with what a blob without any structure shows in a sample of the same size. Noise makes all
     neighbourhoods thick, thin sheets and edges only some: with `thin`, the smallest will do as soon as a quarter of
     them is flatter than that.
     """
-    pick = rng.choice(len(points), min(probes, len(points)), replace=False)
+    pick = rng.choice(len(points), min(GLANCE, len(points)), replace=False)
     most = min(NEIGHBOURS[-1], len(points) // 8 + 4, len(points))
     ratios: dict[int, float] = {}
     for k in NEIGHBOURS:
@@ -233,30 +230,15 @@ def _blob_flatness(k: int) -> float:
     return max(float(np.median(flatness_of(values))), 1e-12)
 
 
-def fills_volume(points: Array, tree: Tree, rng: np.random.Generator, radius: float = 1.0) -> bool:
-    """Whether points [N, 3] of this RMS radius fill a volume: at no width do neighbourhoods look flatter than blobs."""
-    order, most = rng.permutation(len(points)), WIDEST_BLOB * radius
-    first, widest = _flattest(points, tree, order[:PROBES], NEIGHBOURS[0], most)
-    if abs(first - VOLUME) > UNCERTAIN:
-        return first > VOLUME
-    return _flattest(points, tree, order[: 5 * PROBES], widest, most)[0] > VOLUME
-
-
-def _flattest(points: Array, tree: Tree, pick: Index, likely: int, most: float) -> tuple[float, int]:
-    """Smallest median flatness of neighbourhoods of some points, over that of a blob, at any size, up to `most` wide.
-
-    Told with the largest size that was asked; sizes up to the one that is `likely` to be it are asked at once.
-    """
-    size, flattest = NEIGHBOURS[0], np.inf
-    distance, near = tree.query(points[pick], likely)
+def fills_volume(points: Array, tree: Tree) -> bool:
+    """Whether points [N, 3] fill a volume: at no width do neighbourhoods look flatter than blobs."""
+    pick, size = np.random.default_rng(0).permutation(len(points))[:LOOK], NEIGHBOURS[0]
+    most = WIDEST_BLOB * float(np.sqrt(points.var(axis=0).sum()))
     while size <= max(len(points) // 8, NEIGHBOURS[0]):
-        if size > near.shape[1]:
-            distance, near = tree.query(points[pick], size)
-        if float(np.median(distance[:, size - 1])) > most:
+        distance, near = tree.query(points[pick], size)
+        if float(np.median(distance[:, -1])) > most:
             break
-        values = planes_of(points, near[:, :size])[2]
-        flattest = min(flattest, float(np.median(flatness_of(values))) / _blob_flatness(size))
-        if flattest < VOLUME - UNCERTAIN:
-            break
+        if float(np.median(flatness_of(planes_of(points, near)[2]))) <= VOLUME * _blob_flatness(size):
+            return False
         size *= 2
-    return flattest, near.shape[1]
+    return True

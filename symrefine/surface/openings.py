@@ -28,7 +28,7 @@ from symrefine.surface.neighbourhoods import (
     smallest_eigenvectors,
     spreads_of,
 )
-from symrefine.surface.skin import LocalPlanes
+from symrefine.surface.skin import AROUND, LocalPlanes
 from symrefine.surface.tree import Tree
 
 # Neighbours that tell a border, and how far off the point their middle lies there, in standard deviations along the
@@ -49,8 +49,6 @@ OPEN, WIRE = 0.02, 0.2
 EVIDENT = 0.1
 # Correlation of how far off the common sheet neighbours lie with how far in: 0.6 where two sheets meet, 0 at a border.
 PARTED = 0.3
-# Neighbours by which the patches of an image hang together.
-LINKS = 6
 # A patch is unseen if one in so many of the places where it begins is at a border: of true ones more than half are.
 MOST = 3
 # Operations, but for the identity, from which on most take a place where the object ends to others where it does: if it
@@ -108,8 +106,8 @@ class Openings:
         """Pairs [2, E] of every `stride`-th local planes that are neighbours, both ways, by the first of each."""
         if stride not in self.links:
             points = cloud.points[::stride]
-            _, near = Tree(points).query(points, LINKS, skip=1)
-            pairs = np.stack([np.repeat(np.arange(len(points)), LINKS), near.ravel()])
+            _, near = Tree(points).query(points, AROUND, skip=1)
+            pairs = np.stack([np.repeat(np.arange(len(points)), AROUND), near.ravel()])
             both = np.concatenate([pairs, pairs[::-1]], axis=1)
             self.links[stride] = both[:, np.argsort(both[0], kind="stable")]
         return self.links[stride]
@@ -222,9 +220,9 @@ def agreed(places: Array, unseen: Mask) -> Mask:
     Whether somebody did is a matter of the place. Of a border not all may be told, so that a patch of one operation is
     denied what those of others that come to lie there are granted.
     """
-    if unseen.all() or not unseen.any() or len(places) <= LINKS:
+    if unseen.all() or not unseen.any() or len(places) <= AROUND:
         return unseen
-    near = Tree(places).query(places, LINKS + 1)[1]
+    near = Tree(places).query(places, AROUND + 1)[1]
     return np.asarray(unseen[near].mean(axis=1) > 0.5)
 
 
@@ -296,7 +294,7 @@ def _aside(cloud: LocalPlanes, points: Array, tree: Tree, near: Index | None) ->
     mean, spread = spreads_of(Neighbourhoods.of(points, tree, NEIGHBOURS).around(cloud.points, near))
     variances, _ = smallest_eigenvectors(spread)
     # The normals of as wide a neighbourhood.
-    count = min(max(LINKS, round(NEIGHBOURS * len(cloud.points) / len(points))), len(cloud.points))
+    count = min(max(AROUND, round(NEIGHBOURS * len(cloud.points) / len(points))), len(cloud.points))
     normals = rows(cloud.normals, cloud.around(cloud.points, cloud.labels, count)[1])
     sheet = variances[:, 1] > WIRE**2 * variances[:, 2]
     aside = np.where(sheet, _off(mean - cloud.points, spread, normals), 0.0)
@@ -341,7 +339,7 @@ def _folded(at: Array, points: Array, tree: Tree, near: Index | None) -> Mask:
     Where a surface ends they scatter, or two walls run side by side, as far in as at the end. By chance 32 neighbours
     show a correlation of 0.18, so those of several places at the same edge are taken together.
     """
-    if len(at) <= LINKS:
+    if len(at) <= AROUND:
         return np.zeros(len(at), dtype=bool)
     near = tree.query(at, NEIGHBOURS)[1] if near is None else near
     middle, across, _ = planes_of(points, near)
@@ -354,7 +352,7 @@ def _folded(at: Array, points: Array, tree: Tree, near: Index | None) -> Mask:
     off, depth = (v - v.mean(axis=1, keepdims=True) for v in (off, depth))
     size = np.linalg.norm(off, axis=1) * np.linalg.norm(depth, axis=1)
     parted = np.einsum("nk,nk->n", off, depth) / np.maximum(size, DOUBLE)
-    return _together(at, parted, LINKS + 1) > PARTED
+    return _together(at, parted, AROUND + 1) > PARTED
 
 
 def _lines(cloud: LocalPlanes, chosen: Mask) -> Mask:

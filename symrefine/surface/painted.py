@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 
 from symrefine.geometry import Array, Isometry, ReadOnly
+from symrefine.samples import GLANCE
 from symrefine.shape import Index
 from symrefine.surface.misses import needs
+from symrefine.surface.neighbourhoods import NEIGHBOURS
 from symrefine.surface.tree import Tree
 from symrefine.texture import COLOUR_TOLERANCE, Texture, corner_weights
 
-# Samples next to a place whose triangles it may lie on; samples that are asked for a colour around a place: of 8,000 as
-# many as lie within a tenth of the diagonal, beyond which nothing is told apart.
-FACES, AROUND = 3, 192
-# Samples that tell which operations are hopeless, and of how many operations the worst they allow for: a few samples
-# miss by chance.
-GLANCE, CHANCES = 250, 1000
+# Samples next to a place whose triangles it may lie on.
+FACES = 3
+# Of how many operations the worst is allowed for at a glance: a few samples miss by chance.
+CHANCES = 1000
 _NO_NOISE = np.array([])
 
 
@@ -83,7 +83,7 @@ class Painted(ReadOnly):
         off = np.flatnonzero(_differ(self._colours_at(places), colours))
         found = np.zeros(len(places))
         if off.size:
-            away, near = self.tree.query(places[off], min(AROUND, len(self.points)))
+            away, near = self.tree.query(places[off], min(NEIGHBOURS[-1], len(self.points)))
             away = np.where(_differ(self.colours[near], colours[off, None]), away[:, -1:], away)
             found[off] = away.min(axis=1) / self.diagonal
         return found

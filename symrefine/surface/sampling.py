@@ -4,7 +4,6 @@ A few thousand of the points tell whether there is anything to be done at all; o
 decided here depends on the surroundings of a point alone, so that it breaks no symmetry.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,16 +12,14 @@ import numpy as np
 from symrefine.geometry import Array, Mask
 from symrefine.shape import Index
 from symrefine.surface.clumps import clumps, filled
+from symrefine.surface.misses import SHARES
 from symrefine.surface.neighbourhoods import FLAT, WIDEST, fills_volume, planes_of, thickness_of
-from symrefine.surface.surroundings import AROUND, ASKED, Surroundings, around_some, some_of
+from symrefine.surface.surroundings import AROUND, Surroundings, around_some, some_of
 from symrefine.surface.tree import Tree
 
 # A stray has its neighbours so many times as far away as half of the points have theirs: what 8 neighbours vary by on
 # an even surface ends at 1.8, and a density that falls by 6:1 to one side reaches it.
 FAR = 2.5
-# The ball to the eighth neighbour of a point that is spread at random over a volume should hold eight, near a surface
-# half of that; of thin parts that are sampled sparsely it should hold a tenth of one.
-CROWDED = 1.0
 # A round that finds fewer strays than this share is the last: what remains lies within the spacing of the surface.
 LAST = 0.001
 # Standard deviation of the logarithm of the density along some direction from which on points are no even sample: half
@@ -30,8 +27,6 @@ LAST = 0.001
 UNEVEN = 0.1
 # Density over the least up to which weights make up for it: there neighbourhoods are one step of sizes narrower.
 DENSER = 2.0
-# Share of the points beyond which they are too lonely to say how dense a surface was sampled.
-LONELY = 0.99
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -72,7 +67,6 @@ def sampling(
     groups: bool = True,
     apart: bool = True,
     foreign: Sequence[Index] = (),
-    asked: int = ASKED,
 ) -> Sampling:
     """How points [N, 3] were sampled; with `outliers` those that belong to no surface are set apart.
 
@@ -86,14 +80,14 @@ def sampling(
     lone: list[Index] = []
     if len(points) <= AROUND or points.std() == 0.0:
         return Sampling(kept=kept, even=kept, strays=kept[:0])
-    some = some_of(points, rng, asked)
+    some = some_of(points, rng)
     spread = points[some].std()
     points = (points - points[some].mean(axis=0)) / spread
     around = Surroundings.of(points[some])
     solid = _is_solid(around, points)
     if outliers and _alone(around).any() and (not solid or _stand_off(around)):
         kept = _without_strays(points)
-        around = around_some(points[kept], rng, asked)
+        around = around_some(points[kept], rng)
     groups = groups and not solid  # nothing tells one volume from another
     if outliers and groups and apart and (found := clumps(points[kept], around)):
         taken += [kept[c] for c in found]
@@ -121,10 +115,9 @@ def sampling(
 
 def _is_solid(around: Surroundings, points: Array) -> bool:
     """Whether points [N, 3] fill a volume, as some of them say: to few points small parts are solid, too."""
-    radius = math.sqrt(3.0)  # coordinates have a standard deviation of 1
-    if not fills_volume(around.points, around.tree, np.random.default_rng(0), radius):
+    if not fills_volume(around.points, around.tree):
         return False
-    return len(around.points) == len(points) or fills_volume(points, Tree(points), np.random.default_rng(0), radius)
+    return len(around.points) == len(points) or fills_volume(points, Tree(points))
 
 
 def _without(indices: Index, parts: Sequence[Index], size: int) -> Index:
@@ -191,7 +184,8 @@ def _scattered(points: Array, box: Array) -> bool:
     if len(points) <= neighbours:
         return False
     away = Tree(points).query(points, 1, skip=neighbours)[0]
-    return bool(4.0 / 3.0 * np.pi * np.median(away) ** 3 * len(points) > CROWDED * np.prod(box))
+    # The ball to the eighth neighbour should then hold eight; of thin parts that are sampled sparsely a tenth of one.
+    return bool(4.0 / 3.0 * np.pi * np.median(away) ** 3 * len(points) > np.prod(box))
 
 
 def _is_uneven(around: Surroundings, points: Array) -> bool:
@@ -227,7 +221,7 @@ def _evened(points: Array, rng: np.random.Generator) -> tuple[Index, Array]:
     """
     around = Surroundings.of(points)
     area = _area(around)[around.near].mean(axis=1)
-    chance = np.minimum(DENSER * area / np.quantile(area, LONELY), 1.0)
+    chance = np.minimum(DENSER * area / np.quantile(area, 1.0 - SHARES[2]), 1.0)
     even = np.flatnonzero(rng.random(len(points)) < chance)
     return even, (area / chance)[even]
 
@@ -235,4 +229,4 @@ def _evened(points: Array, rng: np.random.Generator) -> tuple[Index, Array]:
 def _area(around: Surroundings) -> Array:
     """How much surface [N] each point stands for, up to a factor."""
     away = around.away[:, -1]
-    return np.asarray(np.minimum(away, np.quantile(away, LONELY)) ** 2)
+    return np.asarray(np.minimum(away, np.quantile(away, 1.0 - SHARES[2])) ** 2)

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.geometry import Array, Mask, ReadOnly, rows
+from symrefine.samples import GLANCE
 from symrefine.shape import Index
 from symrefine.surface.neighbourhoods import (
     NEIGHBOURS,
-    PROBES,
     Neighbourhoods,
     choose_neighbours,
     fit_planes,
@@ -240,7 +240,7 @@ class Skin:
 
     @property
     def _probes(self) -> Array:
-        return self.points[:: max(1, len(self.points) // PROBES)]
+        return self.points[:: max(1, len(self.points) // GLANCE)]
 
     @cached_property
     def _neighbourhoods(self) -> Neighbourhoods:

@@ -8,6 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from symrefine.geometry import Array, Axis, Isometry, read_only
+from symrefine.moments.moments import PARTS
+from symrefine.samples import COUNT, LOOK
 from symrefine.surface.cameras import unclosed
 from symrefine.surface.drift import Drift
 from symrefine.surface.misses import (
@@ -29,10 +31,6 @@ from symrefine.surface.wedge import Wedge
 NEAREST_SPREAD = 0.363
 # Local planes that show how the patches of an image hang together.
 PATCHES = 1500
-# Pieces of a volume that tell how far chance puts its covariance off, which two of its components do to a sixth.
-PIECES = 32
-# Windows that are moved: by all operations together, and by each at least.
-WINDOWS, WINDOWS_EACH = 2400, 400
 # Misses of an open surface end where the least of it needs so many tolerances: nothing beyond is told apart.
 HOPELESS = 3.0
 
@@ -232,9 +230,9 @@ class Surface:
     def _spread(self) -> tuple[Array, float]:
         """Covariance of the points [3, 3], and by how much, in squares, chance puts it off its image in the mean."""
         points = self.cloud.points[np.random.default_rng(0).permutation(len(self.cloud.points))]
-        own, parts = np.cov(points.T), [np.cov(points[k::PIECES].T) for k in range(PIECES)]
+        own, parts = np.cov(points.T), [np.cov(points[k::PARTS].T) for k in range(PARTS)]
         # One of n pieces is n - 1 times as far off as the whole, in squares, and the image is off as much once more.
-        return own, float(2.0 * np.mean([spread_distance(own, part) ** 2 for part in parts]) / (PIECES - 1))
+        return own, float(2.0 * np.mean([spread_distance(own, part) ** 2 for part in parts]) / (PARTS - 1))
 
     def drifts(self, motions: Sequence[Isometry]) -> Array:
         """How far windows of each of K images lie from those of the cloud [K, S], fractions of the diagonal."""
@@ -315,4 +313,4 @@ class Surface:
 
 def _windows_each(motions: Sequence[Isometry]) -> int:
     """Windows that each of some operations moves."""
-    return max(WINDOWS_EACH, WINDOWS // len(motions))
+    return max(LOOK, COUNT // len(motions))

@@ -10,7 +10,8 @@ from symrefine.shape import Index
 from symrefine.surface.neighbourhoods import planes_of, renumbered, thickness_of
 from symrefine.surface.tree import Tree
 
-# Points that are asked first, and neighbours that tell of the surroundings of a point.
+# Points that are asked first, and neighbours that tell of the surroundings of a point. To 3,000 points the legs of a
+# spider are no surface.
 ASKED, AROUND = 5000, 16
 
 
@@ -66,13 +67,13 @@ class Surroundings:
         return thickness_of(self.planes[2])
 
 
-def around_some(points: Array, rng: np.random.Generator, asked: int = ASKED) -> Surroundings:
+def around_some(points: Array, rng: np.random.Generator) -> Surroundings:
     """The surroundings of some of points [N, 3]."""
-    return Surroundings.of(points[some_of(points, rng, asked)])
+    return Surroundings.of(points[some_of(points, rng)])
 
 
-def some_of(points: Array, rng: np.random.Generator, asked: int = ASKED) -> Index:
-    """Indices of so many of points [N, 3] at random, and of the farthest, lest a few strays are missed."""
+def some_of(points: Array, rng: np.random.Generator) -> Index:
+    """Indices of some of points [N, 3] at random, and of the farthest, lest a few strays are missed."""
     away = ((points - np.median(points, axis=0)) ** 2).sum(axis=1)
-    asked_or_far = np.concatenate([rng.permutation(len(points))[:asked], np.argpartition(away, -1 - AROUND)[-AROUND:]])
+    asked_or_far = np.concatenate([rng.permutation(len(points))[:ASKED], np.argpartition(away, -1 - AROUND)[-AROUND:]])
     return renumbered(asked_or_far, len(points))[0]

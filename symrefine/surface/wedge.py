@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, Axis, Isometry, frame_with_z, orthogonal_factor
+from symrefine.samples import COUNT
 from symrefine.shape import Index
-from symrefine.surface.misses import ASKED, disc_distances, halves, needs
+from symrefine.surface.misses import disc_distances, halves, needs
 from symrefine.surface.skin import LocalPlanes, Skin, drawn
 
 # Neighbourhoods side by side that a wedge has to be wide for what leans in it to be seen as it is: two for each half of
@@ -160,7 +161,7 @@ def _planes(skin: Skin, some: Index | slice, pitch: float, rng: np.random.Genera
         neighbours=skin.neighbours,
         labels=None if labels is None else np.tile(labels, 2),
     )
-    own = wider.local_planes(drawn(len(points), ASKED, rng))
+    own = wider.local_planes(drawn(len(points), COUNT, rng))
     aside = _aside(own.points, pitch)
     return own.with_copies(_turned(own.points, aside), _turned(own.normals, aside))
 

@@ -19,6 +19,7 @@ from symrefine.fit.placed import Placed
 from symrefine.fit.vertices import NEAR, Distinct, on_vertices, settled, towards
 from symrefine.geometry import Array, ReadOnly, tight_diagonal, unit
 from symrefine.groups import PointGroup
+from symrefine.groups.names import TURNS
 from symrefine.shape import Index, Shape
 from symrefine.surface.skin import FEW
 from symrefine.symmetrize.leftover import with_leftovers
@@ -36,6 +37,8 @@ MATCHINGS, FEWEST = 4, 4
 FITTED = 2000
 # Copies of a point this near (of the diagonal) are one point.
 _SAME = 1e-9
+# A copied sector keeps at least so many points, and there are so many of them at least.
+SECTOR, FEWEST_TURNS = 30, 8
 # No operation of any group fixes this direction: it marks the sector that is copied.
 _GENERIC = (0.8123, 0.2877, 0.5072)
 
@@ -238,7 +241,10 @@ class _Work:
 def _start(shape: Shape, center: Array, group: PointGroup, *, copied: bool, seed: int) -> _Work:
     """The distinct points (and labels) of a shape, in units of the diagonal about the centre of its group."""
     diagonal = tight_diagonal(shape.points)
-    own = Distinct.of(shape, center, diagonal)
+    own, turns = Distinct.of(shape, center, diagonal), TURNS
+    if copied and not group.is_finite:
+        sectors = len(group.sampled(1).operations())
+        turns = min(TURNS, max(FEWEST_TURNS, len(own.points) // (SECTOR * sectors) // 2 * 2))
     return _Work(
         shape=shape,
         center=center,
@@ -247,7 +253,7 @@ def _start(shape: Shape, center: Array, group: PointGroup, *, copied: bool, seed
         rows=own.rows,
         back=own.back,
         labels=own.labels,
-        place=Placed(group=finite_group(group, own.points, copied=copied), center=np.zeros(3)),
+        place=Placed(group=finite_group(group, own.points, turns), center=np.zeros(3)),
         rng=np.random.default_rng(seed),
     )
 
