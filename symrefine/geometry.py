@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symrefine.errors import InputError
-from symrefine.units import LARGEST_TOLERANCE as LARGEST_TOLERANCE
+from symrefine.rounding import LARGEST_TOLERANCE as LARGEST_TOLERANCE
 
 Array = NDArray[np.floating[Any]]
 Mask = NDArray[np.bool_]
@@ -169,15 +169,6 @@ class Axis:
         object.__setattr__(self, "direction", read_only(unit(self.direction)))
 
 
-def homogeneous(matrices: Array, center: Array) -> Array:
-    """Matrices [N, n+1, n+1] of orthogonal maps [N, n, n] that leave a centre [n] in place."""
-    dim = len(center)
-    found = np.tile(np.eye(dim + 1), (len(matrices), 1, 1))
-    found[:, :dim, :dim] = matrices
-    found[:, :dim, dim] = center - matrices @ center
-    return found
-
-
 def householder(normal: ArrayLike) -> Array:
     """Reflection `I - 2 n n'` [n, n] with determinant -1 across the plane through 0 normal to `normal`."""
     n = np.asarray(normal, dtype=np.float64) / _length(normal, "normal")
@@ -302,13 +293,6 @@ def tight_diagonal(points: Array) -> float:
         if trial < best:
             best, frame = trial, turned
     return best
-
-
-def least_diagonal(points: Array) -> float:
-    """Distance between two of points [N, 3] that lie far apart: no box around them has a shorter diagonal."""
-    centred = points - points.mean(axis=0)
-    end = points[np.einsum("ij,ij->i", centred, centred).argmax()]
-    return float(np.sqrt(((points - end) ** 2).sum(axis=1).max()))
 
 
 def corners(points: Array) -> Array:

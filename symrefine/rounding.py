@@ -1,9 +1,12 @@
-"""What rounding leaves of numbers: the two measures by which things of size one count as nothing, or as the same."""
+"""By how much things differ that count as the same: what rounding leaves of numbers of size one, what is forgiven."""
 
 # Coordinates in single precision, or written with six digits, directions and angles made of them.
 SINGLE = 1e-6
 # Sums, products and small systems of equations in double precision: some thousand roundings.
 DOUBLE = 1e-12
+# The tolerance unless another is asked for, and the largest, as fractions of the diagonal: beyond a fifth everything is
+# symmetric.
+TOLERANCE, LARGEST_TOLERANCE = 0.02, 0.2
 
 
 def twelve_digits(value: float, scale: float) -> float:

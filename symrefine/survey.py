@@ -15,9 +15,11 @@ from symrefine.moments.moments import shape_moments
 from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.rounding import SINGLE
 from symrefine.shape import Index, Shape
-from symrefine.surface.clumps import count_parts
+from symrefine.surface.clumps import parts_among
+from symrefine.surface.misses import SHARES
 from symrefine.surface.neighbourhoods import connected_parts, fills_volume
 from symrefine.surface.sampling import sampling
+from symrefine.surface.surroundings import AROUND, around_some
 from symrefine.surface.tree import Tree
 
 # Points below which the answer for a cloud is often `undetermined` (see README, boundary cases).
@@ -184,10 +186,18 @@ def _cloud(shape: Shape) -> Cloud:
         strays=round(each * len(found.strays)),
         clumps=tuple(round(each * len(clump)) for clump in found.clumps),
         floor=points_of_floor(shape),
-        parts=count_parts(kept, np.random.default_rng(0)),
+        parts=_count_parts(kept, np.random.default_rng(0)),
         even=found.shares is None,
         volume=found.solid and fills_volume(kept, Tree(kept)),
     )
+
+
+def _count_parts(points: Array, rng: np.random.Generator) -> int:
+    """How many parts points [N, 3] have, strays left out, that hang together and are so large that they count."""
+    if len(points) <= AROUND:
+        return 1
+    sizes = np.bincount(parts_among(around_some(points, rng)))
+    return max(int((sizes > max(SHARES[-1] * sizes.sum(), AROUND)).sum()), 1)
 
 
 def points_of_floor(shape: Shape) -> int:

@@ -106,7 +106,7 @@ def colour_classes(colours: NDArray[Any], weights: Array) -> NDArray[np.int64]:
     """
     from scipy.spatial import cKDTree
 
-    scaled = _eight_bit(colours)
+    scaled = eight_bit(colours)
     # Some weight for all: what covers nothing needs a class too, but makes none.
     share = weights / max(weights.sum(), np.finfo(float).tiny) + 1e-12
     cell = np.unique(np.floor(scaled / _CELL), axis=0, return_inverse=True)[1].reshape(-1)
@@ -114,12 +114,6 @@ def colour_classes(colours: NDArray[Any], weights: Array) -> NDArray[np.int64]:
     means = np.stack([np.bincount(cell, share * channel) for channel in scaled.T], axis=1) / mass[:, None]
     found = cKDTree(_centres(means, mass)).query(scaled)[1]
     return np.asarray(found, dtype=np.int64)
-
-
-def class_colours(colours: NDArray[Any], classes: NDArray[np.int64]) -> Array:
-    """Mean colours [K, 3], 0 to 255, of classes [N], 0 .. K - 1, of colours [N, 3] on any of these scales."""
-    count = np.maximum(np.bincount(classes), 1)
-    return np.stack([np.bincount(classes, channel) for channel in _eight_bit(colours).T], axis=1) / count[:, None]
 
 
 def _centres(colours: Array, mass: Array) -> Array:
@@ -146,7 +140,7 @@ def _centres(colours: Array, mass: Array) -> Array:
     return np.array(centres)
 
 
-def _eight_bit(colours: NDArray[Any]) -> Array:
+def eight_bit(colours: NDArray[Any]) -> Array:
     """Colours on the scale from 0 to 255."""
     values = colours.astype(np.float64)
     top = values.max()

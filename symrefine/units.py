@@ -6,9 +6,6 @@ from collections.abc import Mapping
 
 from symrefine.errors import InputError, meant
 
-# The tolerance unless another is asked for, and the largest, as fractions of the diagonal: beyond a fifth everything is
-# symmetric.
-TOLERANCE, LARGEST_TOLERANCE = 0.02, 0.2
 # Metres in each.
 METRES: Mapping[str, float] = {
     "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "A": 1e-10, "in": 0.0254,

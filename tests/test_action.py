@@ -5,19 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from symrefine.align.moment_fit import planes, skew, turned_by
+from symrefine.align.span import Monomials
 from symrefine.geometry import Array, orthogonal_factor, random_orthogonal, rotation
-from symrefine.moments.action import (
-    Harmonics,
-    Monomials,
-    euler_zyz,
-    flattened,
-    planes,
-    row_variance,
-    skew,
-    turned_by,
-)
-from symrefine.moments.harmonics import evaluate, harmonic_moments
+from symrefine.moments.harmonics import Harmonics, euler_zyz, flattened, harmonic_moments, row_variance
 from symrefine.moments.moments import central_moments
+from tests.test_harmonics import evaluate
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -15,12 +15,13 @@ from experiments.objects.household import camera
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
 from experiments.studies import partial_alignment
 from symrefine.align import story
+from symrefine.align.contact import met_by
 from symrefine.align.judge import Judge, Met
 from symrefine.align.landscape import grid_rotations, harmonic_pair, hills, landscape, least_misfit
 from symrefine.align.moment_fit import as_good, best_fits, covariance, exact, fit, misfit
 from symrefine.align.pair import Evidence
 from symrefine.align.partial import _first
-from symrefine.align.polish import SOON, Polished, Similarity, polish
+from symrefine.align.polish import Polished, Similarity, polish
 from symrefine.align.procrustes import procrustes
 from symrefine.align.rivals import Choice, choose, polished
 from symrefine.align.shown import Shown
@@ -30,6 +31,7 @@ from symrefine.align.story import Alignment, align
 from symrefine.decide.maps import Merit, said_by_both, score
 from symrefine.decide.maps import as_good as as_well
 from symrefine.errors import DegenerateShapeError, InputError
+from symrefine.fit.refine import SHORT
 from symrefine.geometry import Array, householder, line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.groups.orthogonal import chord_angles
 from symrefine.moments.moments import central_moments
@@ -490,7 +492,7 @@ def test_planes_are_found_where_they_are_asked_for(noise: float, normal_deg: flo
     surface = make_skin(sheet(20000, noise, rng), rng)
     assert (surface.neighbours > 12) == (noise > 0.0)
     queries = sheet(50, 0.02, rng) * 0.5 + 1.0 / 6.0
-    distance, planes = surface.met_by(queries)
+    distance, planes = met_by(surface, queries)
     np.testing.assert_allclose(distance, cKDTree(surface.points).query(queries)[0])
     angles = [np.degrees(line_angle_rad(n, [1, 1, 1])) for n in planes.normals]
     assert np.quantile(angles, 0.9) < normal_deg
@@ -531,7 +533,7 @@ def test_a_polish_is_given_up_where_it_is_not_worthwhile_and_only_there() -> Non
     assert near.converged
     assert not near.given_up
     assert far.given_up
-    assert (far.steps, far.converged) == (SOON, False)
+    assert (far.steps, far.converged) == (SHORT, False)
     np.testing.assert_array_equal(asked[-1].matrix, far.motion.matrix)
 
 

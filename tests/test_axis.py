@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, stool, table
-from symrefine.fit.frame import polish_frame
 from symrefine.geometry import line_angle_rad, random_orthogonal, rotation
 from symrefine.moments.harmonics import harmonic_moments
 from symrefine.moments.moments import central_moments, shape_moments
 from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import fixed_subspace
+from symrefine.propose.candidates import polish_frame
 from symrefine.propose.folds import BINS_PER_ORDER, azimuthal_spectrum, fold_candidates
 from symrefine.shape import Shape
 

@@ -23,9 +23,10 @@ from experiments.studies import baseline_check
 from experiments.studies.baseline_check import ALL_SHAPES, Case
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.fit.gauss_newton import minimise
-from symrefine.fit.residual import design_rows, frame_model, gram, residual_function
+from symrefine.fit.residual import design_rows, frame_model, gram
 from symrefine.geometry import Plane, frame_with_z, line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.moments.quadrature import sample_surface
+from tests.test_residual import residual_function
 
 CUBOID = join([box((0, 0, 0), (1.0, 0.7, 0.4))])
 

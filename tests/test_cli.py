@@ -16,14 +16,13 @@ import pytest
 import symrefine
 from symrefine.cli import batch, invoke, objects, values
 from symrefine.cli.objects import Job
-from symrefine.cli.rows import MAP_HEAD, ROW_HEAD, row_line
+from symrefine.cli.rows import MAP_HEAD, ROW_HEAD, row_line, turn_rad
 from symrefine.cli.tables import detection_lines, headline
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.files import naming, whole
 from symrefine.fleet.journal import Journal, Row
 from symrefine.geometry import random_orthogonal
-from symrefine.groups.orthogonal import turn_rad
 from symrefine.ntuples import notation
 from symrefine.ntuples.affine import derive_affine
 from symrefine.ntuples.derive import derive

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.spatial.distance import pdist
 
+from symrefine.align.pair import least_diagonal
 from symrefine.errors import InputError
 from symrefine.geometry import (
     Axis,
@@ -17,7 +18,6 @@ from symrefine.geometry import (
     cross_matrix,
     frame_with_z,
     householder,
-    least_diagonal,
     line_angle_rad,
     random_orthogonal,
     read_only,

@@ -8,18 +8,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from symrefine.cli.rows import turn_rad
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import frame_with_z, householder, random_orthogonal, rotation, rotoreflection
 from symrefine.groups import (
     MAX_FOLD,
-    PointGroup2D,
     close,
     from_elements,
     identify,
     is_subgroup,
     point_group,
 )
-from symrefine.groups.orthogonal import turn_rad
+from symrefine.groups.plane import PointGroup2D
 
 SEEDS = st.integers(0, 2**32 - 1)
 FOLDS = range(2, 13)

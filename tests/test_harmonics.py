@@ -8,7 +8,7 @@ from scipy.linalg import expm
 from scipy.special import lpmv
 
 from symrefine.geometry import random_orthogonal, rotation, unit
-from symrefine.moments.harmonics import evaluate, generators, harmonic_moments, solid_harmonic, to_polar_axis, turn
+from symrefine.moments.harmonics import generators, harmonic_moments, solid_harmonic, to_polar_axis, turn
 from symrefine.moments.moments import central_moments, transformed
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -20,6 +20,12 @@ EPS = 1e-12
 
 def points_of(seed, count=40):
     return np.random.default_rng(seed).standard_normal((count, 3))
+
+
+def evaluate(l, points):
+    """R_lm at points [N, 3], shape [N, 2l+1], from the polynomials."""
+    harmonics = [solid_harmonic(l, m).items() for m in range(-l, l + 1)]
+    return np.stack([sum(v * np.prod(points ** np.array(e), axis=1) for e, v in terms) for terms in harmonics], axis=1)
 
 
 def legendre(l, m, points):

@@ -22,8 +22,9 @@ from symrefine.surface.neighbourhoods import (
     fit_planes,
     smallest_eigenvectors,
 )
-from symrefine.surface.skin import isolated_points, local_planes
+from symrefine.surface.skin import isolated_points
 from symrefine.surface.tree import Tree, morton_order, side_by_side
+from tests.surfaces import local_planes
 
 BOX = join([box((0, 0, 0), (1, 0.7, 0.4))])
 

@@ -13,10 +13,9 @@ from experiments.objects.parts import assembled, extruded
 from experiments.objects.shapes import bottle, box, join, mug, revolve, sample, table
 from symrefine.decide.hypotheses import fitted, judged
 from symrefine.decide.looks import few_motions, looked_at
-from symrefine.decide.place import SUPPORTED, is_told, least_elsewhere, slack
+from symrefine.decide.place import SUPPORTED, freest, is_told, least_elsewhere, slack
 from symrefine.detection.measure import gather, measure
 from symrefine.detection.story import detect
-from symrefine.fit.freedom import freest
 from symrefine.fit.placed import FITTED, Placed, elements
 from symrefine.fit.refine import Framed
 from symrefine.geometry import Isometry, frame_with_z, line_angle_rad, rotation, unit

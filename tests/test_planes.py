@@ -37,7 +37,7 @@ def case(method: str = "ntuples", shape: str = "table", points: int = 4000, nois
 @pytest.mark.parametrize("name", SHAPES)
 def test_truth_maps_the_object_onto_itself(name: str) -> None:
     from symrefine.geometry import Isometry
-    from symrefine.surface.skin import local_planes
+    from tests.surfaces import local_planes
 
     scan, truth = make(case(shape=name, points=6000, seed=3))
     cloud = local_planes(scan.points, 3000, np.random.default_rng(0), normals=scan.normals, exact=True)

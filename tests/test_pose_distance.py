@@ -10,8 +10,9 @@ from scipy.spatial.transform import Rotation
 import symrefine
 from experiments.studies.poses import draws
 from symrefine.errors import InputError
-from symrefine.geometry import homogeneous, random_orthogonal, rotation
+from symrefine.geometry import random_orthogonal, rotation
 from symrefine.groups import point_group
+from symrefine.poses.symmetry import homogeneous
 
 SEEDS = st.integers(0, 2**32 - 1)
 FINITE = ["C1", "C2", "C5", "D3", "D6", "T", "O", "I"]

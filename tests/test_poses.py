@@ -13,11 +13,12 @@ import symrefine
 from experiments.studies.poses import GROUPS, draws, motion, track
 from symrefine.errors import InputError
 from symrefine.export.bop import placed_entry
-from symrefine.geometry import frame_with_z, homogeneous, random_orthogonal, rotation
+from symrefine.geometry import frame_with_z, random_orthogonal, rotation
 from symrefine.groups import PointGroup, point_group
 from symrefine.groups.orthogonal import chord_angles
 from symrefine.poses.canonicalizer import Canonicalizer
 from symrefine.poses.given import symmetry_of
+from symrefine.poses.symmetry import homogeneous
 
 SEEDS = st.integers(0, 2**32 - 1)
 FINITE = ["C1", "Cs", "Ci", "C2", "C3", "C5", "C4v", "S6", "C3h", "D2", "D3h", "D6", "C36", "D24", "T", "Td", "O", "Oh"]

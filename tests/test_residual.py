@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 
+import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,7 +15,6 @@ from symrefine.fit.residual import (
     design_rows,
     frame_model,
     gram,
-    residual_function,
     theta_models,
     turn_frame,
 )
@@ -30,6 +30,14 @@ OPERATIONS = {
     "rotoreflections": np.stack([rotoreflection(Z, np.pi / 2), rotoreflection([1, 1, 0], 1.0), -np.eye(3)]),
     "all of D3d": point_group("D3d").operations()[1:],
 }
+
+
+def residual_function():
+    """casadi function (x_u, x_l, n_l, m, d) -> e for the plane m.x = d: the definition all else is tested against."""
+    x_u, x_l, n_l, m = (ca.SX.sym(name, 3) for name in ("x_u", "x_l", "n_l", "m"))
+    d = ca.SX.sym("d")
+    mirrored = x_u - 2 * (ca.dot(m, x_u) - d) * m
+    return ca.Function("residual", [x_u, x_l, n_l, m, d], [ca.dot(mirrored - x_l, n_l)])
 
 
 def pairs(rng, count=25):

@@ -27,8 +27,9 @@ from symrefine.surface.misses import (
     noise_distances,
     spread_distance,
 )
-from symrefine.surface.skin import isolated_points, local_planes
+from symrefine.surface.skin import isolated_points
 from symrefine.surface.surface import Surface
+from tests.surfaces import local_planes
 
 Z = np.array([0.0, 0, 1])
 

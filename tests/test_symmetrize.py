@@ -14,13 +14,14 @@ from symrefine.cli import invoke
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.export.models import model_bytes
-from symrefine.fit.action import act, generators
+from symrefine.fit.action import generators
 from symrefine.geometry import Array, random_orthogonal, rotation
 from symrefine.groups import PointGroup, is_subgroup, point_group
 from symrefine.load import load
 from symrefine.moments.quadrature import sample_surface
 from symrefine.shape import Shape
 from symrefine.symmetrize import Symmetrized, exact_place, placed_subgroup, symmetrize
+from symrefine.symmetrize.counterparts import act
 from symrefine.symmetrize.surface import closest_on
 
 GROUPS = ["Cs", "Ci", "C2", "C4v", "C5", "C3h", "S4", "D3", "D6h", "D3d", "Td", "Oh", "I", "Ih"]

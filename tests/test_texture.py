@@ -18,7 +18,9 @@ import symrefine
 from experiments.objects.shapes import join, revolve
 from symrefine.cli import invoke
 from symrefine.decide.subgroups import subgroup_chain
+from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
+from symrefine.detection.textured import with_texture
 from symrefine.errors import InputError
 from symrefine.geometry import Array, random_orthogonal
 from symrefine.groups import is_subgroup, point_group
@@ -124,13 +126,18 @@ CASES = {
 SEVERAL = ("cube, a dot on a side", "box, plain", "box, a dot anywhere", "box, quarters")
 
 
+def both(shape: Shape) -> tuple[Detection, Detection]:
+    """What is found in a shape, and with its texture."""
+    found = with_texture(detect(shape), shape)
+    assert found.textured is not None
+    return found, found.textured
+
+
 @pytest.mark.parametrize("spoil", [np.asarray, jpeg])
 @pytest.mark.parametrize("case", [c if c in SEVERAL else pytest.param(c, marks=SLOW) for c in CASES])
 def test_colours_keep_a_part_of_the_group(case: str, spoil: Callable[[Array], Array]) -> None:
     size, colour, shape_group, group = CASES[case]
-    found = detect(box(size, colour, seed=len(case), spoil=spoil))
-    kept = found.textured
-    assert kept is not None
+    found, kept = both(box(size, colour, seed=len(case), spoil=spoil))
     assert (found.point_group, kept.point_group) == (shape_group, group)
     assert kept.confidence > 0.9
     assert is_subgroup(kept.group, found.group, np.radians(2.0))
@@ -140,8 +147,7 @@ def test_colours_keep_a_part_of_the_group(case: str, spoil: Callable[[Array], Ar
 def test_what_is_painted_turns_with_the_object() -> None:
     """Operations of the texture, applied to the painted object, give the painted object."""
     shape = box(CUBE, dot((0, 0, 0.5), 0.25), seed=3)
-    kept = detect(shape).textured
-    assert kept is not None
+    _, kept = both(shape)
     assert shape.texture is not None
     assert shape.faces is not None
     rng = np.random.default_rng(0)
@@ -198,9 +204,8 @@ def labels(count: int) -> Colour:
     ("colour", "group"), [(plain, "Dinfh"), (band, "Cinfv"), (labels(1), "C2v"), (labels(2), "D2h"), (labels(3), "D3h")]
 )
 def test_of_what_is_round_colours_keep_turns_and_mirrors(colour: Colour, group: str) -> None:
-    found = detect(can(colour, seed=2))
-    assert found.textured is not None
-    assert (found.point_group, found.textured.point_group) == ("Dinfh", group)
+    found, kept = both(can(colour, seed=2))
+    assert (found.point_group, kept.point_group) == ("Dinfh", group)
 
 
 def test_the_chain_of_subgroups_obeys_the_needs() -> None:

@@ -18,9 +18,9 @@ from symrefine.detection.measure import ORDER, PARTS, PLANES, gather, measure
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError
 from symrefine.fit.matching import match, pair_equations
-from symrefine.fit.refine import MAX_OUTER, SETTLED, closest_planes, refine, single_plane
+from symrefine.fit.refine import MAX_OUTER, SETTLED, Framed, closest_planes, refine
 from symrefine.fit.residual import axis_gram, design_rows, gram
-from symrefine.geometry import Array, Isometry, Plane
+from symrefine.geometry import Array, Isometry, Plane, frame_with_z
 from symrefine.groups import from_elements
 from symrefine.moments.moments import shape_moments
 from symrefine.ntuples.contract import ntuples
@@ -90,6 +90,13 @@ def from_ntuples(scan: Scan) -> Answer:
         passes=bundle * found.iterations,
         evaluations=bundle * found.iterations,
         steps=history,
+    )
+
+
+def single_plane(plane: Plane) -> Framed:
+    """One mirror, its normal on the frame's third axis."""
+    return Framed(
+        standard=np.diag([1.0, 1.0, -1.0])[None], frame=frame_with_z(plane.normal), center=plane.offset * plane.normal
     )
 
 

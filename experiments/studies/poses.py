@@ -18,11 +18,12 @@ from time import process_time
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from symrefine.geometry import Array, homogeneous, random_orthogonal
+from symrefine.geometry import Array, random_orthogonal
 from symrefine.groups import PointGroup, point_group
 from symrefine.groups.orthogonal import chord_angles
 from symrefine.poses.canonicalizer import Canonicalizer
 from symrefine.poses.distance import symmetric_distance
+from symrefine.poses.symmetry import homogeneous
 
 GROUPS = ("C2", "C3", "C5", "D2", "D4", "D6", "T", "O", "I", "Cinf", "Dinf")
 # Angles [rad] that differ by less do so by rounding.

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, ReadOnly, householder, unit
-from symrefine.groups import PointGroup, PointGroup2D
+from symrefine.groups import PointGroup
+from symrefine.groups.plane import PointGroup2D
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -11,6 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
+from symrefine.align.alike import maps_between
+from symrefine.align.contact import met_by
 from symrefine.align.polish import COARSE, Polished, Similarity, polish
 from symrefine.align.shown import Shown
 from symrefine.decide.maps import Merit, ahead, as_good, score, well_met
@@ -19,7 +21,7 @@ from symrefine.fit.matching import AGREE
 from symrefine.fit.refine import MAX_OUTER
 from symrefine.geometry import Array, Isometry, Mask, householder
 from symrefine.ntuples.rank import SIGNIFICANT
-from symrefine.propose.maps import WITHIN, maps_between, maps_onto_itself
+from symrefine.propose.maps import WITHIN, maps_onto_itself
 from symrefine.propose.votes import mirror_votes
 from symrefine.samples import FOLLOWED
 from symrefine.shape import Index
@@ -114,7 +116,7 @@ class Judge:
         """Which of every so many local planes of the source meet others of the target, as they stand."""
         every = slice(None, None, COARSE)
         some, classes = self.source.cloud.chosen(every), self.source.cloud.classes(every)
-        away, met = self.target.cloud.met_by(motion.apply(some.points), classes)
+        away, met = met_by(self.target.cloud, motion.apply(some.points), classes)
         facing = np.abs(np.einsum("ij,ij->i", motion.turn(some.normals), met.normals)) > AGREE
         return facing & (away < WITHIN * self.diagonal)
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from symrefine.align.moment_fit import LONGEST, MomentPair
 from symrefine.geometry import Array, read_only
-from symrefine.moments.action import FLOOR, Harmonics, flattened, row_variance
-from symrefine.moments.harmonics import harmonic_moments
+from symrefine.moments.harmonics import FLOOR, Harmonics, flattened, harmonic_moments, row_variance
 from symrefine.moments.moments import Moments, deviations, exponents
 from symrefine.propose.spectrum import whitened
 

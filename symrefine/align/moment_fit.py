@@ -2,13 +2,16 @@
 
     cost(R) = sum_c w_c (D(R) a - b)_c^2
 
-with D the action of R on the moments (`moments.action`) and weights from the sampling noise of both sides. A small turn
-of the target's axes changes D(R) a by the generators applied to it, so the Jacobian costs no more than the residual.
+with D the action of R on the moments and weights from the sampling noise of both sides. A small turn of the target's
+axes changes D(R) a by the generators applied to it, so the Jacobian costs no more than the residual.
+Small turns are counted alike for all actions: one for every plane (i, j) with `dx_i = -x_j, dx_j = x_i`, about x, y and
+z in 3-space.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from itertools import combinations
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +19,7 @@ from numpy.typing import NDArray
 from symrefine.fit.gauss_newton import Linearisations, minimise_all
 from symrefine.fit.refine import MAX_OUTER, WITHIN_NOISE
 from symrefine.geometry import Array, orthogonal_factor
-from symrefine.moments.action import FLOOR, Action, planes, turned_by
+from symrefine.moments.harmonics import FLOOR
 from symrefine.moments.moments import deviations
 from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.shape import Index
@@ -30,6 +33,37 @@ MISFIT = SIGNIFICANT**2
 # Moments that agree to this are those of the same points: some hundred roundings. A step of this
 # (radians) ends the fit: quadratic convergence then leaves 1e-14.
 ROUNDING = 1e-7
+
+
+class Action(Protocol):
+    """A linear action of O(n) on C numbers of an object."""
+
+    def turned(self, matrices: Array, values: Array) -> Array:
+        """D(R) v [K, P, C] of numbers [P, C] under orthogonal matrices [K, n, n]."""
+        ...
+
+    def tangents(self, values: Array) -> Array:
+        """Derivatives [K, A, C] of numbers [K, C] by the A small turns."""
+        ...
+
+
+def planes(dim: int) -> list[tuple[int, int]]:
+    """Planes (i, j) of the small turns, in which i turns towards j: about x, y and z in 3-space."""
+    return [(1, 2), (2, 0), (0, 1)] if dim == 3 else list(combinations(range(dim), 2))
+
+
+def skew(turns: Array, dim: int) -> Array:
+    """Skew matrices [K, n, n] of small turns [K, n(n-1)/2]."""
+    out = np.zeros((len(turns), dim, dim))
+    for k, (i, j) in enumerate(planes(dim)):
+        out[:, i, j], out[:, j, i] = -turns[:, k], turns[:, k]
+    return out
+
+
+def turned_by(matrices: Array, turns: Array) -> Array:
+    """Matrices [K, n, n] after small turns [K, n(n-1)/2] (Cayley: orthogonal for a turn of any size)."""
+    half, one = 0.5 * skew(turns, matrices.shape[1]), np.eye(matrices.shape[1])
+    return np.linalg.solve(one - half, (one + half) @ matrices)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

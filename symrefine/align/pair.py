@@ -11,7 +11,7 @@ from symrefine.align.moment_fit import MomentPair
 from symrefine.align.polish import Polished, Similarity
 from symrefine.align.procrustes import Procrustes, procrustes
 from symrefine.detection.measure import SAMPLES, density_of
-from symrefine.geometry import Array, Isometry, least_diagonal, tight_diagonal
+from symrefine.geometry import Array, Isometry, tight_diagonal
 from symrefine.moments.moments import Moments, central_moments
 from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import ntuples
@@ -74,7 +74,7 @@ class Side:
         weights = self.weights[seen.kept]
         parts = len(self.moments.replicates)
         moments = central_moments(shape.points, weights, self.moments.order, parts=parts)
-        return Side(shape=shape, moments=moments, weights=weights / weights.sum(), known=seen.without_strays)
+        return Side(shape=shape, moments=moments, weights=weights / weights.sum(), known=_of_kept(seen))
 
     def skin(self, unit: float, samples: int, rng: np.random.Generator) -> Skin:
         """The surface about the centre, in units of `unit`: of a mesh, as so many samples show it.
@@ -236,6 +236,20 @@ class Evidence:
         """Whether both sides can be judged: surfaces, or few points that stand for themselves, but no filled solid."""
         sides = (self.source.shape, self.target.shape)
         return few(*sides) or {s.measure for s in sides} != {"solid", "points"}
+
+
+def least_diagonal(points: Array) -> float:
+    """Distance between two of points [N, 3] that lie far apart: no box around them has a shorter diagonal."""
+    centred = points - points.mean(axis=0)
+    end = points[np.einsum("ij,ij->i", centred, centred).argmax()]
+    return float(np.sqrt(((points - end) ** 2).sum(axis=1).max()))
+
+
+def _of_kept(seen: Sampling) -> Sampling:
+    """How the points that are kept were sampled, if nothing else than strays was set apart."""
+    every = np.arange(len(seen.kept))
+    even = np.searchsorted(seen.kept, seen.even)
+    return Sampling(kept=every, even=even, strays=every[:0], shares=seen.shares, solid=seen.solid)
 
 
 def shares(shape: Shape, weights: Array) -> Array:

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from symrefine.align.contact import Contact, meet
 from symrefine.align.moment_fit import LONGEST
-from symrefine.fit.matching import SCALE_FLOOR, Contact, each_coordinate, geman_mcclure, meet, robust_scale, worth
+from symrefine.fit.matching import SCALE_FLOOR, each_coordinate, geman_mcclure, robust_scale, worth
 from symrefine.fit.refine import MAX_OUTER, SETTLED, SHORT, WITHIN_NOISE
 from symrefine.fit.residual import SIZE, design_rows, gram, turn_frame
 from symrefine.geometry import Array, Isometry, cross_matrix
@@ -170,8 +171,8 @@ class _Met:
             rows = design_rows(*each_coordinate(own.points, met.points))
             return cls(rows=rows, worth=np.ones(len(own.points)), each=3, redundancy=1.0)
         rows = design_rows(own.points, met.points, met.normals)
-        redundancy = max(redundancy, target.shared_by(len(rows)))
-        return cls(rows=rows, worth=worth(own.flatness, met.flatness), each=1, redundancy=redundancy)
+        shared = target.redundancy if isinstance(target, LocalPlanes) else target.shared_by(len(rows))
+        return cls(rows=rows, worth=worth(own.flatness, met.flatness), each=1, redundancy=max(redundancy, shared))
 
     def squares(self, phi: Array) -> Array:
         """Squared distances [P] that the pairs are left with under phi [13]."""

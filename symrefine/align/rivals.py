@@ -19,7 +19,7 @@ from symrefine.align.pair import Evidence, few
 from symrefine.align.polish import Polished, Similarity, polish
 from symrefine.geometry import Array, frame_with_z, rotation
 from symrefine.groups.names import CLOSED_FOLD
-from symrefine.moments.action import FLOOR
+from symrefine.moments.harmonics import FLOOR
 from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.propose.folds import BINS_PER_ORDER
 from symrefine.samples import FOLLOWED

@@ -14,7 +14,8 @@ from symrefine.surface.cameras import cameras
 from symrefine.surface.misses import disc_distances
 from symrefine.surface.neighbourhoods import fills_volume
 from symrefine.surface.openings import NEIGHBOURS, Openings, openings
-from symrefine.surface.skin import LocalPlanes, Patches, Skin, drawn, make_skin
+from symrefine.surface.skin import LocalPlanes, Patches, Skin, drawn, make_skin, with_class
+from symrefine.surface.tree import Tree
 
 # A side with so many times the surface gets as many more local planes, up to a number.
 COARSER, MOST_PLANES = 1.5, 6000
@@ -83,7 +84,17 @@ class Shown:
         """The same about the same centre, so many times as large."""
         skin = replace(self.skin, points=factor * self.skin.points, given=None)
         views = None if self.views is None else factor * self.views
-        return replace(self, skin=skin, cloud=self.cloud.scaled(factor), views=views)
+        points = factor * self.cloud.points
+        cloud = replace(
+            self.cloud,
+            points=points,
+            thickness=factor * self.cloud.thickness,
+            reach=factor * self.cloud.reach,
+            spacing=factor * self.cloud.spacing,
+            tree=Tree(with_class(points, self.cloud.labels)),
+            eyes=None if self.cloud.eyes is None else factor * self.cloud.eyes,
+        )
+        return replace(self, skin=skin, cloud=cloud, views=views)
 
     @cached_property
     def moving(self) -> Patches:

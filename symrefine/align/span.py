@@ -11,17 +11,58 @@ from itertools import product
 
 import numpy as np
 
-from symrefine.align.moment_fit import LONGEST, Fits, MomentPair, as_good, best_fits, covariance, exact, misfit
+from symrefine.align.moment_fit import (
+    LONGEST,
+    Fits,
+    MomentPair,
+    as_good,
+    best_fits,
+    covariance,
+    exact,
+    misfit,
+    planes,
+    skew,
+)
 from symrefine.align.procrustes import Procrustes, procrustes
 from symrefine.geometry import Array
-from symrefine.moments.action import FLOOR, Monomials, skew
-from symrefine.moments.moments import Moments, deviations, exponents, occurrences
+from symrefine.moments.harmonics import FLOOR
+from symrefine.moments.moments import Moments, deviations, exponents, occurrences, turned_values
 from symrefine.ntuples.contract import NTuples
 from symrefine.rounding import DOUBLE
+from symrefine.shape import Index
 
 # A turn is not determined if its information is mostly noise: where the moments of the two, with their independent
 # errors, share less than this part of it.
 SHARED = 0.75
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Monomials:
+    """Moments of `exponents(dim, order)`: `d m_p = -p_i m_(p - e_i + e_j) + p_j m_(p - e_j + e_i)` (method.md, 2)."""
+
+    dim: int
+    order: int
+
+    def turned(self, matrices: Array, values: Array) -> Array:
+        return turned_values(values, matrices, self.order)
+
+    def tangents(self, values: Array) -> Array:
+        table = _neighbours(self.dim, self.order)
+        turned = [pj * values[:, to_i] - pi * values[:, to_j] for pi, to_j, pj, to_i in table]
+        return np.array(turned).reshape(len(table), *values.shape).transpose(1, 0, 2)
+
+
+@lru_cache(maxsize=16)
+def _neighbours(dim: int, order: int) -> list[tuple[Index, Index, Index, Index]]:
+    """For each plane: p_i, the place of p - e_i + e_j, p_j, the place of p - e_j + e_i; for every p in turn."""
+    table = exponents(dim, order)
+    place = {tuple(p): k for k, p in enumerate(table.tolist())}
+
+    def moved(down: int, up: int) -> Index:
+        step = np.eye(dim, dtype=np.int64)[up] - np.eye(dim, dtype=np.int64)[down]
+        return np.array([place.get(tuple(p), 0) for p in (table + step).tolist()])
+
+    return [(table[:, i], moved(i, j), table[:, j], moved(j, i)) for i, j in planes(dim)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
+from symrefine.align.contact import distances
 from symrefine.align.kinds import nearest_both_ways, with_one_set_of_classes
 from symrefine.align.pair import Side, few
 from symrefine.align.shown import MOST_PLANES, Shown
@@ -93,7 +94,7 @@ class _Surfaces:
         classes, bound = here.cloud.labels, HOPELESS * self.far * diagonal
         found = disc_distances(there.cloud, moved, classes, bound=bound) / diagonal
         # Where a wall is too thin for the local planes its points still tell that there is something.
-        found = np.minimum(found, there.skin.nearest(moved, classes) / diagonal)
+        found = np.minimum(found, distances(there.skin, moved, classes) / diagonal)
         return np.where(here.unseen(there, moved, found > self.far, self.far * diagonal), np.nan, found)
 
     def nearest(self, side: int, points: Array) -> tuple[Array, Index]:

@@ -1,6 +1,7 @@
 """What was found in one of many objects, on one line."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from symrefine.errors import one_line
@@ -44,8 +45,6 @@ def row_line(name: str, row: Record) -> str:
 
 def map_line(name: str, row: Record) -> str:
     """The map onto one of many targets, or what was wrong with it; of a misfit nothing that looks like an answer."""
-    from symrefine.groups.orthogonal import turn_rad
-
     if row["error"] is not None:
         return _failed(name, row["error"])
     status, fits = row["status"], not row["misfit"]
@@ -64,6 +63,21 @@ def map_line(name: str, row: Record) -> str:
     shown = told if fits else ("", "", "", "", told[4], "", "")
     reason = "" if status == "ok" else f": {one_line(status)}"
     return _MAP_ROW.format(word, *shown, seconds(row), f"{one_line(name)}{reason}")
+
+
+def turn_rad(matrix: Sequence[Sequence[float]]) -> float:
+    """Largest angle in [0, pi] by which an orthogonal matrix [n, n] turns some plane.
+
+    Of determinant -1 that of what is left beside one reversed direction: 0 for a mirror, and for a rotoreflection the
+    angle that goes with its mirror, as in S4.
+    """
+    import numpy as np
+
+    operation = np.asarray(matrix, dtype=np.float64)
+    values = np.linalg.eigvals(operation)
+    if np.linalg.det(operation) < 0.0:
+        values = np.delete(values, int(np.argmin(np.abs(values + 1.0))))
+    return float(np.abs(np.angle(values)).max(initial=0.0))
 
 
 def _failed(name: str, error: str) -> str:

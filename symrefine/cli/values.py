@@ -5,7 +5,8 @@ import math
 from typing import Any, Literal
 
 from symrefine.errors import InputError
-from symrefine.units import LARGEST_TOLERANCE, METRES, SCALES_MM, TOLERANCE, read_length
+from symrefine.rounding import LARGEST_TOLERANCE, TOLERANCE
+from symrefine.units import METRES, SCALES_MM, read_length
 
 # Of options that number an object.
 NUMBERED = "(default: 7 of obj_000007.ply, 1 of any other name)"

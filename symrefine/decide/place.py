@@ -10,12 +10,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from symrefine.decide.looks import GLANCED, exact_need, few_motions, start_error
-from symrefine.fit.freedom import freest
+from symrefine.fit.matching import match
 from symrefine.fit.placed import Operations, Placed, joined
-from symrefine.fit.refine import Framed
+from symrefine.fit.refine import Framed, pair_gram
+from symrefine.fit.residual import SIZE, design_rows, frame_model, gram
+from symrefine.fit.vertices import ROUNDED
 from symrefine.geometry import Array
 from symrefine.groups import is_subgroup
 from symrefine.samples import GLANCE, LOOK
+from symrefine.surface.skin import LocalPlanes
 from symrefine.surface.surface import Surface
 
 # Share of a surface that has to be carried onto itself for anything to be said of an operation.
@@ -70,6 +73,29 @@ def _ways(surface: Surface, placed: Placed) -> tuple[Framed, Array]:
     ways = freest(surface.cloud, state, turns=placed.group.name != "Kh", stride=surface.stride(LOOK))
     turns = np.maximum(np.linalg.norm(ways[:, :3], axis=1), 1e-300)
     return state, ways * np.minimum(2.0 * start_error(surface), 0.25 * wedge / turns)[:, None]
+
+
+def freest(cloud: LocalPlanes, state: Framed, *, turns: bool = True, stride: int = 1) -> Array:
+    """Motions [p, 6] of a frame (rotation about and shift along its axes), what pairs of local planes tell least first.
+
+    Those that change no operation are not among them, as a turn about the normal of a lone mirror; without `turns` no
+    turn is. What the pairs of each changes is weighed against how far images move, which is 1 in the mean square over
+    all operations.
+    """
+    first = 0 if turns else 3
+    points = cloud.points[::stride]
+    every, none, ones = np.ones(len(points)) / len(points), np.zeros_like(points), np.ones((len(points), 1))
+    moves = sum((gram(design_rows(points, none, ones * axis), every) for axis in np.eye(3)), np.zeros((SIZE, SIZE)))
+    grams = np.stack([pair_gram(cloud, p) for p in match(cloud, state.motions, 0.0, stride=stride)])
+    told, moved = (
+        frame_model(g, state.standard, state.frame, state.center, np.zeros(6)).hessian[first:, first:]
+        for g in (grams, np.broadcast_to(moves / len(grams), grams.shape))
+    )
+    lengths, ways = np.linalg.eigh(moved)
+    some = lengths > ROUNDED * lengths[-1]
+    ways = ways[:, some] / np.sqrt(lengths[some])
+    found = (ways @ np.linalg.eigh(ways.T @ told @ ways)[1]).T
+    return np.pad(found, ((0, 0), (first, 0)))
 
 
 def _needs(surface: Surface, placed: Placed, state: Framed, ways: Array, *, rough: bool = False) -> Array:

@@ -44,6 +44,8 @@ def detect(
 ) -> Detection:
     """Point group, mirror planes and rotation axes of an object in 3-space, with what it misses each of them by.
 
+    What a texture keeps of them, `detection.textured` tells.
+
     Args:
         shape: a `Shape`, points [N, 3], or the `Sketch` of a cloud too large to hold; of a cloud of more than 100,000
             points a sketch is made, too.
@@ -68,14 +70,7 @@ def detect(
     """
     data, clock = _given(shape, weights, normals, labels, viewpoint), Clock()
     found = examined(data, outliers=outliers, tolerance=tolerance, ladder=ladder, seed=seed, clock=clock)
-    if not isinstance(data, Shape) or data.texture is None:
-        return told(found, tolerance=tolerance, ladder=ladder, clock=clock)
-    from symrefine.detection.textured import textured
-
-    limit = max((tolerance, *ladder))
-    kept = textured(found, data, tolerance=tolerance, limit=limit, seed=seed, clock=clock)
-    both = (told(each, tolerance=tolerance, ladder=ladder, clock=clock) for each in (found, kept))
-    return replace(next(both), textured=next(both))
+    return told(found, tolerance=tolerance, ladder=ladder, clock=clock)
 
 
 def told(found: Examined, *, tolerance: float = TOLERANCE, ladder: Sequence[float] = (), clock: Clock) -> Detection:

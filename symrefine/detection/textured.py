@@ -5,6 +5,7 @@ by the colours too, by lengths as the shape is, and the group is decided by the 
 subgroups.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import reduce
 
@@ -17,6 +18,8 @@ from symrefine.decide.posterior import ALIKE
 from symrefine.decide.subgroups import subgroup_chain
 from symrefine.detection.examination import Examined, examined
 from symrefine.detection.measure import PLANES, SAMPLES
+from symrefine.detection.result import Detection
+from symrefine.detection.story import told
 from symrefine.fit.placed import Placed
 from symrefine.geometry import Array, Isometry, rotation
 from symrefine.groups import PointGroup, is_subgroup
@@ -25,10 +28,29 @@ from symrefine.shape import Shape
 from symrefine.surface.misses import Deviation
 from symrefine.surface.painted import Painted, needed
 from symrefine.texture import colour_classes, corner_weights
+from symrefine.threads import one_thread
 
 # Operations of the largest group whose subgroups are looked through: those of an icosahedron, and of folds up to 30. Of
 # more, as of endless ones, samples that are labelled by their colours tell what is left.
 MOST = 120
+
+
+@one_thread()
+def with_texture(found: Detection, shape: Shape, *, ladder: Sequence[float] = (), seed: int = 0) -> Detection:
+    """What was detected in a shape, and beside it, as `Detection.textured`, what of that its texture keeps.
+
+    Args:
+        found: of the shape, at the same tolerances and with the same seed.
+        shape: a mesh with a texture.
+        ladder: other tolerances to tell the group at.
+        seed: of the samples.
+    """
+    clock, tolerance = Clock(), found.tolerance
+    clock.seconds.update(found.timings)
+    limit = max((tolerance, *ladder))
+    kept = textured(found.examined, shape, tolerance=tolerance, limit=limit, seed=seed, clock=clock)
+    answer = told(kept, tolerance=tolerance, ladder=ladder, clock=clock)
+    return replace(found, textured=answer, timings=clock.seconds)
 
 
 def textured(found: Examined, shape: Shape, *, tolerance: float, limit: float, seed: int, clock: Clock) -> Examined:

@@ -4,9 +4,10 @@ import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.export.models import npz_bytes
-from symrefine.geometry import Array, homogeneous
+from symrefine.geometry import Array
 from symrefine.groups import PointGroup
 from symrefine.groups.names import MAX_FOLD
+from symrefine.poses.symmetry import homogeneous
 
 # Turns that stand for a continuous axis: every five degrees, as FoundationPose samples one.
 STEPS = 72

@@ -1,54 +1,17 @@
 """How a finite group permutes points: counterparts that agree with one another, so that orbits close exactly."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from symrefine.geometry import Array
 from symrefine.shape import Index
 
-Mask = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Action:
-    """Counterparts `images` [K, N] of points under operations [K, 3, 3], and where they are an action of the group.
-
-    `closed` [N] marks the points on whose orbits g h has the counterpart that g has of that of h: there each operation
-    permutes the points. `miss` [N] is the largest distance of an image to its counterpart.
-    """
-
-    images: Index
-    closed: Mask
-    miss: Array
-
-    def mean(self, points: Array, operations: Array) -> Array:
-        """Means [N, 3] over the group of g^-1 (counterpart of g p)."""
-        return mean_back((points[image] for image in self.images), operations)
-
 
 def mean_back(counterparts: Iterable[Array], operations: Array) -> Array:
     """Means [N, 3] over the group of g^-1 c, the counterparts c [N, 3] given for one operation after the other."""
     return np.asarray(sum(c @ g for g, c in zip(operations, counterparts, strict=True)) / len(operations))
-
-
-def act(points: Array, operations: Array, labels: Index | None, reach: float) -> Action:
-    """The nearest point of the same label as counterpart of each image, up to `reach`."""
-    tree, shifted = labelled(points, labels)
-    images, miss = np.empty((len(operations), len(points)), dtype=np.intp), np.zeros(len(points))
-    for k, g in enumerate(operations):
-        distance, images[k] = tree.query(np.column_stack([points @ g.T, shifted]))
-        miss = np.maximum(miss, distance)
-    closed = miss <= reach
-    for h, table in generators(operations):
-        closed &= (images[table] == images[:, images[h]]).all(axis=0)
-    # Only the points all of whose orbit is closed.
-    while ((whole := closed & closed[images].all(axis=0)) != closed).any():
-        closed = whole
-    return Action(images=images, closed=closed, miss=miss)
 
 
 def permutations(points: Array, operations: Array, labels: Index | None, reach: float) -> Index | None:

@@ -1,47 +1,19 @@
-"""Which finite group is made exact: subgroups in their place, and a fold in place of a continuous axis."""
+"""Which finite group is made exact: a fold in place of a continuous axis."""
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from symrefine.errors import InputError
 from symrefine.fit.anchors import PROBES
-from symrefine.geometry import Array, rotation, unit
-from symrefine.groups import MAX_FOLD, TURNS, PointGroup, is_subgroup, point_group
+from symrefine.geometry import Array, rotation
+from symrefine.groups import MAX_FOLD, TURNS, PointGroup
 from symrefine.rounding import SINGLE
 from symrefine.shape import Index
 
 # How near folds that are tried on the rings of a lathed mesh must come, in spacings; a larger fold is taken although it
 # misses by more, up to ALIKE times more, or LAX times where that is next to nothing.
 NEAR, ALIKE, LAX, CLEAN = 0.25, 1.3, 3.0, 0.2
-
-
-def placed_subgroup(group: PointGroup, name: str) -> PointGroup:
-    """The first subgroup called `name` of a group where it stands: on its axes and mirrors in their order.
-
-    Raises:
-        InputError: there is none.
-    """
-    wanted = point_group(name)
-    for frame in _frames(group):
-        candidate = PointGroup(name=wanted.name, frame=frame)
-        if is_subgroup(candidate, group):
-            return candidate
-    raise InputError(f"{wanted.name} is no subgroup of {group.name}, which the object has; name one of its subgroups")
-
-
-def _frames(group: PointGroup) -> Iterator[Array]:
-    """Frames on pairs of perpendicular directions that the group singles out, its own frame first."""
-    yield group.frame
-    axes = [u for u, _ in (*group.rotation_axes(), *group.improper_axes())]
-    directions = np.array([*axes, *group.mirrors(), *group.frame])
-    crosses = np.cross(directions[:, None], directions[None]).reshape(-1, 3)
-    every = np.concatenate([directions, unit(crosses[np.linalg.norm(crosses, axis=1) > SINGLE])])
-    for z in directions:
-        for x in every[np.abs(every @ z) < SINGLE]:
-            yield np.stack([x, np.cross(z, x), z])
 
 
 def finite_group(group: PointGroup, points: Array, turns: int = TURNS) -> PointGroup:

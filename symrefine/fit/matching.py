@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symrefine.geometry import Array, Isometry, Mask, rows
 from symrefine.shape import Index
-from symrefine.surface.skin import LocalPlanes, Patches, Planes, Skin
+from symrefine.surface.skin import LocalPlanes
 
 # Robust scale over the median absolute residual (three standard deviations), and its bound from below in spacings.
 ROBUST = 4.4
@@ -24,23 +23,6 @@ class Pairs:
     sources: Index
     targets: Index
     weights: Array
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Contact:
-    """Local planes of one object, and those of another that they lie nearest to under a motion.
-
-    Attributes:
-        source: [M] as they stand.
-        target: [M] what each is nearest to.
-        away: [M] from the moved point to the nearest of the other object's.
-        kept: [M] which of these pairs count.
-    """
-
-    source: Planes
-    target: Planes
-    away: Array
-    kept: Mask
 
 
 def match(
@@ -64,7 +46,7 @@ def match(
     moved = points @ turns + shifts
     every = None if classes is None else np.tile(classes, len(motions))
     distance, target = cloud.nearest(
-        moved.reshape(-1, points.shape[1]), every, bound=_reach(cloud.spacing, uncertainty)
+        moved.reshape(-1, points.shape[1]), every, bound=reach_of(cloud.spacing, uncertainty)
     )
     distance, target = distance.reshape(moved.shape[:2]), target.reshape(moved.shape[:2])
     keep = np.isfinite(distance)
@@ -76,7 +58,7 @@ def match(
         target = np.where(keep, target, 0)
         normals = rows(cloud.normals, target)
         turned = cloud.normals[source] @ turns
-        keep &= _facing(turned, normals)
+        keep &= facing(turned, normals)
         if cloud.eyes is not None:
             keep &= cloud.faced(moved, turned)
         error = _dot(moved - rows(cloud.points, target), normals)
@@ -91,25 +73,13 @@ def match(
     )
 
 
-def meet(
-    source: Patches, target: Skin | LocalPlanes, motion: Isometry, uncertainty: float, *, stride: int = 1
-) -> Contact:
-    """Every `stride`-th local plane of one object, moved, with those of another; pairs count by the same rules."""
-    every = slice(None, None, stride)
-    some = source.chosen(every)
-    away, met = target.met_by(motion.apply(some.points), source.classes(every))
-    kept = away < _reach(target.spacing, uncertainty)
-    if not target.isolated:
-        kept &= _facing(motion.turn(some.normals), met.normals)
-    return Contact(source=some, target=met, away=away, kept=kept)
-
-
-def _reach(spacing: float, uncertainty: float) -> float:
+def reach_of(spacing: float, uncertainty: float) -> float:
     """How far apart a pair may be."""
     return 3.0 * (spacing + uncertainty)
 
 
-def _facing(moved: Array, normals: Array) -> NDArray[np.bool_]:
+def facing(moved: Array, normals: Array) -> Mask:
+    """Which moved normals [..., n] agree with others, whatever their signs."""
     return np.asarray(np.abs(_dot(moved, normals)) > AGREE)
 
 

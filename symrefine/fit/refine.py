@@ -20,7 +20,7 @@ from symrefine.fit.residual import (
     theta_models,
     turn_frame,
 )
-from symrefine.geometry import Array, Isometry, Plane, ReadOnly, frame_with_z, householder
+from symrefine.geometry import Array, Isometry, Plane, ReadOnly, householder
 from symrefine.rounding import DOUBLE
 from symrefine.surface.misses import RIM
 from symrefine.surface.skin import LocalPlanes
@@ -84,13 +84,6 @@ def mirror_bundle(fold: int, frame: Array, center: Array) -> Framed:
     return Framed(standard=np.stack([householder(n) for n in normals]), frame=frame, center=center, bundle=True)
 
 
-def single_plane(plane: Plane) -> Framed:
-    """One mirror, its normal on the frame's third axis."""
-    return Framed(
-        standard=np.diag([1.0, 1.0, -1.0])[None], frame=frame_with_z(plane.normal), center=plane.offset * plane.normal
-    )
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Iterate(ReadOnly):
     """State after one outer iteration.
@@ -104,7 +97,6 @@ class Iterate(ReadOnly):
         cost: mean weighted squared residual over the inliers, squared RMS radii.
         inliers: pairs used, over all operations.
         pairs: correspondences of each operation.
-        inner_steps: accepted Gauss-Newton steps.
         converged: whether the change has settled.
     """
 
@@ -116,7 +108,6 @@ class Iterate(ReadOnly):
     cost: float
     inliers: int
     pairs: tuple[Pairs, ...]
-    inner_steps: int
     converged: bool
 
 
@@ -146,7 +137,7 @@ def refine(
     way: Array = np.zeros(6)
     yield Iterate(
         index=0, state=state, theta_rad=np.zeros(0), step=np.inf, covariance=np.zeros((6, 6)), cost=np.nan, inliers=0,
-        pairs=(), inner_steps=0, converged=False,
+        pairs=(), converged=False,
     )  # fmt: skip
     for index in range(1, max_outer + 1):
         uncertainty = min(start_error_rad, RIM * step)
@@ -173,7 +164,6 @@ def refine(
             cost=max(solution.cost, 0.0) / weight,
             inliers=sum(len(p.sources) for p in pairs),
             pairs=pairs,
-            inner_steps=solution.steps,
             converged=settled,
         )
         if settled:

@@ -42,16 +42,6 @@ def coordinates(motion: Isometry) -> Array:
     return np.concatenate([motion.matrix.ravel(), motion.shift, [1.0]])
 
 
-def residual_function() -> Any:
-    """casadi function (x_u, x_l, n_l, m, d) -> e for the plane m.x = d: the definition all else is tested against."""
-    import casadi as ca
-
-    x_u, x_l, n_l, m = (ca.SX.sym(name, 3) for name in ("x_u", "x_l", "n_l", "m"))
-    d = ca.SX.sym("d")
-    mirrored = x_u - 2 * (ca.dot(m, x_u) - d) * m
-    return ca.Function("residual", [x_u, x_l, n_l, m, d], [ca.dot(mirrored - x_l, n_l)])
-
-
 class _Compiled:
     """A casadi function called through its buffers: microseconds instead of the 150 that converting arguments takes.
 

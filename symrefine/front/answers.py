@@ -11,7 +11,8 @@ import numpy as np
 from symrefine.errors import InputError, about
 from symrefine.files import Writer, bytes_writer, check_other, check_target, json_text, text_writer, write_all
 from symrefine.front import lines
-from symrefine.geometry import Array, homogeneous
+from symrefine.geometry import Array
+from symrefine.poses.symmetry import homogeneous
 from symrefine.shape import Shape
 
 if TYPE_CHECKING:

@@ -127,6 +127,10 @@ def _detect_in_space(
             looked_at = sketched(given, seed)
         shape = looked_at.sample
     found = story.detect(looked_at, ladder=ladder, outliers=options["outliers"], tolerance=tolerance, seed=seed)
+    if shape.texture is not None:
+        from symrefine.detection.textured import with_texture
+
+        found = with_texture(found, shape, ladder=ladder, seed=seed)
     found = replace(found, timings=clock.seconds | found.timings)
     if verify == "all":
         found, options = _verified(found, given), options | {"verify": verify}

@@ -70,19 +70,6 @@ def axes_and_angles(operations: Array) -> tuple[Array, Array]:
     return axes, 2.0 * np.arctan2(sine, q[:, 0])
 
 
-def turn_rad(matrix: ArrayLike) -> float:
-    """Largest angle in [0, pi] by which an orthogonal matrix [n, n] turns some plane.
-
-    Of determinant -1 that of what is left beside one reversed direction: 0 for a mirror, and for a rotoreflection the
-    angle that goes with its mirror, as in S4.
-    """
-    operation = np.asarray(matrix, dtype=np.float64)
-    values = np.linalg.eigvals(operation)
-    if np.linalg.det(operation) < 0.0:
-        values = np.delete(values, int(np.argmin(np.abs(values + 1.0))))
-    return float(np.abs(np.angle(values)).max(initial=0.0))
-
-
 def half_turns(directions: Array) -> Array:
     """Rotations [k, 3, 3], determinant +1, by pi about unit `directions` [k, 3]: each stands for an unsigned line."""
     return 2.0 * directions[:, :, None] * directions[:, None, :] - np.eye(3)

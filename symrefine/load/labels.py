@@ -9,7 +9,7 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.load.content import Content, Values, are_whole
 from symrefine.shape import Index
-from symrefine.texture import class_colours, colour_classes
+from symrefine.texture import colour_classes, eight_bit
 
 # Classes [N], and the colours [K, 3] or texts [K] that they stand for; None where they are numbers of their own.
 Classes = tuple[Index, NDArray[Any] | None]
@@ -83,7 +83,7 @@ def _classes(content: Content, key: str, kind: Literal["point", "face"], weights
         raise InputError(f"{key} of {content.name(kind, row)} is {values[row].tolist()}; labels are {right}")
     if values.ndim == 2:
         classes = colour_classes(values, weights)
-        return classes, class_colours(values, classes)
+        return classes, _class_colours(values, classes)
     if values.dtype.kind in "US":
         kinds, own = np.unique(values, return_inverse=True)
         return own.reshape(-1).astype(np.int64), kinds
@@ -101,3 +101,9 @@ def _unfit(values: Values) -> int | None:
             fit = np.ones(len(values), dtype=bool)
     bad = np.flatnonzero(~fit)
     return int(bad[0]) if bad.size else None
+
+
+def _class_colours(colours: Values, classes: NDArray[np.int64]) -> Array:
+    """Mean colours [K, 3], 0 to 255, of classes [N], 0 .. K - 1, of colours [N, 3] on any of these scales."""
+    count = np.maximum(np.bincount(classes), 1)
+    return np.stack([np.bincount(classes, channel) for channel in eight_bit(colours).T], axis=1) / count[:, None]

@@ -2,18 +2,29 @@
 
 `c[p,l,m] = int r^(p-l) R_lm dX` is linear in the moments of order p. R_lm are the real solid harmonics in Racah's
 normalisation (`sum_m R_lm(x)^2 = |x|^(2l)`), index m = -l..l standing for sin(|m| phi) and cos(m phi).
-Under x -> Q x the coefficients of degree l turn by the orthogonal matrix D_l(Q): c' = D_l(Q) c.
+Under x -> Q x the coefficients of degree l turn by the orthogonal matrix D_l(Q): c' = D_l(Q) c. So the numbers of an
+object turn by a linear D(Q) that falls into small blocks; small turns are counted about x, y and z.
 """
 
 from collections import defaultdict
+from dataclasses import dataclass
 from functools import lru_cache
 from math import comb, factorial, sqrt
+from typing import Any
 
 import numpy as np
 
-from symrefine.geometry import Array
-from symrefine.moments.moments import Moments, exponents, exponents_of, monomials, occurrences
+from symrefine.geometry import Array, read_only
+from symrefine.moments.moments import Moments, deviations, exponents, exponents_of, occurrences
+from symrefine.shape import Index
 
+# Variance of a moment that no sample takes away: two files of one model differ by as much.
+FLOOR = 1e-8
+
+# Degree l of each row of harmonic coefficients, in their order along a flat array: rows of 2l+1, m = -l..l in each.
+Rows = tuple[int, ...]
+
+# Coefficient of x^i y^j z^k by (i, j, k).
 Polynomial = dict[tuple[int, int, int], float]
 
 
@@ -117,6 +128,89 @@ def to_polar_axis(l: int, directions: Array) -> Array:
     return turn(l, 1, -theta) @ turn(l, 2, -phi)
 
 
-def evaluate(l: int, points: Array) -> Array:
-    """R_lm at points [N, 3], shape [N, 2l+1]."""
-    return (_projection(l)[l][0] @ monomials(points, l)).T
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Harmonics:
+    """Flat harmonic coefficients with these rows; D_l(-R) = (-1)^l D_l(R).
+
+    R = det(R) R_z(a) R_y(b) R_z(c): a turn about z mixes m with -m only, and a constant quarter turn takes y to z, so
+    D is applied without ever being formed.
+    """
+
+    rows: Rows
+
+    def turned(self, matrices: Array, values: Array) -> Array:
+        layout, signs = _layout(self.rows), np.sign(np.linalg.det(matrices))
+        m = np.arange(max(self.rows) + 1)
+        angles = (np.multiply.outer(angle, m) for angle in euler_zyz(matrices * signs[:, None, None]))
+        first, second, third = ((np.cos(a), np.sin(a)) for a in angles)
+        out = _spin(_spin(_spin(values, third, layout) @ layout.tip, second, layout) @ layout.tip.T, first, layout)
+        return np.asarray(out * np.where(layout.l % 2, signs[:, None], 1.0)[:, None])
+
+    def tangents(self, values: Array) -> Array:
+        turns = _layout(self.rows).generators @ values.T
+        return np.asarray(turns.T.reshape(len(values), 3, -1))
+
+
+def flattened(by_degree: dict[int, Array]) -> tuple[Array, Rows]:
+    """Coefficients {l: [P, n_l, 2l+1]} side by side [P, C], and their rows."""
+    flat = np.concatenate([c.reshape(len(c), c.shape[1] * c.shape[2]) for c in by_degree.values()], axis=1)
+    return flat, tuple(l for l, c in by_degree.items() for _ in range(c.shape[1]))
+
+
+def row_variance(replicates: Array, rows: Rows) -> Array:
+    """Sampling variance [C] of a component of each row, from jackknife replicates [B, C]; zero where there are none.
+
+    The mean over a row does not change when the object turns.
+    """
+    lengths = 2 * np.array(rows) + 1
+    sums = np.add.reduceat((deviations(replicates) ** 2).sum(axis=0), np.cumsum(lengths) - lengths)
+    return np.repeat(sums / lengths, lengths)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Layout:
+    """Flat coefficients: |m| and l of each, where its partner -m stands, and the sign with which a turn mixes it in.
+
+    `tip` [C, C] is D of the quarter turn about x, transposed, between which R_y(b) is R_z(b); `generators` [3C, C] are
+    the three of them on top of one another, of two entries a row at most.
+    """
+
+    m: Index
+    l: Index
+    partner: Index
+    sign: Array
+    tip: Array
+    generators: Any
+
+
+@lru_cache(maxsize=32)
+def _layout(rows: Rows) -> _Layout:
+    from scipy.linalg import block_diag
+    from scipy.sparse import csr_array
+
+    stacked = np.concatenate([block_diag(*(generators(l)[k] for l in rows)) for k in range(3)])
+    m = np.concatenate([np.arange(-l, l + 1) for l in rows])
+    return _Layout(
+        m=np.abs(m),
+        l=np.repeat(rows, [2 * l + 1 for l in rows]),
+        partner=np.arange(len(m)) - 2 * m,
+        sign=-np.sign(m).astype(np.float64),
+        tip=read_only(block_diag(*(turn(l, 0, np.array(np.pi / 2)).T for l in rows))),
+        generators=csr_array(stacked),
+    )
+
+
+def _spin(c: Array, phase: tuple[Array, Array], layout: _Layout) -> Array:
+    """D of turns about z by K angles, given as cos and sin of m times each [K, degree + 1], on c [P or K, P, C]."""
+    cosine, sine = (values[:, None, layout.m] for values in phase)
+    return np.asarray(cosine * c + (layout.sign * sine) * c[..., layout.partner])
+
+
+def euler_zyz(rotations: Array) -> tuple[Array, Array, Array]:
+    """Angles (a, b, c) [K] with R = R_z(a) R_y(b) R_z(c), accurate where b vanishes too."""
+    r = rotations
+    a = np.arctan2(r[:, 1, 2], r[:, 0, 2])
+    b = np.arctan2(np.hypot(r[:, 0, 2], r[:, 1, 2]), r[:, 2, 2])
+    # The second row of R_z(-a) R is (sin c, cos c, 0) whatever b is.
+    row = np.cos(a)[:, None] * r[:, 1, :2] - np.sin(a)[:, None] * r[:, 0, :2]
+    return a, b, np.arctan2(row[:, 0], row[:, 1])

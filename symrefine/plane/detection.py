@@ -11,7 +11,7 @@ from symrefine.decide.doubts import on_a_line, set_by_strays
 from symrefine.decide.posterior import ALIKE, NEAR, PICTURE, Alternative, Decision, Link, alternatives, decide
 from symrefine.errors import InputError
 from symrefine.geometry import Array, Plane, ReadOnly, check_tolerance, toward_positive
-from symrefine.groups import PointGroup2D
+from symrefine.groups.plane import PointGroup2D
 from symrefine.moments.moments import PARTS, Moments, shape_moments
 from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.plane.chain import Hypothesis, chain, explore

@@ -12,7 +12,7 @@ from symrefine.fit.matching import match, pair_equations
 from symrefine.fit.placed import FITTED, FREE_TURNS, evenly, wide_angle_rad
 from symrefine.fit.refine import MAX_OUTER, SETTLED
 from symrefine.geometry import Array, Isometry, Plane, ReadOnly
-from symrefine.groups import PointGroup2D
+from symrefine.groups.plane import PointGroup2D
 from symrefine.plane.outline import Outlines
 from symrefine.propose.candidates import START_ERROR
 from symrefine.surface.misses import RIM

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.errors import InputError, about
-from symrefine.geometry import Array, Axis, frame_with_z, homogeneous, numbers
+from symrefine.geometry import Array, Axis, frame_with_z, numbers
 from symrefine.groups import MAX_FOLD, PointGroup, identify, point_group
 from symrefine.groups.elements import DIRECTION_ERROR_RAD as TILT_RAD
 from symrefine.groups.orthogonal import chord_angles, determinants
-from symrefine.poses.symmetry import Symmetry, checked_poses
+from symrefine.poses.symmetry import Symmetry, checked_poses, homogeneous
 from symrefine.rounding import SINGLE
 
 # What is nearer to the identity is it: a tenth of the smallest turn that a group here has.

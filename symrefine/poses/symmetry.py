@@ -13,12 +13,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.errors import InputError
-from symrefine.geometry import Array, ReadOnly, homogeneous, numbers
+from symrefine.geometry import Array, ReadOnly, numbers
 from symrefine.groups import PointGroup
 from symrefine.groups.orthogonal import determinants
 
 # By how much R'R may miss 1: what four written digits leave, and no scale.
 _WRITTEN = 1e-3
+
+
+def homogeneous(matrices: Array, center: Array) -> Array:
+    """Matrices [N, n+1, n+1] of orthogonal maps [N, n, n] that leave a centre [n] in place."""
+    dim = len(center)
+    found = np.tile(np.eye(dim + 1), (len(matrices), 1, 1))
+    found[:, :dim, :dim] = matrices
+    found[:, :dim, dim] = center - matrices @ center
+    return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -10,13 +10,14 @@ from functools import cached_property
 
 import numpy as np
 
-from symrefine.fit.frame import polish_frame
+from symrefine.fit.gauss_newton import Linearisation, minimise
 from symrefine.fit.placed import Placed
+from symrefine.fit.residual import turn_frame
 from symrefine.geometry import Array, frame_with_z
 from symrefine.groups import MAX_FOLD, PointGroup, close
 from symrefine.groups.identify import POLYHEDRAL
 from symrefine.groups.names import CLOSED_FOLD
-from symrefine.moments.harmonics import harmonic_moments
+from symrefine.moments.harmonics import FLOOR, Harmonics, flattened, harmonic_moments, row_variance
 from symrefine.moments.moments import Moments
 from symrefine.ntuples.rank import FixedSubspace
 from symrefine.propose.folds import fold_candidates, frames_across, mirror_through
@@ -32,10 +33,10 @@ from symrefine.surface.skin import LocalPlanes
 START_ERROR = 0.05
 # Primes whose axes the moments tell.
 PRIMES = (2, 3, 5, 7)
-
-
 # Atoms nearer to an axis than these (RMS radii) may stand on it.
 ON_AXIS = (0.03, 0.15)
+# Longest step (radians) of a frame that is polished on the moments: what the linear model covers.
+LONGEST = 0.15
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -130,6 +131,36 @@ def about(evidence: Evidence, direction: Array) -> list[Placed]:
             if candidate.fold not in anyway and abs(frame[2] @ direction) < np.cos(0.2 * START_ERROR):
                 turns.setdefault((candidate.fold, True), frame)  # the axis that told the fold may know it better
     return [*found, *(placed(f"C{fold}", turns[fold, polished]) for fold, polished in sorted(turns, reverse=True))]
+
+
+def polish_frame(harmonics: dict[int, Array], frame: Array, fold: int, *, steps: int = 6) -> Array:
+    """Turn a C_bv frame until the moments that break the group vanish: Gauss-Newton on SO(3), noise-weighted.
+
+    No point is matched. In the frame, the invariant coefficients are cos(m phi) with b | m; every other one is a
+    residual whose derivative under a small rotation is the generator applied to the coefficients. For fold 1 the group
+    is Cs with normal p1.
+
+    Args:
+        harmonics: c[p,l,m] with jackknife replicates, about the centre the axis passes through.
+        frame: rows (p0, p1, u), determinant +1.
+        fold: b.
+
+    Returns: the polished frame, rows (p0, p1, u).
+    """
+    values, rows = flattened(harmonics)
+    action = Harmonics(rows=rows)
+    m = np.concatenate([np.arange(-l, l + 1) for l in rows])
+    weights = ((m < 0) | (m % fold != 0)) / (row_variance(values[1:], rows) + FLOOR)
+
+    def linearise(turned: Array) -> Linearisation:
+        here = action.turned(turned[None], values[:1])[:, 0]
+        jacobian = action.tangents(here)[0]
+        weighted = jacobian * weights
+        return Linearisation(
+            cost=float(weights @ here[0] ** 2), gradient=weighted @ here[0], hessian=weighted @ jacobian.T
+        )
+
+    return minimise(linearise, frame, move=turn_frame, max_steps=steps, longest=LONGEST).x
 
 
 def _counted(points: Array, direction: Array) -> set[int]:

@@ -1,4 +1,4 @@
-"""Maps of one surface onto another, or onto itself, that local planes which look alike agree upon.
+"""Maps of one surface onto itself, or onto another, that local planes which look alike agree upon.
 
 Neither centroid nor moments are asked, so that missing parts bias nothing; either determinant is as likely. What a
 surface is carried onto itself by is a symmetry of what was seen: a mirror, a turn, the inversion, a rotoreflection.
@@ -7,7 +7,7 @@ surface is carried onto itself by is a symmetry of what was seen: a mirror, a tu
 import numpy as np
 
 from symrefine.propose.consensus import Matches, Proposal, consensus
-from symrefine.propose.signatures import mutual_matches, own_matches, signatures
+from symrefine.propose.signatures import own_matches, signatures
 from symrefine.shape import Index
 from symrefine.surface.skin import LocalPlanes, Planes
 
@@ -17,26 +17,17 @@ from symrefine.surface.skin import LocalPlanes, Planes
 AROUND, WITHIN, PLANES, MATCHES = 0.1, 0.04, 1500, 400
 
 
-def maps_between(source: LocalPlanes, target: LocalPlanes, diagonal: float) -> list[Proposal]:
-    """Maps of either determinant from one surface onto another, best first; `diagonal` is that of the smaller one."""
-    # Of a side with more local planes as many as elsewhere tell what surroundings look like.
-    every = [max(1, round(len(cloud.points) / PLANES)) for cloud in (source, target)]
-    sides = zip((source, target), every, strict=True)
-    source_looks, target_looks = (signatures(cloud, AROUND * diagonal, k) for cloud, k in sides)
-    classes = None if source.labels is None or target.labels is None else (source.labels, target.labels)
-    return _agreed(source, target, mutual_matches(source_looks, target_looks, classes), diagonal)
-
-
 def maps_onto_itself(cloud: LocalPlanes, diagonal: float, rng: np.random.Generator) -> list[Proposal]:
     """Maps of either determinant of a surface onto itself, but for the identity and what is next to it, best first."""
     some = np.sort(rng.permutation(len(cloud.points))[:PLANES])
     chosen = cloud.chosen(some)
     looks = signatures(chosen, AROUND * diagonal)
     matches = own_matches(looks, chosen.points, 2.0 * WITHIN * diagonal, cloud.classes(some))
-    return _agreed(chosen, chosen, matches, diagonal)
+    return agreed(chosen, chosen, matches, diagonal)
 
 
-def _agreed(source: Planes, target: Planes, matches: tuple[Index, Index], diagonal: float) -> list[Proposal]:
+def agreed(source: Planes, target: Planes, matches: tuple[Index, Index], diagonal: float) -> list[Proposal]:
+    """The maps that the first of some matches agree upon, indices of the planes of either side."""
     i, j = (m[:MATCHES] for m in matches)
     return consensus(
         Matches(

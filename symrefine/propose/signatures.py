@@ -66,39 +66,23 @@ def _histograms(owner: Index, values: Array, count: int) -> Array:
     return found
 
 
-def mutual_matches(source: Array, target: Array, classes: tuple[Index, Index] | None = None) -> tuple[Index, Index]:
-    """Indices of the signatures [N, F] and [M, F] that are each nearest to the other, of those of its class.
-
-    Those come first that are least like a plane, which is like any other.
-    """
-    squares = _squares(source, target)
-    if classes is not None:
-        squares[classes[0][:, None] != classes[1]] = np.inf
-    nearest = squares.argmin(axis=1)
-    least = squares[np.arange(len(source)), nearest]
-    # The least of a column is that of its row too where both choose one another; numpy finds it faster than its place.
-    mutual = np.flatnonzero((least == squares.min(axis=0)[nearest]) & np.isfinite(least))
-    first = _least_flat_first(source, mutual)
-    return first, nearest[first]
-
-
 def own_matches(looks: Array, points: Array, apart: float, classes: Index | None = None) -> tuple[Index, Index]:
     """Indices of the signatures [N, F], and of those nearest to each that stand farther from it than `apart`.
 
     Of points [N, 3] of some classes [N]; those come first that are least like a plane.
     """
-    squares = _squares(looks, looks)
+    squares = square_distances(looks, looks)
     middle = points - points.mean(axis=0)
-    squares[_squares(middle, middle) < apart**2] = np.inf
+    squares[square_distances(middle, middle) < apart**2] = np.inf
     if classes is not None:
         squares[classes[:, None] != classes] = np.inf
     nearest = squares.argmin(axis=1)
     matched = np.flatnonzero(np.isfinite(squares[np.arange(len(looks)), nearest]))
-    first = _least_flat_first(looks, matched)
+    first = least_flat_first(looks, matched)
     return first, nearest[first]
 
 
-def _squares(one: Array, other: Array) -> "np.ndarray[tuple[int, int], np.dtype[np.float32]]":
+def square_distances(one: Array, other: Array) -> "np.ndarray[tuple[int, int], np.dtype[np.float32]]":
     """|a - b|^2 [N, M] of rows [N, F] and [M, F] as one product, in single precision, which is fine enough."""
     a, b = one.astype(np.float32), other.astype(np.float32)
     a_squares, b_squares = ((v * v).sum(axis=1, keepdims=True) for v in (a, b))
@@ -106,7 +90,7 @@ def _squares(one: Array, other: Array) -> "np.ndarray[tuple[int, int], np.dtype[
     return np.hstack([a, a_squares, a_ones]) @ np.hstack([-2.0 * b, b_ones, b_squares]).T
 
 
-def _least_flat_first(looks: Array, some: Index) -> Index:
+def least_flat_first(looks: Array, some: Index) -> Index:
     """Some of the signatures [N, F], those first whose neighbours' normals turn away from their own most."""
     turned = looks.reshape(len(looks), SHELLS, 3, BINS)[some, :, 1, -1].mean(axis=1)
     return some[np.argsort(turned, kind="stable")]

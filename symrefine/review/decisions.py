@@ -9,7 +9,7 @@ from typing import Any
 
 from symrefine.errors import InputError, printable
 from symrefine.files import file_bytes, json_text
-from symrefine.units import LARGEST_TOLERANCE
+from symrefine.rounding import LARGEST_TOLERANCE
 
 SCHEMA = "symrefine.decisions/1"
 # A decision takes some 300 bytes: so much holds those of a hundred thousand objects. JSON of so many bytes, which in

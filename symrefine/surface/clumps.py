@@ -22,7 +22,7 @@ from symrefine.surface.neighbourhoods import (
     planes_of,
     renumbered,
 )
-from symrefine.surface.surroundings import AROUND, Surroundings, around_some
+from symrefine.surface.surroundings import AROUND, Surroundings
 from symrefine.surface.tree import Tree
 
 # A clump holds at most this share of the points, so many that it counts, and has no counterpart: none of half its size.
@@ -62,7 +62,7 @@ def clumps(points: Array, around: Surroundings) -> list[Index]:
     Points hang together if each is among the nearest of the other, whatever the density: a few between two dense parts
     join nothing. `around` tells of some of the points. A piece of surface is no clump: what a hole cut off the body.
     """
-    apart = [m for m in _lone(_parts(around), CLUMP) if _gap(around, m)] if np.median(around.reach) > 0.0 else []
+    apart = [m for m in _lone(parts_among(around), CLUMP) if _gap(around, m)] if np.median(around.reach) > 0.0 else []
     return [c for c in _members(points, around, apart) if _is_filled(points[c])]
 
 
@@ -75,7 +75,7 @@ def clump_among(points: Array, unmet: Mask) -> Index:
     found, least = np.flatnonzero(unmet), max(NEIGHBOURS[0] * FRACTIONS[0], SHARES[-1] * len(points))
     if not least <= len(found) <= CLUMP * len(points):
         return found[:0]
-    part = _parts(Surroundings.of(points[found]))
+    part = parts_among(Surroundings.of(points[found]))
     own = found[part == np.bincount(part).argmax()]
     if len(own) < max(least, 0.5 * len(found)):
         return found[:0]
@@ -89,15 +89,7 @@ def _is_filled(points: Array) -> bool:
     return bool(min(thick) > VOLUME)
 
 
-def count_parts(points: Array, rng: np.random.Generator) -> int:
-    """How many parts points [N, 3] have, strays left out, that hang together and are so large that they count."""
-    if len(points) <= AROUND:
-        return 1
-    sizes = np.bincount(_parts(around_some(points, rng)))
-    return max(int((sizes > max(SHARES[-1] * sizes.sum(), AROUND)).sum()), 1)
-
-
-def _parts(around: Surroundings) -> Index:
+def parts_among(around: Surroundings) -> Index:
     """Number of the part that each of some points belongs to: they hang together if each is near the other."""
     count = len(around.points)
     one, other = np.repeat(np.arange(count), AROUND), around.near.ravel()

@@ -13,10 +13,10 @@ import numpy as np
 
 from symrefine.geometry import Array, Isometry, rows
 from symrefine.moments.moments import BLOCK
+from symrefine.rounding import TOLERANCE as TOLERANCE
 from symrefine.samples import COUNT
 from symrefine.shape import Index
 from symrefine.surface.skin import LocalPlanes
-from symrefine.units import TOLERANCE as TOLERANCE
 
 # An operation holds at tolerance t (2 % by default) if the mean miss stays below the first of these multiples of t, and
 # if no larger shares of the surface miss by more than the others: a detail of 3 % by 1.15 t, one of 0.6 % by 1.85 t.

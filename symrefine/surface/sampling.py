@@ -51,13 +51,6 @@ class Sampling:
     shares: Array | None = None
     solid: bool = False
 
-    @property
-    def without_strays(self) -> "Sampling":
-        """The same of the points that are kept, if nothing else than strays was set apart."""
-        every = np.arange(len(self.kept))
-        even = np.searchsorted(self.kept, self.even)
-        return Sampling(kept=every, even=even, strays=every[:0], shares=self.shares, solid=self.solid)
-
 
 def sampling(
     points: Array,

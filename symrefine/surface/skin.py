@@ -81,7 +81,7 @@ class Patches(Planes):
             **_all_of(self),
             reach=distance[:, -1],
             spacing=_spacing(distance),
-            tree=tree if self.labels is None else Tree(_with_class(self.points, self.labels)),
+            tree=tree if self.labels is None else Tree(with_class(self.points, self.labels)),
         )
 
 
@@ -144,26 +144,13 @@ class LocalPlanes(Patches):
 
     def nearest(self, queries: Array, classes: Index | None, *, bound: float = math.inf) -> tuple[Array, Index]:
         """Distance and index, both [Q], of the point nearest to each query [Q, 3] of the classes [Q]; see `Tree`."""
-        return self.tree.nearest(_with_class(queries, classes), bound=bound)
+        return self.tree.nearest(with_class(queries, classes), bound=bound)
 
     def around(
         self, queries: Array, classes: Index | None, count: int, *, skip: int = 0, bound: float = math.inf
     ) -> tuple[Array, Index]:
         """The same, both [Q, count], of several; see `Tree.query`."""
-        return self.tree.query(_with_class(queries, classes), count, skip=skip, bound=bound)
-
-    def scaled(self, factor: float) -> "LocalPlanes":
-        """The same surface, so many times as large."""
-        points = factor * self.points
-        return replace(
-            self,
-            points=points,
-            thickness=factor * self.thickness,
-            reach=factor * self.reach,
-            spacing=factor * self.spacing,
-            tree=Tree(_with_class(points, self.labels)),
-            eyes=None if self.eyes is None else factor * self.eyes,
-        )
+        return self.tree.query(with_class(queries, classes), count, skip=skip, bound=bound)
 
     def with_copies(self, points: Array, normals: Array) -> "LocalPlanes":
         """The same surface, and behind it as many of its planes again elsewhere, [M, 3] and [M, 3]."""
@@ -177,18 +164,9 @@ class LocalPlanes(Patches):
             flatness=np.tile(self.flatness, 2),
             reach=np.tile(self.reach, 2),
             redundancy=2.0 * self.redundancy,
-            tree=Tree(_with_class(every, labels)),
+            tree=Tree(with_class(every, labels)),
             labels=labels,
         )
-
-    def shared_by(self, _: int) -> float:
-        """How many of the planes each point takes part in, whichever of them are met."""
-        return self.redundancy
-
-    def met_by(self, queries: Array, classes: Index | None = None) -> tuple[Array, Planes]:
-        """Distance [Q] from each query [Q, 3] of the classes [Q] to the nearest of the planes, and these."""
-        distance, near = self.nearest(queries, classes)
-        return distance, self.chosen(near)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -243,31 +221,9 @@ class Skin:
         return self.points[:: max(1, len(self.points) // GLANCE)]
 
     @cached_property
-    def _neighbourhoods(self) -> Neighbourhoods:
+    def neighbourhoods(self) -> Neighbourhoods:
+        """What planes are fitted to."""
         return Neighbourhoods.of(self.points, self.tree, self.neighbours)
-
-    def met_by(self, queries: Array, classes: Index | None = None) -> tuple[Array, Planes]:
-        """Distance [Q] from each query [Q, 3] to the nearest point, and the planes of the points around the queries.
-
-        Infinite where that point is not of the class [Q] of the query.
-        """
-        near: Index | None = None
-        # Where cells are the points themselves, what a plane is fitted to begins with the nearest of them.
-        if self.neighbours > 1 and self._neighbourhoods.tree is self.tree:
-            away, near = self.tree.query(queries, self._neighbourhoods.count)
-            distance, nearest = away[:, 0], near[:, 0]
-        else:
-            distance, nearest = self.tree.nearest(queries)
-        return self._of_class(distance, nearest, classes), self._planes(queries, nearest, near)
-
-    def nearest(self, queries: Array, classes: Index | None = None) -> Array:
-        """Distance [Q] from each query [Q, 3] to the nearest point; infinite where that is not of its class [Q]."""
-        return self._of_class(*self.tree.nearest(queries), classes)
-
-    def _of_class(self, distance: Array, near: Index, classes: Index | None) -> Array:
-        if self.labels is None or classes is None:
-            return distance
-        return np.where(self.labels[near] == classes, distance, np.inf)
 
     def shared_by(self, count: int) -> float:
         """How many of the planes at `count` of the points each point takes part in; at least 1."""
@@ -276,7 +232,7 @@ class Skin:
     def denoised(self, pick: Index, near: Index | None = None) -> Planes:
         """Some of the points, each moved onto the plane of its neighbours (`near`, if known), and these planes."""
         points = rows(self.points, pick)
-        fitted = self._planes(points, pick, near)
+        fitted = self.planes_at(points, pick, near)
         if self.neighbours == 1:
             return fitted
         across = np.einsum("ij,ij->i", fitted.normals, points - fitted.points)
@@ -291,12 +247,13 @@ class Skin:
             return None
         return self.tree.query(rows(self.points, pick), most, scattered=scattered)[1]
 
-    def _planes(self, queries: Array, nearest: Index, near: Index | None = None) -> Planes:
+    def planes_at(self, queries: Array, nearest: Index, near: Index | None = None) -> Planes:
+        """The planes where queries [Q, 3] meet the surface, given the points nearest to them [Q]; `near` if known."""
         normals = None if self.normals is None else rows(self.normals, nearest)
         if self.neighbours == 1 and normals is not None:
             none = np.zeros(len(nearest))
             return Planes(points=rows(self.points, nearest), normals=normals, thickness=none, flatness=none)
-        mean, normals, values = fit_planes(self._neighbourhoods.around(queries, near), normals)
+        mean, normals, values = fit_planes(self.neighbourhoods.around(queries, near), normals)
         return Planes(points=mean, normals=normals, thickness=np.sqrt(values[:, 0]), flatness=flatness_of(values))
 
     def patches(self, pick: Index, labels: Index | None = None, near: Index | None = None) -> Patches:
@@ -325,33 +282,15 @@ def _spacing(away: Array) -> float:
     return float(np.median(apart)) if apart.size else 0.0
 
 
-def _with_class(points: Array, classes: Index | None) -> Array:
+def with_class(points: Array, classes: Index | None) -> Array:
+    """Points [N, 3] with the class [N] as a fourth coordinate where there are classes."""
     return points if classes is None else np.column_stack([points, APART * classes])
 
 
-def local_planes(
-    points: Array,
-    count: int,
-    rng: np.random.Generator,
-    *,
-    normals: Array | None = None,
-    labels: Index | None = None,
-    weights: Array | None = None,
-    exact: bool = False,
-    tree: Tree | None = None,
-) -> LocalPlanes:
-    """Local planes at `count` of the points [N, 3], from neighbourhoods among all of them.
-
-    Args:
-        normals: [N, 3] unit normals to use instead of fitted ones, any sign.
-        labels: [N] classes; they do not matter to the fits.
-        weights: [N] positive; a point is chosen in proportion to its own, so that an uneven density evens out.
-        exact: points and normals are free of noise (samples of a mesh) and are taken as they are.
-        tree: kd-tree over `points`, if there is one already.
-    """
-    chance = None if weights is None else weights / weights.sum()
-    pick = drawn(len(points), count, rng, chance)
-    return make_skin(points, rng, normals=normals, exact=exact, tree=tree).local_planes(pick, labels)
+def local_planes(points: Array, count: int, rng: np.random.Generator) -> LocalPlanes:
+    """Local planes at `count` of the points [N, 3], from neighbourhoods among all of them."""
+    pick = drawn(len(points), count, rng)
+    return make_skin(points, rng).local_planes(pick)
 
 
 def drawn(size: int, count: int, rng: np.random.Generator, weights: Array | None = None) -> Index:
@@ -372,7 +311,14 @@ def make_skin(
 ) -> Skin:
     """The skin of points [N, 3], with neighbourhoods as large as their noise asks for.
 
-    Arguments as those of `local_planes` and `choose_neighbours`.
+    Args:
+        points: [N, 3].
+        rng: of the points that are asked for their noise.
+        normals: [N, 3] unit normals to use instead of fitted ones, any sign.
+        labels: [N] classes; they do not matter to the fits.
+        exact: points and normals are free of noise (samples of a mesh) and are taken as they are.
+        thin: as of `choose_neighbours`.
+        tree: kd-tree over `points`, if there is one already.
     """
     if exact and normals is not None:
         return Skin(points=points, normals=normals, neighbours=1, given=tree, labels=labels)
@@ -394,7 +340,7 @@ def isolated_points(points: Array, labels: Index | None = None, *, body: Body = 
         reach=none,
         spacing=float(np.median(distance[:, 1])),
         redundancy=1.0,
-        tree=tree if labels is None else Tree(_with_class(points, labels)),
+        tree=tree if labels is None else Tree(with_class(points, labels)),
         body=body,
         labels=labels,
     )

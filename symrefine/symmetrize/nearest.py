@@ -13,19 +13,19 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from symrefine.errors import DegenerateShapeError, InputError
-from symrefine.fit.action import Action, act, generators, mean_back
+from symrefine.fit.action import generators, mean_back
 from symrefine.fit.finite import finite_group
 from symrefine.fit.placed import Placed
 from symrefine.fit.vertices import NEAR, Distinct, on_vertices, settled, towards
 from symrefine.geometry import Array, ReadOnly, tight_diagonal, unit
 from symrefine.groups import PointGroup
 from symrefine.groups.names import TURNS
+from symrefine.rounding import TOLERANCE
 from symrefine.shape import Index, Shape
 from symrefine.surface.skin import FEW
-from symrefine.symmetrize.leftover import with_leftovers
+from symrefine.symmetrize.counterparts import Action, act, with_leftovers
 from symrefine.symmetrize.surface import Closest, closest_on
 from symrefine.threads import one_thread
-from symrefine.units import TOLERANCE
 
 # Counterparts are looked for up to so many tolerances away. Where points are many they must miss by no more than so
 # much of the usual distance between points (RMS, and the worst), and in a mesh some of whose vertices have none each by

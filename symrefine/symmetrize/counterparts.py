@@ -1,19 +1,20 @@
-"""Counterparts for points that nearest neighbours leave without: pairs closer to a mirror than the noise, and the like.
+"""How a finite group permutes points that nearly have it: nearest points as counterparts, and what they leave without.
 
-Orbit by orbit: a point either takes part in an orbit of full length or lies on an element of the group, by the noise
-beside it; for each of these cases the places of the orbit are given to points one to one, and the case that moves the
-points least wins, longer orbits before shorter ones.
+These are pairs closer to a mirror than the noise, and the like. Orbit by orbit: a point either takes part in an orbit
+of full length or lies on an element of the group, by the noise beside it; for each of these cases the places of the
+orbit are given to points one to one, and the case that moves the points least wins, longer orbits before shorter ones.
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from symrefine.fit.action import Action
-from symrefine.geometry import Array
+from symrefine.fit.action import generators, labelled, mean_back
+from symrefine.geometry import Array, Mask
 from symrefine.shape import Index
 
 # More points, or larger groups, than this are left alone: it costs their product for each orbit.
@@ -24,6 +25,39 @@ PREFERENCE = 2.0
 
 # Rows [K] at the place of each g of what stands at the identity, and how far points move [K].
 _Orbit = tuple[Index, Array]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Action:
+    """Counterparts `images` [K, N] of points under operations [K, 3, 3], and where they are an action of the group.
+
+    `closed` [N] marks the points on whose orbits g h has the counterpart that g has of that of h: there each operation
+    permutes the points. `miss` [N] is the largest distance of an image to its counterpart.
+    """
+
+    images: Index
+    closed: Mask
+    miss: Array
+
+    def mean(self, points: Array, operations: Array) -> Array:
+        """Means [N, 3] over the group of g^-1 (counterpart of g p)."""
+        return mean_back((points[image] for image in self.images), operations)
+
+
+def act(points: Array, operations: Array, labels: Index | None, reach: float) -> Action:
+    """The nearest point of the same label as counterpart of each image, up to `reach`."""
+    tree, shifted = labelled(points, labels)
+    images, miss = np.empty((len(operations), len(points)), dtype=np.intp), np.zeros(len(points))
+    for k, g in enumerate(operations):
+        distance, images[k] = tree.query(np.column_stack([points @ g.T, shifted]))
+        miss = np.maximum(miss, distance)
+    closed = miss <= reach
+    for h, table in generators(operations):
+        closed &= (images[table] == images[:, images[h]]).all(axis=0)
+    # Only the points all of whose orbit is closed.
+    while ((whole := closed & closed[images].all(axis=0)) != closed).any():
+        closed = whole
+    return Action(images=images, closed=closed, miss=miss)
 
 
 def with_leftovers(points: Array, operations: Array, action: Action, labels: Index | None, reach: float) -> Action:

@@ -1,0 +1,23 @@
+"""Surfaces that tests are made of."""
+
+from typing import Any
+
+import numpy as np
+
+from symrefine.geometry import Array
+from symrefine.shape import Index
+from symrefine.surface.skin import LocalPlanes, drawn, make_skin
+
+
+def local_planes(
+    points: Array,
+    count: int,
+    rng: np.random.Generator,
+    *,
+    labels: Index | None = None,
+    weights: Array | None = None,
+    **given: Any,
+) -> LocalPlanes:
+    """Local planes at `count` of the points [N, 3], each drawn as often as its weight [N] says; `given` the skin."""
+    pick = drawn(len(points), count, rng, weights)
+    return make_skin(points, rng, **given).local_planes(pick, labels)
