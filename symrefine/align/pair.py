@@ -150,6 +150,11 @@ class Evidence:
         return self._planes(0, LOOK)
 
     @cached_property
+    def _met_back(self) -> LocalPlanes:
+        """The source as what comes back from the target is to meet it."""
+        return self._planes(0, COUNT).surface
+
+    @cached_property
     def met(self) -> Skin | LocalPlanes:
         """The target, with planes wherever they are asked for."""
         return self._planes(1, 0).surface if few(self.source.shape, self.target.shape) else self._skins[1]
@@ -179,7 +184,7 @@ class Evidence:
         """Distances from the target to the moved source, fractions of the diagonal."""
         cloud, size = self.judge.cloud, self.judge.diagonal
         moved, bound = motion.inverse.apply(cloud.points), size / motion.scale
-        back = disc_distances(self.moving.surface, moved, cloud.labels, bound=bound)
+        back = disc_distances(self._met_back, moved, cloud.labels, bound=bound)
         return motion.scale * back / size
 
     def excess(self, motion: Similarity, *, both: bool = False) -> float:
