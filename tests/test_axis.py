@@ -11,7 +11,7 @@ from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import fixed_subspace
 from symrefine.propose.candidates import polish_frame
-from symrefine.propose.folds import BINS_PER_ORDER, azimuthal_spectrum, fold_candidates
+from symrefine.propose.folds import BINS_PER_ORDER, azimuthal_spectrum, fold_candidates, mirror_through
 from symrefine.shape import Shape
 
 ORDER = 8
@@ -192,6 +192,20 @@ def test_of_folds_that_leak_alike_the_largest_comes_first():
     found = fold_candidates(*drum(lambda phi, _: 1 + 0.5 * np.cos(6 * phi) + 0.16 * np.cos(2 * phi)), Z_AXIS)
     assert [f.fold for f in found] == [6, 2]
     assert found[0].leak > found[1].leak
+
+
+@pytest.mark.parametrize("azimuth_deg", [0.0, 17.0, 90.0, 133.3])
+def test_the_mirror_through_an_axis_is_told_whatever_repeats(azimuth_deg):
+    azimuth = np.radians(azimuth_deg)
+    waves = ((1, 0.1), (2, 0.3), (5, -0.2), (7, 0.25))
+    points, weights = drum(lambda phi, _: 1 + sum(a * np.cos(k * (phi - azimuth)) for k, a in waves))
+    normal = mirror_through(points, weights, Z_AXIS)
+    assert line_angle_rad(normal, np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])) < np.radians(0.1)
+
+
+def test_of_random_azimuths_no_mirror_is_told():
+    rng = np.random.default_rng(11)
+    assert sum(mirror_through(scattered(rng), np.ones(400), Z_AXIS) is not None for _ in range(30)) < 12
 
 
 def test_folds_that_leave_much_energy_out_are_none():

@@ -15,7 +15,7 @@ from experiments.objects.boundary import instance
 from experiments.objects.shapes import box, join, revolve, sample
 from experiments.studies import groups
 from experiments.studies.boundary import Case, look
-from symrefine.decide.chain import _best, _excluded, _holding, _told_apart, _with, chain, explore
+from symrefine.decide.chain import _best, _by_chance, _excluded, _holding, _told_apart, _with, chain, explore
 from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import Link, decide
@@ -425,12 +425,68 @@ def mirror_at(angle_deg):
         ([upright("C50v"), upright("Cs")], "D50h"),
     ],
 )
-def test_what_parts_generate_turns_by_no_less_than_tells_directions_apart(parts, whole):
-    assert _told_apart(joined(parts), parts).group.name == whole
+def test_what_parts_generate_turns_by_no_less_than_tells_directions_apart(parts, whole, monkeypatch):
+    monkeypatch.setattr("symrefine.decide.chain._by_chance", lambda *_: False)
+    assert _told_apart(round_but_for_holes(4)[0], joined(parts), parts).group.name == whole
 
 
 def test_what_generates_nothing_is_nothing():
-    assert _told_apart(None, []) is None
+    assert _told_apart(round_but_for_holes(4)[0], None, []) is None
+
+
+@cache
+def round_but_for_holes(holes, noise_rel=0.005):
+    """The surface of a flange with a few small holes through it, about its axis z."""
+    rng = np.random.default_rng(holes)
+    points = sample(
+        join([revolve([(0.3, 0.0), (1.0, 0.0), (1.0, 0.2), (0.5, 0.2), (0.5, 0.7), (0.3, 0.7)])]), 9000, 0.0, rng
+    )
+    angles = 2.0 * np.pi * np.arange(holes) / 4
+    middles = 0.75 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    apart = np.linalg.norm(points[:, None, :2] - middles, axis=2).min(axis=1)
+    wall = 2.0 * np.pi * rng.random((holes, 90))
+    walls = middles[:, None] + 0.12 * np.stack([np.cos(wall), np.sin(wall)], axis=2)
+    walls = np.column_stack([walls.reshape(-1, 2), 0.2 * rng.random(90 * holes)])
+    points = np.concatenate([points[apart > 0.12], walls])
+    points += noise_rel * 2.9 * rng.standard_normal(points.shape)
+    evidence, surface = gather(measure(Shape(points=points)), np.random.default_rng(0))
+    return surface, -evidence.moments.center / evidence.moments.scale, points
+
+
+@pytest.mark.parametrize(
+    ("name", "chance"), [("C4v", False), ("C2v", False), ("C12v", True), ("C30v", True), ("C5", True)]
+)
+def test_folds_by_which_something_round_is_forgiven_as_much_as_by_any_turn_are_none(name, chance):
+    surface, center, _ = round_but_for_holes(4)
+    assert _by_chance(surface, replace(upright(name), center=center)) == chance
+
+
+@pytest.mark.parametrize("name", ["C1", "Cs", "Kh", "Oh", "Cinfv", "D2"])
+def test_what_has_no_fold_has_none_by_chance(name):
+    """Of a cube half a turn misses less than parts of it do; of what has no axis, or turns freely, nothing is asked."""
+    rng = np.random.default_rng(5)
+    evidence, surface = gather(measure(Shape(points=sample(join([box((0, 0, 0), (1, 1, 1))]), 5000, 0.0, rng))), rng)
+    center = -evidence.moments.center / evidence.moments.scale
+    assert not _by_chance(surface, replace(upright(name), center=center))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_something_round_has_no_fold_that_nothing_in_it_has(seed):
+    """Noise hides the four holes of a flange from many mirrors, any two of which make some fold."""
+    _, _, points = round_but_for_holes(4, 0.01)
+    rng = np.random.default_rng(seed)
+    found = detect(points @ random_orthogonal(rng).T)
+    assert found.point_group in ("C4v", "C2v", "Cinfv")
+    assert all(a.point_group in ("C1", "Cs", "C2v", "C4v", "Cinfv", "Dinfh") for a in found.alternatives)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_exact_mirror_of_what_is_nearly_round_is_found(seed):
+    """Of a flange with three holes of four, which all turns nearly leave as it is, azimuths tell the mirror."""
+    _, _, points = round_but_for_holes(3, 0.0)
+    rng = np.random.default_rng(seed)
+    found = detect(points @ random_orthogonal(rng).T)
+    assert found.point_group == "Cs" or any(a.point_group == "Cs" for a in found.alternatives)
 
 
 @pytest.mark.parametrize("seed", range(3))
