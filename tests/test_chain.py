@@ -15,8 +15,9 @@ from experiments.objects.boundary import instance
 from experiments.objects.shapes import box, join, revolve, sample
 from experiments.studies import groups
 from experiments.studies.boundary import Case, look
-from symrefine.decide.chain import _best, _by_chance, _excluded, _holding, _told_apart, _with, chain, explore
+from symrefine.decide.chain import _best, _excluded, _holding, _told_apart, _with, chain, explore
 from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted
+from symrefine.decide.looks import by_chance
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import Link, decide
 from symrefine.detection.measure import gather, measure
@@ -426,7 +427,7 @@ def mirror_at(angle_deg):
     ],
 )
 def test_what_parts_generate_turns_by_no_less_than_tells_directions_apart(parts, whole, monkeypatch):
-    monkeypatch.setattr("symrefine.decide.chain._by_chance", lambda *_: False)
+    monkeypatch.setattr("symrefine.decide.chain.by_chance", lambda *_: False)
     assert _told_apart(round_but_for_holes(4)[0], joined(parts), parts).group.name == whole
 
 
@@ -458,7 +459,7 @@ def round_but_for_holes(holes, noise_rel=0.005):
 )
 def test_folds_by_which_something_round_is_forgiven_as_much_as_by_any_turn_are_none(name, chance):
     surface, center, _ = round_but_for_holes(4)
-    assert _by_chance(surface, replace(upright(name), center=center)) == chance
+    assert by_chance(surface, replace(upright(name), center=center)) == chance
 
 
 @pytest.mark.parametrize("name", ["C1", "Cs", "Kh", "Oh", "Cinfv", "D2"])
@@ -467,7 +468,7 @@ def test_what_has_no_fold_has_none_by_chance(name):
     rng = np.random.default_rng(5)
     evidence, surface = gather(measure(Shape(points=sample(join([box((0, 0, 0), (1, 1, 1))]), 5000, 0.0, rng))), rng)
     center = -evidence.moments.center / evidence.moments.scale
-    assert not _by_chance(surface, replace(upright(name), center=center))
+    assert not by_chance(surface, replace(upright(name), center=center))
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -66,6 +66,7 @@ KIND_OF = {
         "texture": "COLOUR_TOLERANCE RARE",
         "rounding": "TOLERANCE",
         "shape": "SAME_MASS",
+        "propose.folds": "LEAK",
     },
     "looks": {
         "align.landscape": "GRID GRID_DEGREE",
@@ -116,6 +117,7 @@ KIND_OF = {
         "surface.wedge": "ACROSS PARTS",
         "texture": "_CELL",
         "samples": "GLANCE LOOK COUNT FOLLOWED",
+        "surface.clumps": "SPARSE",
     },
     "rounding": {
         "align.moment_fit": "ROUNDING",

@@ -11,8 +11,6 @@ from dataclasses import replace
 from functools import partial
 from operator import attrgetter
 
-import numpy as np
-
 from symrefine.decide.ends import ends_there, ends_too, hidden_by, hides_surely, hides_there, often_kept, often_left
 from symrefine.decide.hypotheses import (
     NOTHING,
@@ -25,12 +23,11 @@ from symrefine.decide.hypotheses import (
     single,
     unbroken,
 )
-from symrefine.decide.looks import COARSE, exact_need, glances, hopeless, looked_at, start_error
+from symrefine.decide.looks import COARSE, by_chance, exact_need, glances, hopeless, looked_at, start_error
 from symrefine.decide.place import SUPPORTED, least_elsewhere
 from symrefine.decide.pool import Pool, is_at
 from symrefine.decide.posterior import ALIKE, ALONE, EVEN, LEAST, Link, certain, meant
-from symrefine.fit.placed import FREE_TURNS, Placed, elements, joined
-from symrefine.geometry import Isometry, rotation
+from symrefine.fit.placed import Placed, elements, joined
 from symrefine.groups import PointGroup
 from symrefine.propose.candidates import (
     Evidence,
@@ -42,8 +39,7 @@ from symrefine.propose.candidates import (
     turned_over,
     voted_mirrors,
 )
-from symrefine.samples import FOLLOWED, LOOK
-from symrefine.surface.misses import SURE
+from symrefine.samples import FOLLOWED
 from symrefine.surface.surface import Surface
 
 # Candidates of an open surface that are looked at: where little was seen many seem possible at a glance.
@@ -193,11 +189,13 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
             pool = replace(pool, looked=(*pool.looked, (moved, needs)))
             parts += _holding(surface, moved, ALIKE * pool.limit)
         elif not pool.has(moved, needs) and not pool.met(moved):
-            found = fitted(surface, moved, error_rad=look.error_rad, close=ALIKE * pool.limit)
-            if surface.openings is None or surface.viewed or found.supported >= SUPPORTED:
-                pool = _grown(surface, pool, found)
-                # What does not hold may have elements that do, which nothing else proposes.
-                parts += [p.placed for p in _better(found)] if found.need > pool.limit else []
+            pool = _joined_at_once(surface, pool, moved) if needs <= pool.limit and pool.largest.elements else pool
+            if not pool.has(moved, needs):
+                found = fitted(surface, moved, error_rad=look.error_rad, close=ALIKE * pool.limit)
+                if surface.openings is None or surface.viewed or found.supported >= SUPPORTED:
+                    pool = _grown(surface, pool, found)
+                    # What does not hold may have elements that do, which nothing else proposes.
+                    parts += [p.placed for p in _better(found)] if found.need > pool.limit else []
     return _tried(surface, pool, parts) if parts else pool
 
 
@@ -214,6 +212,24 @@ def _holding(surface: Surface, placed: Placed, most: float) -> list[Placed]:
 def _better(found: Hypothesis) -> list[Hypothesis]:
     """The elements of a group that need less than all of it does, each alone."""
     return [single(e) for e in found.elements if ALIKE * e.need < found.need]
+
+
+def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
+    """The pool where a candidate and the largest group hold together as far as noise tells: no need to part them.
+
+    Where the largest has it already and holds worse, that is the largest of those in it that need nothing; of what is
+    round any two mirrors through its axis make some fold, which says nothing.
+    """
+    if pool.largest.holds(start) and not pool.largest.group.is_finite:
+        return pool
+    exact = [h for h in pool.small if h.need <= pool.nothing and h.elements] if pool.largest.holds(start) else []
+    known = max(exact or [pool.largest], key=lambda h: _size(h.placed))
+    if known.holds(start) or has_all(start, known.placed):
+        return pool
+    both = _generated(surface, [known.placed, start], pool.failed, known.iterations, ALIKE * pool.nothing)
+    if both is None or _is_loose(surface, both) or both.need > pool.nothing:
+        return pool.with_failed(both)
+    return replace(pool, small=(*pool.small, both)) if exact else replace(pool, largest=both)
 
 
 def _grown(surface: Surface, pool: Pool, found: Hypothesis) -> Pool:
@@ -278,7 +294,7 @@ def _told_apart(surface: Surface, placed: Placed | None, parts: Sequence[Placed]
     fold = placed.group.symbol.fold
     if any(fold <= p.group.symbol.fold for p in parts):
         return placed
-    return _endless(placed) if math.inf > fold > math.pi / SAME_RAD or _by_chance(surface, placed) else placed
+    return _endless(placed) if math.inf > fold > math.pi / SAME_RAD or by_chance(surface, placed) else placed
 
 
 def _endless(placed: Placed) -> Placed:
@@ -323,7 +339,7 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     hidden = max(_hidden(surface), pool.nothing / ALIKE)
     worst = partial(_worst, hidden=hidden)
     every = [*pool.small, *_better(pool.largest), pool.largest, *near]
-    rest = sorted((h for h in every if h.need <= hidden or not _by_chance(surface, h.placed)), key=worst)
+    rest = sorted((h for h in every if h.need <= hidden or not by_chance(surface, h.placed)), key=worst)
     known = [pool.largest, *pool.failed, *pool.small]
     links = [NOTHING]
     while rest := [h for h in rest if not links[-1].holds(h.placed)]:
@@ -362,23 +378,6 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
             told.append(replace(part, need=need, elsewhere=elsewhere))
         told.append(link)
     return tuple(told)
-
-
-def _by_chance(surface: Surface, placed: Placed) -> bool:
-    """Whether turns by parts of what a fold turns by miss no more than it does, for all that a sample tells.
-
-    What is round but for something small is forgiven as it moves, by any turn: folds that miss it by less than all
-    turns do are many, and say nothing.
-    """
-    group = placed.group
-    if not 1 < group.symbol.fold < math.inf:
-        return False
-    pitch = 2.0 * math.pi / group.symbol.fold
-    turns = [rotation(group.frame[2], pitch * part) for part in (1.0, *FREE_TURNS / (2.0 * math.pi))]
-    motions = [Isometry.about(placed.center, turn) for turn in turns]
-    seen = surface.seen(surface.misses(motions, sources=LOOK), motions, sources=LOOK)
-    better = np.nan_to_num(seen[1:]).mean(axis=0) - np.nan_to_num(seen[0])
-    return bool(better.mean() <= SURE * better.std() / math.sqrt(better.size))
 
 
 def _excluded(link: Hypothesis, larger: Sequence[Hypothesis], limit: float) -> Hypothesis:

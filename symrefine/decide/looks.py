@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.fit.placed import Placed, elements
+from symrefine.fit.placed import FREE_TURNS, Placed, elements
 from symrefine.fit.refine import SHORT, refine
 from symrefine.fit.vertices import ROUNDED
-from symrefine.geometry import Array, Isometry
+from symrefine.geometry import Array, Isometry, rotation
 from symrefine.propose.candidates import START_ERROR
 from symrefine.propose.votes import AGREE_RAD
 from symrefine.samples import GLANCE, LOOK
-from symrefine.surface.misses import LIMITS, RIM
+from symrefine.surface.misses import LIMITS, RIM, SURE
 from symrefine.surface.surface import Surface
 
 # A fit that is not settled may need so many times what it does then.
@@ -190,6 +190,23 @@ def _sideways(placed: Placed) -> Array:
 def seems(surface: Surface, placed: Placed, sources: int = LOOK) -> float:
     """What a group where it stands needs, as a few operations tell on a few points."""
     return float(surface.needs(few_motions(placed), sources=sources, tests=GLANCED, together=True).max())
+
+
+def by_chance(surface: Surface, placed: Placed) -> bool:
+    """Whether turns by parts of what a fold turns by miss no more than it does, for all that a sample tells.
+
+    What is round but for something small is forgiven as it moves, by any turn: folds that miss it by less than all
+    turns do are many, and say nothing.
+    """
+    group = placed.group
+    if not 1 < group.symbol.fold < math.inf:
+        return False
+    pitch = 2.0 * math.pi / group.symbol.fold
+    turns = [rotation(group.frame[2], pitch * part) for part in (1.0, *FREE_TURNS / (2.0 * math.pi))]
+    motions = [Isometry.about(placed.center, turn) for turn in turns]
+    seen = surface.seen(surface.misses(motions, sources=LOOK), motions, sources=LOOK)
+    better = np.nan_to_num(seen[1:]).mean(axis=0) - np.nan_to_num(seen[0])
+    return bool(better.mean() <= SURE * better.std() / math.sqrt(better.size))
 
 
 def mended(surface: Surface) -> float:

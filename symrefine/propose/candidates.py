@@ -20,7 +20,7 @@ from symrefine.groups.names import CLOSED_FOLD
 from symrefine.moments.harmonics import FLOOR, Harmonics, flattened, harmonic_moments, row_variance
 from symrefine.moments.moments import Moments
 from symrefine.ntuples.rank import FixedSubspace
-from symrefine.propose.folds import fold_candidates, frames_across, mirror_through
+from symrefine.propose.folds import azimuthal_spectrum, folds_of, frames_across, mirror_through
 from symrefine.propose.maps import WITHIN, maps_onto_itself
 from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candidates, whitened
 from symrefine.propose.votes import AGREE_RAD, meeting, mirror_votes, revolution
@@ -122,9 +122,10 @@ def about(evidence: Evidence, direction: Array) -> list[Placed]:
     anyway = {2, 3, *_counted(evidence.points, direction)} if evidence.atoms else set(PRIMES)
     turns = {(fold, False): given for fold in anyway}
     for axis in apart(np.stack([round_frame[2], direction]), 0.2 * START_ERROR):
-        normal = mirror_through(evidence.points, evidence.weights, axis)
+        spectrum = azimuthal_spectrum(evidence.points, evidence.weights, axis)
+        normal = mirror_through(*spectrum, axis)
         found += [] if normal is None else [placed("Cs", frame_with_z(normal))]
-        for candidate in fold_candidates(evidence.points, evidence.weights, axis)[:FOLLOWED]:
+        for candidate in folds_of(*spectrum, axis)[:FOLLOWED]:
             frame = polish_frame(evidence.harmonics, candidate.frame, candidate.fold)
             found.append(placed(f"C{candidate.fold}v", frame))
             turns[candidate.fold, False] = given

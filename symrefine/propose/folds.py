@@ -10,6 +10,8 @@ from symrefine.rounding import DOUBLE
 
 # Bins of the circle for each order: what a bin blurs is then below a thousandth, and is put right.
 BINS_PER_ORDER = 16
+# Share of the azimuthal energy that may be no multiple of a fold.
+LEAK = 0.35
 # Share of surfaces of revolution that may show a fold by chance: the squares are exponential, so their largest is told.
 CHANCE = 0.01
 
@@ -55,13 +57,17 @@ class FoldCandidate(ReadOnly):
     leak: float
 
 
-def fold_candidates(points: Array, weights: Array, axis: Array, *, leak_max: float = 0.35) -> list[FoldCandidate]:
+def fold_candidates(points: Array, weights: Array, axis: Array) -> list[FoldCandidate]:
     """Folds b >= 2 whose multiples carry the azimuthal energy beyond the noise, the least leaking first.
 
     For C_b only k = 0 mod b survives; for C_bv all phases arg(c_k)/k agree on the mirrors (method.md, section 4).
     An empty list means a surface of revolution as far as the azimuthal spectrum can tell, or no axis at all.
     """
-    c, sigma = azimuthal_spectrum(points, weights, axis)
+    return folds_of(*azimuthal_spectrum(points, weights, axis), axis)
+
+
+def folds_of(c: Array, sigma: Array, axis: Array) -> list[FoldCandidate]:
+    """The same, from the azimuthal spectrum c [max_fold + 1, 4] about the axis, and its deviations [4] by chance."""
     energy = _energy_over_noise(c, sigma)
     energy[0] = 0.0
     k = np.arange(len(energy))
@@ -71,20 +77,20 @@ def fold_candidates(points: Array, weights: Array, axis: Array, *, leak_max: flo
     found = []
     for b in range(2, len(energy) // 2 + 1):
         leak = 1.0 - energy[(k % b == 0)].sum() / total
-        if leak < leak_max and energy[b] > 0.0:
+        if leak < LEAK and energy[b] > 0.0:
             phase = rotation([0, 0, 1], -np.angle(c[b, np.argmax(_over(c[b], sigma))]) / b)
             found.append(FoldCandidate(fold=b, frame=phase @ frame_with_z(axis), leak=float(leak)))
     # A divisor of the true fold leaks no more than it: prefer the largest fold among equals.
     return sorted(found, key=lambda f: (round(f.leak, 1), -f.fold))
 
 
-def mirror_through(points: Array, weights: Array, axis: Array) -> Array | None:
+def mirror_through(c: Array, sigma: Array, axis: Array) -> Array | None:
     """Normal [3] of the mirror through an axis that azimuths tell best, whatever else repeats; None if they tell none.
 
+    From the azimuthal spectrum c [max_fold + 1, 4] about the axis, and its deviations [4] by chance.
     A mirror at azimuth a makes every c_k e^(-i k a) real, so that the sum of the real parts of c_k^2 e^(-2 i k a) is
     largest there, of those c_k that stand out of chance.
     """
-    c, sigma = azimuthal_spectrum(points, weights, axis)
     told = (c / np.where(sigma > 0.0, sigma, np.inf)) ** 2
     told[np.abs(told) < np.log(c.size / CHANCE)] = 0.0
     told[0] = 0.0
