@@ -20,7 +20,7 @@ from symrefine.groups.names import CLOSED_FOLD
 from symrefine.moments.harmonics import FLOOR, Harmonics, flattened, harmonic_moments, row_variance
 from symrefine.moments.moments import Moments
 from symrefine.ntuples.rank import FixedSubspace
-from symrefine.propose.folds import azimuthal_spectrum, folds_of, frames_across, mirror_through
+from symrefine.propose.folds import fold_candidates, frames_across, mirror_through
 from symrefine.propose.maps import WITHIN, maps_onto_itself
 from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candidates, whitened
 from symrefine.propose.votes import AGREE_RAD, meeting, mirror_votes, revolution
@@ -64,8 +64,12 @@ class Evidence:
 def proposals(evidence: Evidence) -> list[Placed]:
     """What the moments propose first: what may stand about the likeliest axes, mirrors and inversion."""
     spectral = mirror_candidates(evidence.moments).directions
-    normals = np.concatenate([evidence.tuples.directions[::-1], _principal(evidence), spectral])
     around = [start for direction in _likely(evidence) for start in about(evidence, direction)]
+    # Of what is nearly round nothing but azimuths about the axis of a revolution tells its own mirror from all others.
+    axes = [start.group.frame[2] for start in around if start.group.name == "Cinfv"]
+    through = (mirror_through(evidence.points, evidence.weights, axis) for axis in axes)
+    told = [normal for normal in through if normal is not None]
+    normals = [*evidence.tuples.directions[::-1], *_principal(evidence), *spectral, *told]
     return [*around, placed("Ci", np.eye(3)), *(placed("Cs", frame_with_z(n)) for n in apart(normals))]
 
 
@@ -122,10 +126,7 @@ def about(evidence: Evidence, direction: Array) -> list[Placed]:
     anyway = {2, 3, *_counted(evidence.points, direction)} if evidence.atoms else set(PRIMES)
     turns = {(fold, False): given for fold in anyway}
     for axis in apart(np.stack([round_frame[2], direction]), 0.2 * START_ERROR):
-        spectrum = azimuthal_spectrum(evidence.points, evidence.weights, axis)
-        normal = mirror_through(*spectrum, axis)
-        found += [] if normal is None else [placed("Cs", frame_with_z(normal))]
-        for candidate in folds_of(*spectrum, axis)[:FOLLOWED]:
+        for candidate in fold_candidates(evidence.points, evidence.weights, axis)[:FOLLOWED]:
             frame = polish_frame(evidence.harmonics, candidate.frame, candidate.fold)
             found.append(placed(f"C{candidate.fold}v", frame))
             turns[candidate.fold, False] = given

@@ -63,11 +63,7 @@ def fold_candidates(points: Array, weights: Array, axis: Array) -> list[FoldCand
     For C_b only k = 0 mod b survives; for C_bv all phases arg(c_k)/k agree on the mirrors (method.md, section 4).
     An empty list means a surface of revolution as far as the azimuthal spectrum can tell, or no axis at all.
     """
-    return folds_of(*azimuthal_spectrum(points, weights, axis), axis)
-
-
-def folds_of(c: Array, sigma: Array, axis: Array) -> list[FoldCandidate]:
-    """The same, from the azimuthal spectrum c [max_fold + 1, 4] about the axis, and its deviations [4] by chance."""
+    c, sigma = azimuthal_spectrum(points, weights, axis)
     energy = _energy_over_noise(c, sigma)
     energy[0] = 0.0
     k = np.arange(len(energy))
@@ -84,13 +80,13 @@ def folds_of(c: Array, sigma: Array, axis: Array) -> list[FoldCandidate]:
     return sorted(found, key=lambda f: (round(f.leak, 1), -f.fold))
 
 
-def mirror_through(c: Array, sigma: Array, axis: Array) -> Array | None:
+def mirror_through(points: Array, weights: Array, axis: Array) -> Array | None:
     """Normal [3] of the mirror through an axis that azimuths tell best, whatever else repeats; None if they tell none.
 
-    From the azimuthal spectrum c [max_fold + 1, 4] about the axis, and its deviations [4] by chance.
     A mirror at azimuth a makes every c_k e^(-i k a) real, so that the sum of the real parts of c_k^2 e^(-2 i k a) is
     largest there, of those c_k that stand out of chance.
     """
+    c, sigma = azimuthal_spectrum(points, weights, axis)
     told = (c / np.where(sigma > 0.0, sigma, np.inf)) ** 2
     told[np.abs(told) < np.log(c.size / CHANCE)] = 0.0
     told[0] = 0.0
