@@ -100,7 +100,7 @@ KIND_OF = {
         "propose.maps": "AROUND WITHIN PLANES MATCHES",
         "propose.signatures": "SHELLS BINS",
         "propose.spectrum": "DIRECTIONS THIN",
-        "propose.votes": "AGREE_RAD TOLD DIRECTIONS FEET",
+        "propose.votes": "VOTERS AGREE_RAD TOLD DIRECTIONS FEET",
         "stream": "CHUNK",
         "surface.cameras": "RAYS BESIDE",
         "surface.drift": "CELLS REACH",

@@ -333,13 +333,13 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
 
     Those that no fit brings within the limit of the pool are only looked at: what larger tolerances would make of them.
     """
-    surface = surface.closed if pool.whole else surface
+    seen, surface = surface, surface.closed if pool.whole else surface
     near = [h for h in pool.turned_down() if h.need <= COARSE * pool.limit]
     # What is hidden by noise, or by the least tolerance that is asked for, tells no two groups apart.
     hidden = max(_hidden(surface), pool.nothing / ALIKE)
     worst = partial(_worst, hidden=hidden)
     every = [*pool.small, *_better(pool.largest), pool.largest, *near]
-    rest = sorted((h for h in every if h.need <= hidden or not by_chance(surface, h.placed)), key=worst)
+    rest = sorted((h for h in every if h.need <= hidden or not by_chance(seen, h.placed)), key=worst)
     known = [pool.largest, *pool.failed, *pool.small]
     links = [NOTHING]
     while rest := [h for h in rest if not links[-1].holds(h.placed)]:

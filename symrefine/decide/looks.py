@@ -10,13 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.fit.placed import FREE_TURNS, Placed, elements
+from symrefine.fit.placed import FREE_TURNS, Placed, elements, evenly
 from symrefine.fit.refine import SHORT, refine
 from symrefine.fit.vertices import ROUNDED
 from symrefine.geometry import Array, Isometry, rotation
+from symrefine.groups.names import far_steps
 from symrefine.propose.candidates import START_ERROR
 from symrefine.propose.votes import AGREE_RAD
-from symrefine.samples import GLANCE, LOOK
+from symrefine.samples import COUNT, GLANCE, LOOK
 from symrefine.surface.misses import LIMITS, RIM, SURE
 from symrefine.surface.surface import Surface
 
@@ -193,19 +194,20 @@ def seems(surface: Surface, placed: Placed, sources: int = LOOK) -> float:
 
 
 def by_chance(surface: Surface, placed: Placed) -> bool:
-    """Whether turns by parts of what a fold turns by miss no more than it does, for all that a sample tells.
+    """Whether a fold is none of the object: turns by parts of it more are met as well, for all that a sample tells.
 
     What is round but for something small is forgiven as it moves, by any turn: folds that miss it by less than all
-    turns do are many, and say nothing.
+    turns do are many, and say nothing. All turns go far, as noise that moves by little meets itself.
     """
-    group = placed.group
-    if not 1 < group.symbol.fold < math.inf:
+    fold = placed.group.symbol.fold
+    if not 1 < fold < math.inf:
         return False
-    pitch = 2.0 * math.pi / group.symbol.fold
-    turns = [rotation(group.frame[2], pitch * part) for part in (1.0, *FREE_TURNS / (2.0 * math.pi))]
+    steps = np.array(evenly(far_steps(int(fold)), len(FREE_TURNS)))
+    beyond = np.resize(steps, len(FREE_TURNS)) + FREE_TURNS / (2.0 * math.pi)
+    turns = [rotation(placed.group.frame[2], 2.0 * math.pi / fold * k) for k in (*steps, *beyond)]
     motions = [Isometry.about(placed.center, turn) for turn in turns]
-    seen = surface.seen(surface.misses(motions, sources=LOOK), motions, sources=LOOK)
-    better = np.nan_to_num(seen[1:]).mean(axis=0) - np.nan_to_num(seen[0])
+    misses = np.nan_to_num(surface.seen(surface.misses(motions, sources=COUNT), motions, sources=COUNT))
+    better = misses[len(steps) :].mean(axis=0) - misses[: len(steps)].mean(axis=0)
     return bool(better.mean() <= SURE * better.std() / math.sqrt(better.size))
 
 

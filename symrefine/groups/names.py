@@ -24,6 +24,11 @@ _SPECIAL: dict[tuple[str, float], str] = {("Ch", 1): "Cs", ("S", 1): "Ci"}
 _PATTERN = re.compile(r"([cds])([1-9][0-9]{0,5}|inf|∞)([vhdi]?)")
 
 
+def far_steps(fold: int) -> list[int]:
+    """How many turns by 2 pi / fold go far, farthest first, and over and over come to all of them; 1 of few."""
+    return [m for m in range(fold // 2, fold // 4, -1) if math.gcd(m, fold) == 1] or [1]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Symbol:
     """A point group up to its placement.

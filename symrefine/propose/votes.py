@@ -12,12 +12,11 @@ import numpy as np
 from symrefine.geometry import Array, rows
 from symrefine.propose.consensus import pair_slopes
 from symrefine.rounding import DOUBLE
-from symrefine.samples import LOOK
 from symrefine.shape import Index
 
-# The largest angle between the normals of a pair that votes, and the candidates that are told: of 9 planes of a cube
-# one view shows 7, and the last of them is the 50th.
-AGREE_RAD, TOLD = np.radians(8.0), 60
+# Local planes whose pairs vote, the largest angle between the normals of a pair, and the candidates that are told: of 9
+# planes of a cube one view shows 7, and the last of them is the 50th.
+VOTERS, AGREE_RAD, TOLD = 1000, np.radians(8.0), 60
 # Cells of votes: along an edge of the cube that directions are binned on, and of feet for each RMS radius.
 DIRECTIONS, FEET = 24, 10
 
@@ -43,7 +42,7 @@ def mirror_votes(
     Pairs within one flat part agree under any mirror across it and say nothing: a pair counts by how much its normals
     turn. Where all are known to point `outwards` a mirror keeps their signs, too.
     """
-    some = rng.permutation(len(points))[:LOOK]
+    some = rng.permutation(len(points))[:VOTERS]
     x, n = points[some], normals[some]
     i, j = _mirrored(x, n, outwards=outwards)
     across = unit_rows(rows(x, j) - rows(x, i))
