@@ -206,9 +206,12 @@ def by_chance(surface: Surface, placed: Placed) -> bool:
     beyond = np.resize(steps, len(FREE_TURNS)) + FREE_TURNS / (2.0 * math.pi)
     turns = [rotation(placed.group.frame[2], 2.0 * math.pi / fold * k) for k in (*steps, *beyond)]
     motions = [Isometry.about(placed.center, turn) for turn in turns]
-    misses = np.nan_to_num(surface.seen(surface.misses(motions, sources=COUNT), motions, sources=COUNT))
-    better = misses[len(steps) :].mean(axis=0) - misses[: len(steps)].mean(axis=0)
-    return bool(better.mean() <= SURE * better.std() / math.sqrt(better.size))
+    for sources in (LOOK, COUNT):
+        misses = np.nan_to_num(surface.seen(surface.misses(motions, sources=sources), motions, sources=sources))
+        better = misses[len(steps) :].mean(axis=0) - misses[: len(steps)].mean(axis=0)
+        if better.mean() > SURE * better.std() / math.sqrt(better.size):
+            return False
+    return True
 
 
 def mended(surface: Surface) -> float:
