@@ -104,7 +104,7 @@ def test_however_many_windows_are_moved_those_that_reach_what_nobody_saw_are_tol
     np.testing.assert_array_equal(seen[told], drifts[told])
 
 
-@pytest.mark.parametrize("seed", [41, pytest.param(61, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [41, pytest.param(64, marks=pytest.mark.slow)])
 def test_a_tooth_out_of_place_is_told_though_noise_makes_teeth_look_open(seed: int) -> None:
     made, _ = groups.posed(groups.Case(shape="gear24", sibling=True, noise_rel=0.01, seed=seed))
     found = detect(made)
