@@ -20,6 +20,7 @@ from symrefine.decide.hypotheses import (
     doubtless,
     fitted,
     has_all,
+    roughly_judged,
     single,
     unbroken,
 )
@@ -281,6 +282,8 @@ def _generated(
     look = looked_at(surface, placed, COARSE * most)
     if look.needs > most:
         return Hypothesis(placed=placed, elements=(), need=look.needs)
+    if look.needs > (ALIKE if look.settled else COARSE) * close:
+        return roughly_judged(surface, look, before=before)
     return fitted(surface, look.placed, error_rad=look.error_rad, before=before)
 
 

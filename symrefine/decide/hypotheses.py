@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from symrefine.decide.looks import COARSE, exact_need, mended, seems, slid
+from symrefine.decide.looks import COARSE, Look, exact_need, mended, seems, slid
 from symrefine.decide.place import is_told, least_elsewhere
 from symrefine.decide.posterior import EVEN, EVEN_MIRROR, certain
 from symrefine.fit.placed import FITTED, Operations, Placed, elements, joined
@@ -202,6 +202,11 @@ def seen_to_end(surface: Surface, found: Hypothesis) -> float:
     """What an open surface needs to have a group by what was seen, and by where it ends if it has the group."""
     parts = _Parts.of(found.placed, MOVED_EACH, 0)
     return _seen_judged(surface, parts, *_met(surface, parts), found.placed.motions())[1]
+
+
+def roughly_judged(surface: Surface, look: Look, *, before: int = 0) -> Hypothesis:
+    """A group judged where a look put it, by as few points of each element as a fit moves."""
+    return _placed(surface, look.placed, look.history, before, GLANCE)
 
 
 def _placed(

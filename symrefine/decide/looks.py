@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symrefine.fit.placed import FREE_TURNS, Placed, elements, evenly
-from symrefine.fit.refine import SHORT, refine
+from symrefine.fit.refine import SHORT, Iterate, refine
 from symrefine.fit.vertices import ROUNDED
 from symrefine.geometry import Array, Isometry, rotation
 from symrefine.groups.names import far_steps
@@ -53,8 +53,14 @@ class Look:
     """A group where a fit on a few points put it, what it needs by them, and how far off it may stand (radians)."""
 
     placed: Placed
+    history: tuple[Iterate, ...]
     needs: float
     error_rad: float
+
+    @property
+    def settled(self) -> bool:
+        """Whether the fit came to its end."""
+        return self.history[-1].converged
 
 
 def looked_at(
@@ -71,9 +77,10 @@ def looked_at(
     asks to believe in is needed as well, and one that asks for more than that, or needs more wherever it is moved
     sideways, stays where the fit put it.
     """
-    state, error = start.roughly_framed(), start_error(surface)
+    state, error, history = start.roughly_framed(), start_error(surface), list[Iterate]()
     stride = surface.stride(max(GLANCE, LOOK // len(state.standard)), matched=True)
     for iterate in refine(surface.cloud, state, start_error_rad=error, stride=stride):
+        history.append(iterate)
         if iterate.converged or iterate.index < SHORT:
             continue
         here = start.moved(iterate.state)
@@ -91,14 +98,14 @@ def looked_at(
         # Where noise is as thick as a surface it may draw a fit away, step by step.
         if not iterate.converged and (stayed := seems(surface, start)) < needs:
             aside, needs = slid(surface, start, stayed, useful)
-            return Look(placed=aside, needs=needs, error_rad=error)
+            return Look(placed=aside, history=tuple(history[:1]), needs=needs, error_rad=error)
     off = max(iterate.step, math.sqrt(max(float(np.diag(iterate.covariance).max()), 0.0)))
     aside = start.moved(iterate.state)
     # Where it asks to believe in too much it is not worth a search, and where little is missing most of it tells.
     if asked <= useful and surface.lacks_much:
         aside, needs = slid(surface, aside, needs, useful)
     needs = math.hypot(needs, asked)
-    return Look(placed=aside, needs=needs, error_rad=min(error, RIM * off))
+    return Look(placed=aside, history=tuple(history), needs=needs, error_rad=min(error, RIM * off))
 
 
 def slid(surface: Surface, placed: Placed, needs: float, useful: float = math.inf) -> tuple[Placed, float]:
