@@ -199,13 +199,14 @@ def test_the_mirror_through_an_axis_is_told_whatever_repeats(azimuth_deg):
     azimuth = np.radians(azimuth_deg)
     waves = ((1, 0.1), (2, 0.3), (5, -0.2), (7, 0.25))
     points, weights = drum(lambda phi, _: 1 + sum(a * np.cos(k * (phi - azimuth)) for k, a in waves))
-    normal = mirror_through(points, weights, Z_AXIS)
+    normal = mirror_through(azimuthal_spectrum(points, weights, Z_AXIS), Z_AXIS)
     assert line_angle_rad(normal, np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])) < np.radians(0.1)
 
 
 def test_of_random_azimuths_no_mirror_is_told():
     rng = np.random.default_rng(11)
-    assert sum(mirror_through(scattered(rng), np.ones(400), Z_AXIS) is not None for _ in range(30)) < 12
+    spectra = [azimuthal_spectrum(scattered(rng), np.ones(400), Z_AXIS) for _ in range(30)]
+    assert sum(mirror_through(spectrum, Z_AXIS) is not None for spectrum in spectra) < 12
 
 
 def test_folds_that_leave_much_energy_out_are_none():

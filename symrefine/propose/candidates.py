@@ -5,7 +5,7 @@ azimuthal spectrum the folds about an axis with their phases. Everything is in n
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -20,7 +20,7 @@ from symrefine.groups.names import CLOSED_FOLD
 from symrefine.moments.harmonics import FLOOR, Harmonics, flattened, harmonic_moments, row_variance
 from symrefine.moments.moments import Moments
 from symrefine.ntuples.rank import FixedSubspace
-from symrefine.propose.folds import fold_candidates, frames_across, mirror_through
+from symrefine.propose.folds import azimuthal_spectrum, folds_of, frames_across, mirror_through
 from symrefine.propose.maps import WITHIN, maps_onto_itself
 from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candidates, whitened
 from symrefine.propose.votes import AGREE_RAD, meeting, mirror_votes, revolution
@@ -44,7 +44,8 @@ class Evidence:
     """What is known before any point is matched: moments, the class of the n-tuples, and points to take azimuths of.
 
     `atoms` says that the points stand for themselves, so that they can be counted. `vertices` is the group that maps
-    those of a mesh onto one another, where they put it; `proven` says that it maps the faces, too.
+    those of a mesh onto one another, where they put it; `proven` says that it maps the faces, too. `spectra` are those
+    that `azimuths` told, by the bytes of their axes.
     """
 
     moments: Moments
@@ -54,11 +55,19 @@ class Evidence:
     atoms: bool = False
     vertices: Placed | None = None
     proven: bool = False
+    spectra: dict[bytes, tuple[Array, Array]] = field(default_factory=dict)
 
     @cached_property
     def harmonics(self) -> dict[int, Array]:
         """Solid-harmonic moments with jackknife replicates."""
         return harmonic_moments(self.moments)
+
+    def azimuths(self, axis: Array) -> tuple[Array, Array]:
+        """The azimuthal spectrum about an axis, which folds and mirrors are both told by."""
+        key = axis.tobytes()
+        if key not in self.spectra:
+            self.spectra[key] = azimuthal_spectrum(self.points, self.weights, axis)
+        return self.spectra[key]
 
 
 def proposals(evidence: Evidence) -> list[Placed]:
@@ -67,7 +76,7 @@ def proposals(evidence: Evidence) -> list[Placed]:
     around = [start for direction in _likely(evidence) for start in about(evidence, direction)]
     # Of what is nearly round nothing but azimuths about the axis of a revolution tells its own mirror from all others.
     axes = [start.group.frame[2] for start in around if start.group.name == "Cinfv"]
-    through = (mirror_through(evidence.points, evidence.weights, axis) for axis in axes)
+    through = (mirror_through(evidence.azimuths(axis), axis) for axis in axes)
     told = [normal for normal in through if normal is not None]
     normals = [*evidence.tuples.directions[::-1], *_principal(evidence), *spectral, *told]
     return [*around, placed("Ci", np.eye(3)), *(placed("Cs", frame_with_z(n)) for n in apart(normals))]
@@ -126,7 +135,7 @@ def about(evidence: Evidence, direction: Array) -> list[Placed]:
     anyway = {2, 3, *_counted(evidence.points, direction)} if evidence.atoms else set(PRIMES)
     turns = {(fold, False): given for fold in anyway}
     for axis in apart(np.stack([round_frame[2], direction]), 0.2 * START_ERROR):
-        for candidate in fold_candidates(evidence.points, evidence.weights, axis)[:FOLLOWED]:
+        for candidate in folds_of(evidence.azimuths(axis), axis)[:FOLLOWED]:
             frame = polish_frame(evidence.harmonics, candidate.frame, candidate.fold)
             found.append(placed(f"C{candidate.fold}v", frame))
             turns[candidate.fold, False] = given

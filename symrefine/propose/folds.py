@@ -63,7 +63,12 @@ def fold_candidates(points: Array, weights: Array, axis: Array) -> list[FoldCand
     For C_b only k = 0 mod b survives; for C_bv all phases arg(c_k)/k agree on the mirrors (method.md, section 4).
     An empty list means a surface of revolution as far as the azimuthal spectrum can tell, or no axis at all.
     """
-    c, sigma = azimuthal_spectrum(points, weights, axis)
+    return folds_of(azimuthal_spectrum(points, weights, axis), axis)
+
+
+def folds_of(spectrum: tuple[Array, Array], axis: Array) -> list[FoldCandidate]:
+    """The same, from the azimuthal spectrum about the axis."""
+    c, sigma = spectrum
     energy = _energy_over_noise(c, sigma)
     energy[0] = 0.0
     k = np.arange(len(energy))
@@ -80,13 +85,13 @@ def fold_candidates(points: Array, weights: Array, axis: Array) -> list[FoldCand
     return sorted(found, key=lambda f: (round(f.leak, 1), -f.fold))
 
 
-def mirror_through(points: Array, weights: Array, axis: Array) -> Array | None:
+def mirror_through(spectrum: tuple[Array, Array], axis: Array) -> Array | None:
     """Normal [3] of the mirror through an axis that azimuths tell best, whatever else repeats; None if they tell none.
 
     A mirror at azimuth a makes every c_k e^(-i k a) real, so that the sum of the real parts of c_k^2 e^(-2 i k a) is
     largest there, of those c_k that stand out of chance.
     """
-    c, sigma = azimuthal_spectrum(points, weights, axis)
+    c, sigma = spectrum
     told = (c / np.where(sigma > 0.0, sigma, np.inf)) ** 2
     told[np.abs(told) < np.log(c.size / CHANCE)] = 0.0
     told[0] = 0.0
