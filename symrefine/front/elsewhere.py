@@ -38,8 +38,7 @@ class PlanarDetection(Found, BarePlanarDetection):
         Raises:
             InputError: nothing is decided, or the group is continuous.
         """
-        if self.undetermined:
-            raise InputError(f"{self.shape.source}: no operations: {self.undetermined}")
+        _check_decided(self)
         return Operations.about(self.group.operations(), self.center)
 
 
@@ -68,7 +67,11 @@ class SubspaceDetection(Found, BareSubspaceDetection):
         Raises:
             InputError: nothing is decided.
         """
-        if self.undetermined:
-            raise InputError(f"{self.shape.source}: no operations: {self.undetermined}")
+        _check_decided(self)
         mirrors = [householder(h.plane.normal) for h in self.hyperplanes]
         return Operations.about(np.array([np.eye(len(self.center)), *mirrors]), self.center)
+
+
+def _check_decided(found: PlanarDetection | SubspaceDetection) -> None:
+    if found.undetermined:
+        raise InputError(f"{found.shape.source}: no operations: {found.undetermined}")

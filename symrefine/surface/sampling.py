@@ -64,8 +64,8 @@ def sampling(
     """How points [N, 3] were sampled; with `outliers` those that belong to no surface are set apart.
 
     With `apart` clumps apart from the body are as well, and those groups that are known to be `foreign`, indices of
-    each; if none are, it is told what may be. Without `groups` nobody looks for any. `asked` of the points tell whether
-    there is anything to be done. Of points that fill a volume only strays are set apart.
+    each; if none are, it is told what may be. Without `groups` nobody looks for any. Of points that
+    fill a volume only strays are set apart.
     """
     size = len(points)
     kept: Index = np.arange(size)
