@@ -25,7 +25,7 @@ from symrefine.detection.story import detect
 from symrefine.fit.placed import Placed, joined
 from symrefine.geometry import frame_with_z, line_angle_rad, random_orthogonal, rotation
 from symrefine.groups import is_subgroup, point_group
-from symrefine.propose.candidates import START_ERROR
+from symrefine.propose.candidates import START_ERROR, proposals
 from symrefine.shape import Shape
 from symrefine.surface.misses import LIMITS
 
@@ -536,3 +536,13 @@ def test_what_generates_all_of_a_group_that_does_not_hold_is_not_asked_again(nam
     surface = gather(measure(Shape(points=cube)), np.random.default_rng(0))[1]
     placed = Placed(group=point_group(name), center=np.zeros(3))
     assert name not in {h.group.name for h in _holding(surface, placed, 1.0)}
+
+
+def test_the_mirror_that_azimuths_tell_is_proposed(monkeypatch):
+    told = np.array([0.48, 0.6, 0.64])
+    _, _, points = round_but_for_holes(3, 0.0)
+    evidence, _ = gather(measure(Shape(points=points)), np.random.default_rng(0))
+    for normal in (None, told):
+        monkeypatch.setattr("symrefine.propose.candidates.mirror_through", lambda *_, n=normal: n)
+        mirrors = [p.group.frame[2] for p in proposals(evidence) if p.group.name == "Cs"]
+        assert any(line_angle_rad(m, told) < 1e-9 for m in mirrors) == (normal is not None)
