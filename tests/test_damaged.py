@@ -657,6 +657,26 @@ def test_where_one_of_several_thin_parts_ends_nothing_is_missing(name, noise, se
         assert found.at_least or state == "whole"  # it may be missing all the same
 
 
+@pytest.mark.parametrize(("family", "name"), [("shape", "fan7"), ("household", "basket"), ("household", "wine_glass")])
+def test_where_thin_parts_end_as_their_group_has_it_nothing_is_open(family, name):
+    """In noise the edge of a blade is a border, which all turns carry onto the edges of the others."""
+    mesh, truth = specimen(family, name)
+    rng = np.random.default_rng(7)
+    found = detect(Pose.random(rng).of(sample(mesh, 20000, 0.005, rng)))
+    assert found.examined.surface.openings.evident
+    assert (found.point_group, found.at_least) == (truth.group.name, False)
+
+
+@pytest.mark.parametrize(("name", "group"), [("rotor2", "C2"), ("swirl6", "C3"), ("hollow_ball", "Cinfv")])
+def test_a_cut_across_the_axis_is_kept_by_all_that_is_left_and_open_all_the_same(name, group):
+    mesh, truth = specimen("shape", name)
+    rng = np.random.default_rng(7)
+    points = sample(mesh, 26000, 0.0, rng)
+    height = (points - points.mean(axis=0)) @ truth.group.rotation_axes()[0][0]
+    found = detect(Pose.random(rng).of(points[height < np.quantile(height, 0.8)]))
+    assert (found.point_group, found.at_least) == (group, True)
+
+
 @pytest.mark.parametrize("name", ["tray", "paddles", "radiator"])
 def test_a_sample_sparser_than_walls_are_thick_tells_no_end_of_one_from_a_hole(name):
     """Sixteen neighbours are as wide: they see none of the ends, which what is not short shows to be some."""

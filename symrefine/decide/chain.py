@@ -11,7 +11,16 @@ from dataclasses import replace
 from functools import partial
 from operator import attrgetter
 
-from symrefine.decide.ends import ends_there, ends_too, hidden_by, hides_surely, hides_there, often_kept, often_left
+from symrefine.decide.ends import (
+    ends_there,
+    ends_too,
+    hidden_by,
+    hides_surely,
+    hides_there,
+    often_kept,
+    often_left,
+    thin_ends,
+)
 from symrefine.decide.hypotheses import (
     NOTHING,
     SAME_RAD,
@@ -64,8 +73,9 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     if surface.openings is None or (not surface.is_open and surface.openings.floor is None):
         return replace(whole, at_least=surface.openings is not None and surface.openings.evident)
     ends, evident = ends_there(surface, whole.largest), surface.openings.evident
+    opens = evident and not (ends and thin_ends(surface))
     if not whole.largest.group.is_polar and (ends or not evident):
-        return replace(whole, at_least=evident)  # no single hole leaves such a group, and there is hardly one
+        return replace(whole, at_least=opens)  # no single hole leaves such a group, and there is hardly one
     evident = surface.openings.hide_much
     part = _of_part(surface, whole)
     more = _size(part.largest.placed) > _size(whole.largest.placed)
@@ -82,9 +92,9 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     # What a border hides may be why a larger group is in doubt.
     doubted = (h for h in (part.largest, *part.small) if _size(h.placed) > _size(whole.largest.placed))
     hides = not ends and any(meant(Link(need=h.need), surface.tolerance) > LEAST for h in doubted)
-    whole = replace(whole, at_least=evident or hides or missing)
     if not more:
-        return whole
+        return replace(whole, at_least=hides or opens or surface.openings.floor is not None)
+    whole = replace(whole, at_least=evident or hides or missing)
     # To believe that what ends so evenly is missing a part takes as much as to believe in as much as was seen.
     asked, known = belief_in_as_much(surface, part.largest.placed), part.largest
     rival = replace(known, need=math.hypot(known.need, asked), believed=math.hypot(known.believed, asked))

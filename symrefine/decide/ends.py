@@ -38,6 +38,15 @@ def ends_there(surface: Surface, found: Hypothesis) -> bool:
     return bool(shares) and float(np.median(shares)) > KEPT
 
 
+def thin_ends(surface: Surface) -> bool:
+    """Whether most of its open borders may just be where thin parts end.
+
+    A group keeps a cut across its axis as it keeps a rim; that of a thin part it keeps has nothing beyond.
+    """
+    openings = surface.openings
+    return openings is not None and openings.ends is not None and bool(openings.ends[openings.line].mean() > KEPT)
+
+
 def ends_too(surface: Surface, found: Hypothesis, hidden: Sequence[tuple[Isometry, Mask]], limit: float) -> bool:
     """Whether an object ends at its open borders if it has a group that what lies beyond them was to hide.
 
