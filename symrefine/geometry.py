@@ -125,7 +125,7 @@ def _length(vector: ArrayLike, name: str) -> float:
     return length
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Plane:
     """Hyperplane `normal.x = offset`, kept in Hessian normal form: both are divided by the length of the normal.
 
@@ -152,7 +152,7 @@ class Plane:
         return points - 2.0 * np.multiply.outer(self.signed_distance(points), self.normal)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Axis:
     """Line through `point` along the unit `direction`, the sign of the direction being arbitrary.
 

@@ -20,7 +20,7 @@ SAME_MASS = 0.01
 LARGEST = 1e60
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Shape:
     """Weighted points in n-space, with normals or triangles where the source has them: `Shape(points, faces)`.
 

@@ -15,7 +15,7 @@ from symrefine.shape import Shape
 CHUNK = 2**17
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Stream:
     """Points in 3-space, one chunk after the other: `for chunk in stream` gives arrays [n, 3] of finite float64.
 

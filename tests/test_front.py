@@ -4,6 +4,7 @@ import copy
 import json
 import pickle
 import re
+from dataclasses import FrozenInstanceError, is_dataclass
 from importlib.resources import files
 from pathlib import Path
 
@@ -575,6 +576,18 @@ ONE_OBJECT = {
 @pytest.mark.parametrize("target", ONE_OBJECT.values(), ids=ONE_OBJECT)
 def test_a_list_of_rows_is_one_object(target):
     assert isinstance(symrefine.align(target, target), symrefine.Alignment)
+
+
+KINDS = [kind for name in symrefine.__all__ if is_dataclass(kind := getattr(symrefine, name))]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_people_hold_says_that_it_cannot_be_changed(kind):
+    held = object.__new__(kind)
+    with pytest.raises(FrozenInstanceError, match="cannot assign to field 'remark'"):
+        held.remark = "mine"
+    with pytest.raises(FrozenInstanceError, match="cannot delete field 'remark'"):
+        del held.remark
 
 
 def test_the_front_page_shows_promises_only():

@@ -51,7 +51,6 @@ class Operations(np.ndarray[Any, np.dtype[np.float64]]):
 class Answer:
     """What every result can do, whatever it is about."""
 
-    __slots__ = ()
     options: Options
 
     @classmethod
@@ -125,8 +124,6 @@ class Answer:
 class Pictured(Answer):
     """What every answer can do of which there is a picture."""
 
-    __slots__ = ()
-
     def plot(self, axes: "Axes | None" = None) -> "Axes":
         """The picture of `save("x.png")` on axes of matplotlib, on those of a new figure if None."""
         from io import BytesIO
@@ -154,7 +151,6 @@ class Pictured(Answer):
 class Found(Pictured):
     """What every detection can do."""
 
-    __slots__ = ()
     shape: Shape
 
     def operations(self) -> Operations:

@@ -16,7 +16,6 @@ from symrefine.symmetrize import Symmetrized as BareSymmetrized
 class Derived(Pictured):
     """What every object can do that was made of another one: its page is that of what was found in that one."""
 
-    __slots__ = ()
     source: Shape
     detection: Detection
 
@@ -50,7 +49,7 @@ class Derived(Pictured):
         raise NotImplementedError
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Symmetrized(Derived, BareSymmetrized):
     """What `symmetrize` made, with a voice; `save("exact.ply")` writes the shape.
 
@@ -89,7 +88,7 @@ class Symmetrized(Derived, BareSymmetrized):
         return bytes_writer(model_bytes(suffix, self.shape))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Completion(Derived, BareCompletion):
     """What `complete` made, with a voice; `save("full.ply")` writes the points, those inferred marked.
 

@@ -13,7 +13,7 @@ from symrefine.plane import PlanarDetection as BarePlanarDetection
 from symrefine.shape import Shape
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class PlanarDetection(Found, BarePlanarDetection):
     """What `detect` found in a picture, or in points in the plane, with a voice.
 
@@ -42,7 +42,7 @@ class PlanarDetection(Found, BarePlanarDetection):
         return Operations.about(self.group.operations(), self.center)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class SubspaceDetection(Found, BareSubspaceDetection):
     """What `detect` found in points of four to eight coordinates, with a voice.
 

@@ -13,7 +13,7 @@ from symrefine.groups import PointGroup
 from symrefine.shape import Shape
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Detection(Found, BareDetection):
     """What `detect` found in an object in space, with a voice.
 

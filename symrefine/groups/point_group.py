@@ -29,7 +29,7 @@ from symrefine.rounding import SINGLE
 _POINT_SET = {"C": "Cv", "Cv": "Cv", "Ch": "Dh", "D": "Dh", "Dh": "Dh", "K": "Kh", "Kh": "Kh"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PointGroup:
     """Point group `name` (canonical Schoenflies symbol) placed by the rotation `frame` [3, 3] (rows: its x, y, z)."""
 

@@ -18,7 +18,7 @@ from symrefine.poses.mean import MeanPose, mean_pose
 from symrefine.poses.symmetry import Symmetry
 
 
-@dataclass(frozen=True, slots=True, init=False, eq=False, repr=False)
+@dataclass(frozen=True, init=False, eq=False, repr=False)
 class Canonicalizer:
     """Of all equivalent poses of a symmetric body the one nearest to a reference, or to the frame before.
 
