@@ -109,6 +109,17 @@ def test_frame_must_be_a_rotation(frame):
         point_group("C2", frame)
 
 
+def test_groups_of_one_name_in_one_place_are_equal():
+    turned = rotation([0, 0, 1], math.pi / 2)
+    assert point_group("C4v") == point_group("c4v", np.eye(3))
+    assert point_group("C1h", turned) == point_group("Cs", turned.copy())
+    assert point_group("C4v") not in (point_group("C4"), point_group("C4v", turned), "C4v", None)
+    assert {point_group("C4v"): "found"}[point_group("C4v", np.where(np.eye(3), 1.0, -0.0))] == "found"
+    again = point_group("C4v", turned)
+    assert is_subgroup(point_group("C4v"), again), "though the operations are the same"
+    assert is_subgroup(again, point_group("C4v"))
+
+
 def test_groups_cannot_be_changed():
     group = point_group("D4h")
     with pytest.raises(AttributeError):

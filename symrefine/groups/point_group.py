@@ -31,7 +31,11 @@ _POINT_SET = {"C": "Cv", "Cv": "Cv", "Ch": "Dh", "D": "Dh", "Dh": "Dh", "K": "Kh
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PointGroup:
-    """Point group `name` (canonical Schoenflies symbol) placed by the rotation `frame` [3, 3] (rows: its x, y, z)."""
+    """Point group `name` (canonical Schoenflies symbol) placed by the rotation `frame` [3, 3] (rows: its x, y, z).
+
+    Equal are groups of the same name and frame, number for number. Frames that differ may place the same operations:
+    `symrefine.groups.is_subgroup` both ways tells that, within a tolerance.
+    """
 
     name: str
     frame: Array = field(default_factory=lambda: np.eye(3))
@@ -43,6 +47,14 @@ class PointGroup:
         if np.linalg.det(nearest) <= 0.0 or np.abs(nearest - frame).max() > SINGLE:
             raise InputError(f"the frame of {self.name} must be a rotation matrix [3, 3], determinant +1")
         object.__setattr__(self, "frame", read_only(nearest))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, PointGroup):
+            return NotImplemented
+        return self.name == other.name and np.array_equal(self.frame, other.frame)
+
+    def __hash__(self) -> int:
+        return hash((self.name, *self.frame.flat))  # by its numbers, as -0.0 is 0.0
 
     @property
     def symbol(self) -> Symbol:
