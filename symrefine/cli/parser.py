@@ -62,6 +62,19 @@ class Parser(argparse.ArgumentParser):
         known: Iterable[str] = self._option_string_actions if argument.startswith("-") else ()
         self.error(f"unknown argument: {argument}{meant(argument.partition('=')[0], known)}")
 
+    def check_filled(self, args: argparse.Namespace) -> None:
+        """Refuse an empty text, as a variable of a shell leaves that is not set: as a path it would be this directory.
+
+        Raises:
+            InputError: with the argument that is empty.
+        """
+        for action in self._actions:
+            given = getattr(args, action.dest, None)
+            if given == "" or (isinstance(given, list) and "" in given):
+                is_option = bool(action.option_strings)
+                name = "/".join(action.option_strings) if is_option else action.metavar
+                self.error(f"{name}: is empty; expected {action.metavar if is_option else 'a name'}")
+
 
 class _Version(argparse.Action):
     """Print the version; looking it up takes too long to do it for every command."""
@@ -77,7 +90,7 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     """The values of a command line, with its words as `argv` and the function to call as `run`.
 
     Raises:
-        InputError: unknown commands, options or values.
+        InputError: unknown commands, options or values; empty ones.
     """
     argv = _joined(argv)
     args, rest = grammar().parse_known_args(argv)
@@ -88,6 +101,7 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
         rest = []
     if rest:
         args.parser.unknown(rest[0])
+    args.parser.check_filled(args)
     return args
 
 
