@@ -146,6 +146,16 @@ def test_what_is_sure_enough_is_settled(run: Run, out: Path, models: Path) -> No
     assert command[-4:] == ["--accept", str(sure[1]), "--decisions", "decisions.json"]
 
 
+def test_the_command_of_the_page_takes_a_folder_that_begins_with_a_dash(
+    models: Path, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(models, tmp_path / "-models")
+    monkeypatch.chdir(tmp_path)
+    assert invoke(["label", "-q", "--out", str(out), "--", "-models"]) == 0
+    command = shlex.split(re.findall(r"<pre>(.*)</pre>", (out / "review.html").read_text())[0])
+    assert command[-4:] == ["--decisions", "decisions.json", "--", "-models"]
+
+
 def test_equal_runs_give_equal_bytes_and_nothing_is_detected_twice(
     run: Run, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

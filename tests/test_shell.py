@@ -335,6 +335,37 @@ def test_what_was_meant_is_offered(run: Run, folder: Path, line: str, meant: str
     assert (f"; did you mean {meant}?" in err) if meant else ("did you mean" not in err)
 
 
+def test_names_may_begin_with_a_dash(run: Run, folder: Path) -> None:
+    (folder / "-x.xyz").write_bytes((folder / "box.xyz").read_bytes())
+    assert run("detect", "--", "-x.xyz")[1].startswith("-x.xyz: D2h")
+    for line in ("--seed 1 -- -x.xyz box.xyz", "./-x.xyz box.xyz", "box.xyz --seed 1 -- -x.xyz"):
+        assert [row.split()[0] for row in run("detect", *line.split())[1].splitlines()] == ["group", "D2h", "D2h"]
+    assert run("symmetrize", "-o-exact.xyz", "--json=-figures.json", "-q", "--", "-x.xyz")[0] == 0
+    assert (folder / "-exact.xyz").is_file()
+    assert_refused(run("detect", "box.xyz", "--seed", "1", "-"), "-: stdin is one file")
+
+
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        ("detect -x.ply", "-x.ply"),
+        ("detect box.xyz -q.ply", "-q.ply"),
+        ("batch -models", "-models"),
+        ("view -x.rrd", "-x.rrd"),
+        ("detect box.xyz --json -o.json", "-o.json"),
+        ("symmetrize box.xyz -o -exact.xyz", "-exact.xyz"),
+        ("symmetrize box.xyz -oexact.xyz --seed x", None),
+        ("detect -- -x.ply", None),
+        ("detect box.xyz --tolernace=0.5u.v", None),
+    ],
+)
+def test_names_that_pass_for_options_are_told(run: Run, folder: Path, line: str, name: str | None) -> None:
+    (folder / "-models").mkdir()
+    told = f"; if {name} is a file, write ./{name}\n" if name else "\n"
+    assert_refused(result := run(*line.split()), told)
+    assert ("is a file" in result[2]) is (name is not None)
+
+
 def test_names_do_not_steer_the_terminal(run: Run, folder: Path) -> None:
     name = "\x1b[31mred\x07.xyz"
     (folder / name).write_bytes((folder / "cut.ply").read_bytes())

@@ -291,6 +291,14 @@ def test_opening_refuses_what_is_no_recording(shapeless: Case, tmp_path: Path) -
         open_recording(tmp_path / "half.rrd")
 
 
+def test_a_recording_may_have_the_name_of_an_option(
+    shapeless: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "-help.rrd").write_bytes(shapeless[2].read_bytes())
+    opening.check_recording(Path("-help.rrd"))
+
+
 def test_opening_tells_why_there_is_no_window(shapeless: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     fails = "import sys; sys.exit('Error: a.rs:7: no display is set.')"
     monkeypatch.setattr(opening, "check_recording", lambda _: None)

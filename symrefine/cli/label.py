@@ -218,7 +218,9 @@ def _again(argv: list[str]) -> list[str]:
     others.add_argument("--decisions")
     add_executor_options(others, "file")
     add_loudness(others)
-    return ["symrefine", *others.parse_known_args(argv)[1], "--decisions", "decisions.json"]
+    words = others.parse_known_args(argv)[1]
+    end = words.index("--") if "--" in words else len(words)  # what follows are names, whatever they begin with
+    return ["symrefine", *words[:end], "--decisions", "decisions.json", *words[end:]]
 
 
 def _line(row: "Row") -> str:

@@ -1,6 +1,7 @@
 """The grammar of the command line, and what its values must look like."""
 
 import argparse
+import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NoReturn
@@ -31,6 +32,9 @@ _EPILOG = (
 )
 
 
+# What argparse takes for an option, and what of it is likely to be the name of a file.
+_DASHED = re.compile("-.")
+_FILE = re.compile(r"-[^=]*\.[A-Za-z]\w*")
 # How argparse refuses a value that is none of its choices, among them the commands.
 _CHOICE = re.compile(r"invalid choice: '([^']*)' \(choose from (.*)\)")
 
@@ -62,6 +66,20 @@ class Parser(argparse.ArgumentParser):
         known: Iterable[str] = self._option_string_actions if argument.startswith("-") else ()
         self.error(f"unknown argument: {argument}{meant(argument.partition('=')[0], known)}")
 
+    def dashed(self, words: Iterable[str]) -> str:
+        """`; if -x.ply is a file, write ./-x.ply`, to end a message with, for the first name that passed for an option.
+
+        Args:
+            words: of the whole command line.
+        """
+        words = [*words]
+        command = next((self.commands[word] for word in words if word in self.commands), self)
+        known = tuple(name for action in command.arguments for name in action.option_strings if action.nargs != 0)
+        for word in words[: _end_of_options(words)]:
+            if (_FILE.fullmatch(word) or os.path.lexists(word)) and _DASHED.match(word) and not word.startswith(known):
+                return f"; if {word} is a file, write ./{word}"
+        return ""
+
     def check_filled(self, args: argparse.Namespace) -> None:
         """Refuse an empty text, as a variable of a shell leaves that is not set: as a path it would be this directory.
 
@@ -92,17 +110,30 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     Raises:
         InputError: unknown commands, options or values; empty ones.
     """
-    argv = _joined(argv)
-    args, rest = grammar().parse_known_args(argv)
-    args.argv = argv
-    several = next((name for name in ("path", "target") if isinstance(getattr(args, name, None), list)), None)
-    if several and not any(word.startswith("-") for word in rest):
-        setattr(args, several, getattr(args, several) + rest)  # argparse takes only files that stand together
-        rest = []
-    if rest:
-        args.parser.unknown(rest[0])
-    args.parser.check_filled(args)
+    argv, parser = _joined(argv), grammar()
+    try:
+        args, rest = parser.parse_known_args(argv)
+        args.argv = argv
+        several = next((name for name in ("path", "target") if isinstance(getattr(args, name, None), list)), None)
+        if several and (names := _names(rest)):
+            setattr(args, several, getattr(args, several) + names)  # argparse takes only files that stand together
+        elif rest:
+            args.parser.unknown(rest[0])
+        args.parser.check_filled(args)
+    except InputError as error:
+        raise InputError(f"{error}{parser.dashed(argv)}") from None
     return args
+
+
+def _names(words: Sequence[str]) -> list[str]:
+    """The names of files that words are; none if an option is among them, as it may be until a `--`."""
+    before, after = words[: (end := _end_of_options(words))], words[end + 1 :]
+    return [] if any(map(_DASHED.match, before)) else [*before, *after]
+
+
+def _end_of_options(words: Sequence[str]) -> int:
+    """Where the `--` stands after which no word is an option."""
+    return words.index("--") if "--" in words else len(words)
 
 
 def _joined(argv: Sequence[str]) -> list[str]:

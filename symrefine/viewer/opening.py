@@ -26,7 +26,7 @@ def open_recording(path: Path | str) -> None:
     check_recording(Path(path))
     with tempfile.TemporaryFile() as said:  # not a pipe: the viewer outlives this process and goes on talking
         viewer = subprocess.Popen(
-            [*_rerun(), "--new", "--bind", "127.0.0.1", str(path)],
+            [*_rerun(), "--new", "--bind", "127.0.0.1", _named(path)],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=said,
@@ -55,7 +55,7 @@ def serve_recording(path: Path | str, tell: Callable[[str], None]) -> None:
     """
     check_recording(Path(path))
     ports = ["--port", "auto", "--web-viewer-port", "0"]
-    command = [*_rerun(), "--serve-web", "--bind", "127.0.0.1", *ports, str(path)]
+    command = [*_rerun(), "--serve-web", "--bind", "127.0.0.1", *ports, _named(path)]
     said: list[str] = []
     with subprocess.Popen(
         command,
@@ -99,9 +99,14 @@ def check_recording(path: Path) -> None:
     with path.open("rb") as file:
         if file.read(3) != b"RRF":
             raise InputError(f"{path}: not a recording of rerun; `symrefine detect FILE --recording X.rrd` writes one")
-    done = subprocess.run([*_rerun(), "rrd", "verify", str(path)], capture_output=True, text=True, check=False)
+    done = subprocess.run([*_rerun(), "rrd", "verify", _named(path)], capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise InputError(f"{path}: the recording is damaged: {_reason(done.stderr)}")
+
+
+def _named(path: Path | str) -> str:
+    """A path as an argument of a program, which would take a name that begins with a dash for an option."""
+    return str(Path(path).absolute())
 
 
 def _rerun() -> list[str]:
