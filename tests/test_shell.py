@@ -89,6 +89,24 @@ def test_patterns_that_no_shell_expanded(run: Run, folder: Path) -> None:
     assert_refused(run("detect", "*.stl"), "*.stl: no file matches this pattern")
 
 
+@pytest.mark.parametrize(
+    "line", ["info {}", "symmetrize {} -o box.xyz", "export {} --to bop --out box.xyz", "align {} box.xyz"]
+)
+def test_patterns_where_one_file_is_taken(run: Run, folder: Path, line: str) -> None:
+    before = (folder / "box.xyz").read_bytes()
+    assert_refused(run(*line.format("*.stl").split()), "*.stl: no file matches this pattern")
+    assert_refused(run(*line.format("*.xyz").split()), "*.xyz: 2 files match this pattern; name one of them")
+    (folder / "b[1].xyz").write_bytes((folder / "box.xyz").read_bytes())
+    status, out, err = run(*line.format("bo*.xyz").split())
+    if "info" in line or "align" in line:
+        assert (status, err) == (0, "")
+        assert out.startswith("box.xyz")
+        assert run(*line.format("b[1].xyz").split())[1].startswith("b[1].xyz"), "a file of that name is no pattern"
+    else:
+        assert_refused((status, out, err), "--out box.xyz")
+    assert (folder / "box.xyz").read_bytes() == before
+
+
 def test_names_stay_whole(run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)

@@ -8,7 +8,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from symrefine.cli.inputs import FRAMES, STDIN, Object, expanded, loaded, objects
+from symrefine.cli.inputs import FRAMES, STDIN, Object, expanded, loaded, objects, one_file
 from symrefine.cli.outputs import add_outputs, check_outputs, json_writer, shown, shown_writers, tell, write_all
 from symrefine.cli.rows import MAP_HEAD, map_line
 from symrefine.cli.several import UNDETERMINED, Many, check_alone
@@ -35,7 +35,7 @@ _OK = "ok"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("source", metavar="A", help="mesh or point cloud to be moved; - is stdin")
+    parser.add_argument("source", metavar="A", type=one_file, help="mesh or point cloud to be moved; - is stdin")
     parser.add_argument(
         "target", metavar="B", nargs="+", help="meshes or point clouds to move it onto, or patterns; - is stdin"
     )

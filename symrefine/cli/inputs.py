@@ -3,6 +3,7 @@
 import shutil
 import sys
 import tempfile
+from argparse import ArgumentTypeError
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -44,6 +45,21 @@ def expanded(names: Sequence[str]) -> list[str]:
             raise InputError(f"{name}: no file matches this pattern")
         found += files
     return found
+
+
+def one_file(name: str) -> str:
+    """The one file that a name or a pattern stands for, as a type of an argument.
+
+    Raises:
+        ArgumentTypeError: a pattern that no file matches, or several.
+    """
+    try:
+        files = expanded([name])
+    except InputError as error:
+        raise ArgumentTypeError(str(error)) from None
+    if len(files) > 1:
+        raise ArgumentTypeError(f"{name}: {len(files)} files match this pattern; name one of them")
+    return files[0]
 
 
 @contextmanager

@@ -4,6 +4,7 @@ import argparse
 import math
 from typing import Any, Literal
 
+from symrefine.cli.inputs import one_file
 from symrefine.errors import InputError
 from symrefine.rounding import LARGEST_TOLERANCE, TOLERANCE
 from symrefine.units import METRES, SCALES_MM, read_length
@@ -41,8 +42,8 @@ def add_detection_options(parser: argparse.ArgumentParser, counts_as: str = "sym
 
 def add_path(parser: argparse.ArgumentParser, what: str, *, several: bool = False) -> None:
     """The file or files to read, and what stdin holds where `-` stands for it."""
-    many = {"nargs": "+"} if several else {}
-    parser.add_argument("path", metavar="PATH", help=f"{what}; - is stdin", **many)  # type: ignore[arg-type]
+    many: dict[str, Any] = {"nargs": "+"} if several else {"type": one_file}
+    parser.add_argument("path", metavar="PATH", help=f"{what}; - is stdin", **many)
     parser.add_argument("--format", metavar="SUFFIX", help="what stdin holds where PATH is -: ply, xyz, csv, ...")
 
 
