@@ -27,6 +27,17 @@ _asked: ContextVar[list[Path] | None] = ContextVar("asked", default=None)
 _bring: ContextVar[Callable[[Path], object] | None] = ContextVar("bring", default=None)
 
 
+def path_of(name: str | os.PathLike[str]) -> Path:
+    """The path that is given.
+
+    Raises:
+        InputError: an empty name, which pathlib takes for this directory.
+    """
+    if not os.fspath(name):
+        raise InputError("the name of the file is empty; expected a path")
+    return Path(name)
+
+
 def check_target(path: Path) -> None:
     """Refuse a path that cannot be written, before any work is done for it.
 

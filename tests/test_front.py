@@ -110,6 +110,8 @@ def test_a_path_is_read_like_the_object_in_it(tmp_path):
 
 WRONG = {
     "an object": (object(), "array: is of type object; expected a path"),
+    "an empty list": ([], "array: is an empty list; expected a path"),
+    "an empty name": ("", "the name of the file is empty"),
     "nothing": (None, "is of type NoneType"),
     "a masked array": (np.ma.masked_array(POINTS), "masked array"),
     "a mesh of masked points": ((np.ma.masked_array(CORNERS), TRIANGLES), "masked array"),
@@ -576,6 +578,36 @@ ONE_OBJECT = {
 @pytest.mark.parametrize("target", ONE_OBJECT.values(), ids=ONE_OBJECT)
 def test_a_list_of_rows_is_one_object(target):
     assert isinstance(symrefine.align(target, target), symrefine.Alignment)
+
+
+@pytest.mark.parametrize("empty", [[], ()])
+def test_an_empty_list_is_told_by_the_name_of_its_argument(empty):
+    told = f"is an empty {type(empty).__name__}; expected a path, points"
+    with pytest.raises(InputError, match=f"target: {told}"):
+        symrefine.align(POINTS, empty)
+    with pytest.raises(InputError, match=f"source: {told}"):
+        symrefine.align(empty, POINTS)
+    with pytest.raises(InputError, match=f"target 1: {told}"):
+        symrefine.align(POINTS, [POINTS, empty])
+
+
+UNNAMED = {
+    "load": lambda _: symrefine.load(""),
+    "load_frames": lambda _: symrefine.load_frames(""),
+    "load_depth": lambda _: symrefine.load_depth("", (1, 1, 1, 1)),
+    "stream": lambda _: symrefine.stream(""),
+    "save": lambda found: found.save(""),
+    "report": lambda found: symrefine.report(found, ""),
+    "export": lambda found: symrefine.export(found.shape, "dope", "", found=found),
+}
+
+
+@pytest.mark.parametrize("use", UNNAMED.values(), ids=UNNAMED)
+def test_an_empty_name_is_no_name_of_this_directory(use, found, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="the name of the file is empty; expected a path"):
+        use(found["detection"])
+    assert not any(tmp_path.iterdir())
 
 
 KINDS = [kind for name in symrefine.__all__ if is_dataclass(kind := getattr(symrefine, name))]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self, cast
 import numpy as np
 
 from symrefine.errors import InputError, about
-from symrefine.files import Writer, bytes_writer, check_other, check_target, json_text, text_writer, write_all
+from symrefine.files import Writer, bytes_writer, check_other, check_target, json_text, path_of, text_writer, write_all
 from symrefine.front import lines
 from symrefine.geometry import Array
 from symrefine.poses.symmetry import homogeneous
@@ -81,7 +81,7 @@ class Answer:
             InputError: another suffix, a kind of file that there is not for this kind of answer, the input itself, or
                 no room.
         """
-        path = Path(path)
+        path = path_of(path)
         with about(str(path)):
             make = self._maker(path.suffix.lower())
         check_target(path)

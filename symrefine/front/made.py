@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
 from symrefine.errors import InputError
+from symrefine.files import path_of
 from symrefine.front.asked import flag_of, found_in, in_space, seed_of, told, whole_of
 from symrefine.front.verbs import detect_in_space
 from symrefine.lengths import relative_tolerance
@@ -141,7 +142,7 @@ def export(
     """
     from symrefine.export.packages import package_of, write_package
 
-    shape, out = shape_of(shape), Path(out)
+    shape, out = shape_of(shape), path_of(out)
     found = detect_in_space(shape) if found is None else found_in(found, shape)
     package = package_of(
         to,
@@ -152,7 +153,7 @@ def export(
         scale=scale,
         improper=flag_of("improper", improper),
         steps=None if steps is None else whole_of("steps", steps, least=1),
-        transform=None if transform is None else Path(transform),
+        transform=None if transform is None else path_of(transform),
     )
     write_package(package, to, out)
     return package

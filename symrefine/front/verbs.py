@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias, overload
 from numpy.typing import ArrayLike
 
 from symrefine.errors import InputError
+from symrefine.files import path_of
 from symrefine.front.answers import Found, check_kind
 from symrefine.front.asked import flag_of, ladder_of, seed_of, told
 from symrefine.lengths import relative_tolerance
@@ -268,7 +269,7 @@ def report(given: Any, path: str | Path) -> "Detected | Alignment":
     """
     from symrefine.front.aligned import Alignment
 
-    check_kind(Path(path))
+    check_kind(path_of(path))
     found: Any = given if isinstance(given, Found | Alignment) else detect(given)
     found.save(path)
     return found

@@ -22,7 +22,7 @@ from typing import Any, Literal
 
 from symrefine.clock import passed
 from symrefine.errors import InputError, about
-from symrefine.files import file_bytes
+from symrefine.files import file_bytes, path_of
 from symrefine.load.cif import read_cif
 from symrefine.load.collada import read_dae
 from symrefine.load.content import Content, Threshold, Wanted, check_distinct, check_finite
@@ -181,10 +181,10 @@ def load(
     """
     if frame is not None and (isinstance(frame, bool) or not isinstance(frame, int)):
         raise InputError(f"frame is {frame!r}; expected a whole number from 0, or None")
-    wanted = _wanted(measure, labels, weights, threshold, invert, texture)
+    file, wanted = path_of(path), _wanted(measure, labels, weights, threshold, invert, texture)
     with about(str(path)):
-        content = _contents(Path(path), wanted, is_chosen=frame is not None).chosen(frame)
-    return _shape(content, Path(path), wanted, labels, weights, source=str(path))
+        content = _contents(file, wanted, is_chosen=frame is not None).chosen(frame)
+    return _shape(content, file, wanted, labels, weights, source=str(path))
 
 
 def load_frames(
@@ -209,15 +209,16 @@ def load_frames(
     Raises:
         InputError: as `load`; what is wrong with one of several objects is told when that is asked for.
     """
-    source, wanted = str(path), _wanted(measure, labels, weights, threshold, invert, texture)
+    file, source = path_of(path), str(path)
+    wanted = _wanted(measure, labels, weights, threshold, invert, texture)
     with about(source):
-        contents = _contents(Path(path), wanted)
+        contents = _contents(file, wanted)
 
     def shape(number: int) -> Shape:
         name = source if len(contents) == 1 else f"{source}#{number}"
         with about(name):
             content = contents[number]
-        return _shape(content, Path(path), wanted, labels, weights, source=name)
+        return _shape(content, file, wanted, labels, weights, source=name)
 
     return Frames(contents.what, len(contents), shape)
 

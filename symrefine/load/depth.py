@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.errors import InputError, about
-from symrefine.files import file_bytes
+from symrefine.files import file_bytes, path_of
 from symrefine.geometry import Array
 from symrefine.load.content import Content, check_distinct
 from symrefine.load.image import FORMATS, open_image
@@ -50,8 +50,9 @@ def load_depth(
     fx, fy, cx, cy = _checked(intrinsics)
     if depth_scale is not None and not 0.0 < depth_scale < math.inf:
         raise InputError(f"depth_scale is {depth_scale}; expected a number above 0")
+    file = path_of(path)
     with about(str(path)):
-        depth = _depth(Path(path))
+        depth = _depth(file)
         if depth_scale is None and depth.dtype == np.uint8:
             raise InputError("has pixels of 8 bits, as pictures do; of depths that are stored so, tell the depth scale")
         scale = depth_scale or (1.0 if np.issubdtype(depth.dtype, np.floating) else DEPTH_SCALE)
@@ -62,7 +63,7 @@ def load_depth(
             raise InputError(f"row {row}, column {column}: depth {depth[row, column]}; expected 0 (none) or more")
     if mask is not None:
         with about(str(mask)):
-            seen &= _mask(Path(mask), depth.shape)
+            seen &= _mask(path_of(mask), depth.shape)
     with about(str(path)):
         row, column = np.nonzero(seen)
         z = scale * depth[row, column].astype(np.float64)

@@ -164,6 +164,8 @@ def _array(values: Any, name: str) -> Any:
             raise InputError(f"{name}: is no array that numpy can hold: {error}") from None
     elif _offers(values, "cpu", "numpy"):
         values = values.cpu().numpy()
+    if isinstance(values, list | tuple) and not values:
+        raise InputError(f"{name}: is an empty {type(values).__name__}; expected {_EXPECTED}")
     if not isinstance(values, list | tuple) and np.asarray(values).dtype == object and np.ndim(values) == 0:
         raise InputError(f"{name}: is of type {type(values).__name__}; expected {_EXPECTED}")
     return values

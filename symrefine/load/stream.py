@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from symrefine.errors import InputError, about
+from symrefine.files import path_of
 from symrefine.geometry import Array
 from symrefine.load.extras import library
 from symrefine.load.packed import suffix_of
@@ -43,7 +44,7 @@ def stream(path: str | PathLike[str]) -> Stream:
         InputError: another format, or a file of one that is no such cloud; missing, cut off, or with more in it than
             its header says; numbers that are not finite, while it is read; a library that is not installed.
     """
-    found = _stream(Path(path))
+    found = _stream(path_of(path))
     if found is None:
         raise InputError(
             f"{path}: cannot be read in chunks; expected an .npy of numbers [N, 3], a binary .ply of vertices without "
