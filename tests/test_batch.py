@@ -22,6 +22,7 @@ from symrefine.cli import invoke
 from symrefine.cli.fleet import memory, shard
 from symrefine.cli.sources import manifest, sources
 from symrefine.errors import InputError
+from symrefine.fleet import limits
 from symrefine.fleet.remote import state
 
 Run = Callable[..., tuple[int, str, str]]
@@ -416,6 +417,11 @@ def test_sizes_and_shards_are_read() -> None:
         ("batch objects --shard 4/3", "'4/3' is not a shard I/N"),
         ("batch objects --memory-limit 0", "'0' is not a size of memory"),
         ("batch objects --memory-limit 2PB", "'2PB' is not a size of memory"),
+        pytest.param(
+            "batch objects --memory-limit 1KB",
+            "a limit of memory of 1,000 bytes is less than the libraries of a task alone take, 0.3 GB; give 0.5GB",
+            marks=linux,
+        ),
         ("batch objects --time-limit 0", "--time-limit: '0' is not a number above 0"),
         ("batch objects --time-limit 1e300", "a limit of time of 1e+300 s is more than 2,147,483, 24 days"),
         (
@@ -483,7 +489,7 @@ def test_shards_of_a_study_become_one(run: Run, lab: Path) -> None:
 
 @linux
 @pytest.mark.usefixtures("lab")
-def test_what_meets_a_limit_is_a_row_and_tried_again_under_another(run: Run) -> None:
+def test_what_meets_a_limit_is_a_row_and_tried_again_under_another(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     line = ("batch", "objects/box000.xyz", "--out", "r.jsonl")
     status, _, _ = run(*line, "--time-limit", "0.001")
     assert (status, rows("r.jsonl")[-1]["error"]) == (
@@ -499,6 +505,7 @@ def test_what_meets_a_limit_is_a_row_and_tried_again_under_another(run: Run) -> 
     assert status == 1
     assert "a run failed: the run takes longer than 0.05 s" in err
     assert "2 runs, written" in run("run", "thirds.yaml", "--limit", "2")[1]
+    monkeypatch.setattr(limits, "LEAST", 1)
     assert "needs more memory than 1 bytes, the limit" in run(*line, "--memory-limit", "1", "--tolerance", "0.03")[1]
 
 

@@ -8,6 +8,8 @@ from symrefine.errors import InputError
 
 # Seconds: a system is told how long to wait in milliseconds, by a number of 31 bits.
 LONGEST = 2**31 // 1000
+# Bytes: the libraries of a detection take 0.25 GB on Linux on x86-64; with less than this every task would fail.
+LEAST = 2 * 10**8
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -58,12 +60,17 @@ def check_limits(limits: Limits) -> None:
     """Refuse a limit that this system cannot hold.
 
     Raises:
-        InputError: memory, elsewhere than on Linux; more time than it can wait.
+        InputError: memory, elsewhere than on Linux, or less than the libraries alone take; more time than it can wait.
     """
     if limits.seconds is not None and limits.seconds > LONGEST:
         raise InputError(f"a limit of time of {limits.seconds:g} s is more than {LONGEST:,}, 24 days; leave it out")
     if limits.memory is not None and sys.platform != "linux":
         raise InputError(f"a limit of memory needs Linux, this is {sys.platform}; leave it out")
+    if limits.memory is not None and limits.memory < LEAST:
+        raise InputError(
+            f"a limit of memory of {limits.memory:,} bytes is less than the libraries of a task alone take, 0.3 GB; "
+            "give 0.5GB or more"
+        )
 
 
 def hold_memory(limit: int | None) -> None:
