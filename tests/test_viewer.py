@@ -1,5 +1,6 @@
 """Recordings: what they hold, that equal input gives equal content, and what opening refuses."""
 
+import os
 import socket
 import subprocess
 import sys
@@ -282,6 +283,12 @@ def test_a_recording_takes_the_place_of_another(shapeless: Case, tmp_path: Path)
 def test_opening_refuses_what_is_no_recording(shapeless: Case, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         open_recording(tmp_path / "none.rrd")
+    (tmp_path / "folder.rrd").mkdir()
+    with pytest.raises(InputError, match=r"folder.rrd: is a directory; expected a recording, a file"):
+        open_recording(tmp_path / "folder.rrd")
+    if os.name == "posix":
+        with pytest.raises(InputError, match=r"/dev/null: is a pipe or a device"):
+            open_recording("/dev/null")
     (tmp_path / "text.rrd").write_text("hello")
     with pytest.raises(InputError, match="not a recording"):
         open_recording(tmp_path / "text.rrd")

@@ -11,6 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from symrefine.errors import InputError, SymrefineError
+from symrefine.files import ENDLESS
 
 # Seconds within which a viewer that cannot open a window gives up.
 PATIENCE = 2.0
@@ -92,10 +93,14 @@ def check_recording(path: Path) -> None:
     """Refuse what is not a whole recording.
 
     Raises:
-        InputError: no such file, not a recording, or one that ends too soon.
+        InputError: no such file, a directory, not a recording, or one that ends too soon.
     """
-    if not path.is_file():
+    if path.is_dir():
+        raise InputError(f"{path}: is a directory; expected a recording, a file")
+    if not path.exists():
         raise InputError(f"{path}: no such file; `symrefine detect FILE --recording {path}` writes one")
+    if not path.is_file():
+        raise InputError(f"{path}: {ENDLESS}")
     with path.open("rb") as file:
         if file.read(3) != b"RRF":
             raise InputError(f"{path}: not a recording of rerun; `symrefine detect FILE --recording X.rrd` writes one")
