@@ -469,6 +469,11 @@ def test_processes_and_shards_give_the_same_table(run: Run, lab: Path) -> None:
     run("batch", "objects", "--shard", "3/3", "--out", "other.jsonl", "--seed", "1")
     refused(run("merge", "p1.jsonl", "p2.jsonl", "other.jsonl", "--out", "some.jsonl"), "is part of another fleet")
     refused(run("merge", "whole.jsonl", "--out", "some.jsonl"), "holds rows of no shard")
+    refused(run("merge", *parts, "p1.jsonl", "--out", "some.jsonl"), "p1.jsonl: is named 2 times; merge takes each")
+    before = (lab / "p1.jsonl").read_bytes()
+    refused(run("merge", *parts, "--out", "p1.jsonl"), "p1.jsonl: is there already")
+    refused(run("merge", *parts, "--out", "some.csv", "--table", "./some.csv"), "same file as that of --out")
+    assert (lab / "p1.jsonl").read_bytes() == before
     assert not (lab / "some.jsonl").exists()
 
 

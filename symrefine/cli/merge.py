@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 from symrefine.cli.fleet import add_table_option, table_writer, tell_table
 from symrefine.cli.outputs import check_outputs, print_lines, write_all
 from symrefine.errors import InputError
-from symrefine.files import check_target, naming, pieces_writer
+from symrefine.files import check_target, naming, pieces_writer, place_of
 
 if TYPE_CHECKING:
     from symrefine.fleet.rows import Row
@@ -37,6 +38,9 @@ def run(args: argparse.Namespace) -> int:
 
     parts = [Path(name) for name in args.path]
     studies = [path for path in parts if path.is_dir()]
+    for path, count in Counter(map(place_of, parts)).items():
+        if count > 1:
+            raise InputError(f"{path}: is named {count} times; merge takes each part once")
     if studies and len(studies) < len(parts):
         other = next(path for path in parts if path not in studies)
         raise InputError(f"{other}: is no directory as {studies[0]} is; merge takes files, or directories")
