@@ -1,7 +1,7 @@
 """`symrefine run`: an experiment over the sweep of a YAML config; a run that was killed goes on where it ended."""
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from symrefine.cli.fleet import add_fleet_options, executor, write_rows
 from symrefine.cli.outputs import check_outputs, complain, is_quiet, note, print_lines, say_lines
 from symrefine.cli.signs import progress
 from symrefine.cli.values import count
+from symrefine.errors import InputError
 from symrefine.files import naming
 
 HELP = "run the experiment of a YAML config and write its rows, tables and figures"
@@ -18,6 +19,9 @@ DESCRIPTION = (
     "it is not done again. A run that fails gives a row with its error, the others go on, and the exit status is 1. "
     "A directory holds the rows of one config and one version of the code; others are refused unless --replace."
 )
+# What --list has a use for, by the names of the values: where it prints configs, and where runs.
+_OF_CONFIGS = frozenset({"config", "list", "quiet", "verbose"})
+_OF_RUNS = _OF_CONFIGS | {"set", "quick", "limit"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,13 +53,16 @@ def run(args: argparse.Namespace) -> int:
     """Run the study, print its tables, tell whether all went well."""
     if args.config is None and not args.list:
         args.parser.error("CONFIG.yaml is missing; `symrefine run --list` names those that are here")
+    of_configs = args.list and (args.config is None or Path(args.config).is_dir())
+    if args.list:
+        _check_list(args, *(("configs", _OF_CONFIGS) if of_configs else ("the runs of a config", _OF_RUNS)))
     from symrefine.fleet.limits import one_thread_each
 
     one_thread_each()  # before anything heavy is imported
     from symrefine.study.plan import make_plan
     from symrefine.study.runner import run_study
 
-    if args.config is None or (args.list and Path(args.config).is_dir()):
+    if of_configs:
         say_lines(_configs(Path(args.config or ".")))
         return 0
     plan = make_plan(Path(args.config), args.set, quick=args.quick)
@@ -82,6 +89,19 @@ def run(args: argparse.Namespace) -> int:
     print_lines([", ".join(part for part in parts if part)])
     write_rows(args.table, outcome.untimed)
     return int(outcome.failed > 0)
+
+
+def _check_list(args: argparse.Namespace, listed: str, used: Set[str]) -> None:
+    """Refuse options that say how a study is run, where nothing is run.
+
+    Raises:
+        InputError: one of them is given.
+    """
+    for action in args.parser.arguments:
+        if action.dest not in used and getattr(args, action.dest, action.default) != action.default:
+            raise InputError(
+                f"{action.option_strings[-1]}: does not apply to --list, which prints {listed} alone; leave it out"
+            )
 
 
 def _configs(folder: Path) -> Iterator[str]:
