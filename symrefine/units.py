@@ -3,6 +3,8 @@
 import math
 import re
 from collections.abc import Mapping
+from numbers import Real
+from typing import Any
 
 from symrefine.errors import InputError, meant
 
@@ -20,15 +22,15 @@ _LENGTH = re.compile(r"([-+0-9.eE]*[0-9.])\s*([^\W\d_]+)")
 _SPELT = {"µm": "um", "μm": "um", "Å": "A", "å": "A"}
 
 
-def check_scale(scale: float) -> None:
+def check_scale(scale: Any) -> None:
     """Refuse a number of millimetres that no unit has.
 
     Raises:
-        InputError: it is not positive, or far from all that there is.
+        InputError: it is no number, not positive, or far from all that there is.
     """
-    if not SCALES_MM[0] <= scale <= SCALES_MM[1]:
+    if isinstance(scale, bool) or not isinstance(scale, Real) or not SCALES_MM[0] <= float(scale) <= SCALES_MM[1]:
         raise InputError(
-            f"scale is {scale}; expected millimetres in one unit of the file, such as 1 or 1000, from "
+            f"scale is {scale!r}; expected millimetres in one unit of the file, such as 1 or 1000, from "
             f"{SCALES_MM[0]:g} to {SCALES_MM[1]:g}"
         )
 

@@ -305,6 +305,11 @@ def test_what_was_found_in_the_same_object_is_taken_as_it_is_written():
 
 EXPORTS = {
     "mirrors for BOP": (("bop", "m.json", {"improper": True}), "improper does not apply to 'bop'"),
+    "a number for matrices": (("npz", "x.npz", {"number": 3}), "it is for 'bop', 'foundationpose', 'megapose'"),
+    "a number for DOPE": (("dope", "x", {"number": 3}), "number does not apply to 'dope'"),
+    "millimetres for matrices": (("npz", "x.npz", {"scale": 1000.0}), "scale does not apply to 'npz'"),
+    "a text for millimetres": (("bop", "m.json", {"scale": "1000"}), "scale is '1000'; expected millimetres"),
+    "whether, not how many": (("bop", "m.json", {"scale": True}), "scale is True; expected millimetres"),
     "another suffix": (("npz", "x.dat", {}), "expected a name that ends in .npz"),
     "no turns": (("npz", "x.npz", {"steps": 0}), "steps is 0"),
     "more than all": (("npz", "x.npz", {"steps": 10**9}), "steps is 1000000000; expected 1 to 360"),

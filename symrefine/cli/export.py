@@ -19,6 +19,7 @@ from symrefine.cli.values import (
     natural,
 )
 from symrefine.errors import InputError
+from symrefine.export.formats import TAKES, takers
 from symrefine.files import check_folder
 
 if TYPE_CHECKING:
@@ -34,23 +35,15 @@ DESCRIPTION = (
     "isaac: a folder with a canonical model and the file that this program reads beside it. What the program cannot "
     "express is told."
 )
-# Formats and the options that they alone take.
-_OPTIONS: dict[str, tuple[str, ...]] = {
-    "bop": ("id", "scale"),
-    "foundationpose": ("id", "scale"),
-    "megapose": ("id", "scale"),
-    "dope": ("scale",),
-    "isaac": ("scale",),
-    "npz": ("improper", "steps"),
-    "canonical": ("transform",),
-}
+# Options that not every format takes, and what `symrefine.export` calls them.
+_OPTIONS = {"id": "number", "scale": "scale", "improper": "improper", "steps": "steps", "transform": "transform"}
 _FOLDERS = ("foundationpose", "megapose", "dope", "isaac")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_path(parser, "mesh or point cloud")
-    parser.add_argument("--to", required=True, choices=tuple(_OPTIONS), help="what to write")
+    parser.add_argument("--to", required=True, choices=tuple(TAKES), help="what to write")
     parser.add_argument("--out", required=True, metavar="OUT", help="file, or folder for " + ", ".join(_FOLDERS))
     parser.add_argument("--id", type=natural, metavar="N", help=f"number of the object in models_info.json {NUMBERED}")
     scaled = "millimetres in one unit of PATH: 1000 for metres (default: 1)"
@@ -86,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     tell(None, {}, [f"{args.path}: {detection.point_group}"], map(str, package.files))
     for text in package.notes:
         note(text)
-    if "scale" in _OPTIONS[args.to]:
+    if "scale" in TAKES[args.to]:
         from symrefine.export.bop import diameter, metres_doubt
 
         size = (args.scale or 1.0) * diameter(shape.points)
@@ -117,10 +110,9 @@ def detected(args: argparse.Namespace) -> tuple["Shape", "Detection"]:
 
 def _check(args: argparse.Namespace) -> None:
     """Refuse, before any work, options of other formats and outputs that cannot be written."""
-    for option in ("id", "scale", "improper", "steps", "transform"):
-        if getattr(args, option) is not None and option not in _OPTIONS[args.to]:
-            users = ", ".join(name for name, options in _OPTIONS.items() if option in options)
-            raise InputError(f"--{option}: does not apply to --to {args.to}; it is for {users}")
+    for option, name in _OPTIONS.items():
+        if getattr(args, option) is not None and name not in TAKES[args.to]:
+            raise InputError(f"--{option}: does not apply to --to {args.to}; it is for {', '.join(takers(name))}")
     if args.to in _FOLDERS:
         out = Path(args.out)
         if out.exists() and not out.is_dir():
@@ -158,6 +150,6 @@ def _transform(args: argparse.Namespace) -> Path:
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:
     """The options of the format that were given, by the names that `package_of` has for them."""
-    given = {"number": args.id, "scale": args.scale, "improper": args.improper, "steps": args.steps}
+    given = {name: getattr(args, option) for option, name in _OPTIONS.items()}
     given["transform"] = args.transform and Path(args.transform)
     return {name: value for name, value in given.items() if value is not None}

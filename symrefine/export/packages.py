@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from symrefine.errors import InputError
 from symrefine.export.bop import bop_entry, bop_limits, bop_text, decided, number_for, replaced
 from symrefine.export.canonical import Canonical, canonical_pose
 from symrefine.export.consumers import CONSUMERS, Consumer, reading
+from symrefine.export.formats import TAKES, Format, takers
 from symrefine.export.models import check_suffix, model_bytes, moved, npz_bytes
 from symrefine.export.operations import STEPS, motions_bytes, motions_limits, reflections_left_out
 from symrefine.files import bytes_writer, check_other, check_target, json_text, write_all
@@ -20,7 +21,6 @@ from symrefine.shape import Shape
 from symrefine.units import check_scale
 
 SCHEMA = "symrefine.canonical/1"
-Format = Literal["bop", "npz", "canonical", "foundationpose", "megapose", "dope", "isaac"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,15 +57,21 @@ def package_of(
         transform: canonical: where the transform goes; `place_of_transform` if None.
 
     Raises:
-        InputError: another format, nothing decided, or a file that would take the place of the input, or of a model
-            that no export made.
+        InputError: another format, an option of another one, nothing decided, or a file that would take the place of
+            the input, or of a model that no export made.
     """
     if to not in get_args(Format):
         raise InputError(f"to is {to!r}; expected one of {list(get_args(Format))}")
-    given = {"improper": (improper, "npz"), "steps": (steps, "npz"), "transform": (transform, "canonical")}
-    for name in (name for name, (value, meant) in given.items() if value and to != meant):
-        raise InputError(f"{name} does not apply to {to!r}; it is for {given[name][1]!r}")
     check_scale(scale)
+    given = {
+        "number": number is not None,
+        "scale": scale != 1.0,
+        "improper": improper,
+        "steps": steps is not None,
+        "transform": transform is not None,
+    }
+    for name in (name for name, is_given in given.items() if is_given and name not in TAKES[to]):
+        raise InputError(f"{name} does not apply to {to!r}; it is for {', '.join(map(repr, takers(name)))}")
     number = number_for(shape.source, number)
     if to == "bop":
         made = bop_package(out, detection, shape, number=number, scale=scale)

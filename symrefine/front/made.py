@@ -17,7 +17,8 @@ from symrefine.surface.misses import TOLERANCE
 # Each verb imports what it needs when it is used.
 if TYPE_CHECKING:
     from symrefine.detection.measure import Outliers
-    from symrefine.export.packages import Format, Package
+    from symrefine.export.formats import Format
+    from symrefine.export.packages import Package
     from symrefine.front.derived import Completion, Symmetrized
     from symrefine.front.space import Detection
 
@@ -127,7 +128,8 @@ def export(
         to: "bop": an entry in `models_info.json`; "npz": matrices [N, 4, 4]; "canonical": the model with its axis on z;
             or a folder for "foundationpose", "megapose", "dope", "isaac".
         out: the file, or the folder.
-        found: what `detect` found in it; detected if None.
+        found: what `detect` found in it, at the tolerance and with all else that it was asked; if None it is detected
+            as `detect` does unasked.
         number: of the object in `models_info.json`; if None that of the name of the file, 7 of obj_000007.ply, or 1.
         scale: millimetres in one unit of the object.
         improper: npz: whether mirrors and the like belong to the matrices.
@@ -138,7 +140,8 @@ def export(
         What was written, and notes on what the format cannot express.
 
     Raises:
-        InputError: another format, nothing decided, what was found in another object, or files that cannot be written.
+        InputError: another format, an option that it has no use for, nothing decided, what was found in another object,
+            or files that cannot be written.
     """
     from symrefine.export.packages import package_of, write_package
 
