@@ -172,6 +172,20 @@ ASKED = {
     "a factor": (lambda: symrefine.align(POINTS, POINTS, scale=2.0), "scale is 2.0; expected True or False"),
     "a count": (lambda: symrefine.align(POINTS, POINTS, polish=2), "polish is 2; expected True or False"),
     "one tolerance": (lambda: symrefine.detect(POINTS, ladder=0.1), "ladder is 0.1; expected several tolerances"),
+    "a text for no operations": (
+        lambda: symrefine.detect(POINTS).operations(improper="no"),
+        "improper is 'no'; expected True or False",
+    ),
+    "half a turn": (lambda: symrefine.detect(POINTS).operations(steps=2.5), "steps is 2.5; expected a whole number"),
+    "a text for no picture": (lambda: symrefine.load("x.png", invert="no"), "invert is 'no'; expected True or False"),
+    "a text for no images": (lambda: symrefine.load("x.obj", texture="no"), "texture is 'no'; expected True or False"),
+    "labels for their name": (
+        lambda: symrefine.load("x.ply", labels=[1, 2]),
+        "labels: is of type list; expected",
+    ),
+    "a camera in words": (lambda: symrefine.load_depth("x.png", "wide"), "intrinsics are not numbers"),
+    "a camera matrix": (lambda: symrefine.load_depth("x.png", np.eye(3)), r"expected fx, fy, cx, cy in pixels"),
+    "a scale in words": (lambda: symrefine.load_depth("x.png", (1, 1, 0, 0), depth_scale="mm"), "depth_scale is 'mm'"),
     "a letter": (lambda: symrefine.export(POINTS, "bop", "x.json", number="a"), "number is 'a'; expected a whole"),
     "turns for bop": (lambda: symrefine.export(POINTS, "bop", "x.json", steps=3), "steps does not apply to 'bop'"),
     "a transform for npz": (

@@ -1,12 +1,12 @@
 """What may be asked: tolerances, seeds, and what was found before."""
 
 from collections.abc import Iterable
-from operator import index
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symrefine.errors import InputError
+from symrefine.options import whole_of
 from symrefine.rounding import SINGLE
 
 if TYPE_CHECKING:
@@ -29,21 +29,6 @@ def seed_of(seed: Any) -> int:
     return whole_of("seed", seed)
 
 
-def whole_of(name: str, value: Any, *, least: int = 0) -> int:
-    """A number without fraction, of any type that is one.
-
-    Raises:
-        InputError: another value, or a smaller number; it is called by its name.
-    """
-    try:
-        whole = index(value)
-    except TypeError:
-        whole = least - 1
-    if whole < least:
-        raise InputError(f"{name} is {value!r}; expected a whole number from {least}")
-    return whole
-
-
 def ladder_of(tolerances: Any) -> tuple[float, ...]:
     """Several tolerances, each of which is checked where it is used.
 
@@ -53,17 +38,6 @@ def ladder_of(tolerances: Any) -> tuple[float, ...]:
     if isinstance(tolerances, str) or not isinstance(tolerances, Iterable):
         raise InputError(f"ladder is {tolerances!r}; expected several tolerances, such as [0.01, 0.02]")
     return tuple(tolerances)
-
-
-def flag_of(name: str, value: Any) -> bool:
-    """Yes or no, as Python or numpy says it; a text or a number may mean either.
-
-    Raises:
-        InputError: another value; it is called by its name.
-    """
-    if not isinstance(value, bool | np.bool_):
-        raise InputError(f"{name} is {value!r}; expected True or False")
-    return bool(value)
 
 
 def in_space(found: Any) -> "Detection":

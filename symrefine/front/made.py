@@ -8,10 +8,11 @@ from numpy.typing import ArrayLike
 from symrefine.clock import Clock
 from symrefine.errors import InputError
 from symrefine.files import path_of
-from symrefine.front.asked import flag_of, found_in, in_space, seed_of, told, whole_of
+from symrefine.front.asked import found_in, in_space, seed_of, told
 from symrefine.front.verbs import detect_in_space
 from symrefine.lengths import relative_tolerance
 from symrefine.load.objects import shape_of
+from symrefine.options import flag_of, whole_of
 from symrefine.surface.misses import TOLERANCE
 
 # Each verb imports what it needs when it is used.

@@ -10,6 +10,7 @@ from symrefine.files import Writer
 from symrefine.front.answers import Found, Operations, Options
 from symrefine.geometry import Array
 from symrefine.groups import PointGroup
+from symrefine.options import flag_of, whole_of
 from symrefine.shape import Shape
 
 
@@ -50,12 +51,13 @@ class Detection(Found, BareDetection):
             steps: turns that stand for a continuous axis, 72 if None; a sphere is given as an icosahedron.
 
         Raises:
-            InputError: nothing is decided.
+            InputError: nothing is decided; options that are no yes or no, or no number of turns.
         """
         from symrefine.export.operations import STEPS, motions
 
+        turns = STEPS if steps is None else whole_of("steps", steps, least=1)
         group, center = self.placed()
-        return Operations.of(motions(group, center, improper=improper, steps=STEPS if steps is None else steps))
+        return Operations.of(motions(group, center, improper=flag_of("improper", improper), steps=turns))
 
     def canonical_transform(self) -> Array:
         """[4, 4] from the input to its canonical pose: the centre at 0, the main axis along z.

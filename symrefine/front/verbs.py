@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 from symrefine.errors import InputError
 from symrefine.files import path_of
 from symrefine.front.answers import Found, check_kind
-from symrefine.front.asked import flag_of, ladder_of, seed_of, told
+from symrefine.front.asked import ladder_of, seed_of, told
 from symrefine.lengths import relative_tolerance
 from symrefine.load.objects import objects_of, shape_of, stream_of
+from symrefine.options import flag_of
 from symrefine.shape import Shape
 from symrefine.stream import Stream
 from symrefine.surface.misses import TOLERANCE

@@ -46,6 +46,7 @@ from symrefine.load.stream import stream, stream_if_large
 from symrefine.load.tables import read_npy, read_npz, read_table, read_xyz
 from symrefine.load.threemf import read_3mf
 from symrefine.load.volume_files import read_mrc, read_nifti, read_nrrd
+from symrefine.options import flag_of
 from symrefine.shape import Shape
 
 __all__ = [
@@ -236,8 +237,13 @@ def _wanted(
         raise InputError(f"measure is {measure!r}; expected 'surface', 'solid' or None")
     if threshold not in (None, "otsu") and not (isinstance(threshold, int | float) and 0.0 < threshold < 1.0):
         raise InputError(f"threshold is {threshold}; expected a grey value between 0 (black) and 1 (white), or 'otsu'")
+    said: dict[str, Any] = {"labels": labels, "weights": weights}
+    for option, name in said.items():
+        if not isinstance(name, str | None):
+            raise InputError(f"{option}: is of type {type(name).__name__}; expected a name that the file has")
     named = [name for name in (labels, weights) if name is not None]
-    return Wanted(fields=named, measure=measure, threshold=threshold, invert=invert, texture=texture)
+    flags = {"invert": flag_of("invert", invert), "texture": flag_of("texture", texture)}
+    return Wanted(fields=named, measure=measure, threshold=threshold, **flags)
 
 
 def _contents(file: Path, wanted: Wanted, *, is_chosen: bool = False) -> Frames[Content]:

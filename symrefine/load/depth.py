@@ -8,15 +8,17 @@ A pixel of depth 0, or one of floating point that is not finite, measured nothin
 import io
 import math
 from collections.abc import Sequence
+from numbers import Real
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.errors import InputError, about
 from symrefine.files import file_bytes, path_of
-from symrefine.geometry import Array
+from symrefine.geometry import Array, numbers
 from symrefine.load.content import Content, check_distinct
 from symrefine.load.image import FORMATS, open_image
 from symrefine.load.tables import read_array
@@ -48,8 +50,7 @@ def load_depth(
         InputError: what is no depth image or no mask of its size; depths below 0; fewer than two distinct points.
     """
     fx, fy, cx, cy = _checked(intrinsics)
-    if depth_scale is not None and not 0.0 < depth_scale < math.inf:
-        raise InputError(f"depth_scale is {depth_scale}; expected a number above 0")
+    _check_scale(depth_scale)
     file = path_of(path)
     with about(str(path)):
         depth = _depth(file)
@@ -75,10 +76,15 @@ def load_depth(
 
 
 def _checked(intrinsics: Sequence[float]) -> tuple[float, ...]:
-    values = tuple(float(v) for v in intrinsics)
-    if len(values) != 4 or not all(math.isfinite(v) for v in values) or min(values[:2]) <= 0.0:
-        raise InputError(f"intrinsics are {list(values)}; expected fx, fy, cx, cy in pixels, fx and fy above 0")
-    return values
+    values = numbers(intrinsics, "intrinsics")
+    if values.shape != (4,) or not np.isfinite(values).all() or values[:2].min() <= 0.0:
+        raise InputError(f"intrinsics are {values.tolist()}; expected fx, fy, cx, cy in pixels, fx and fy above 0")
+    return tuple(values.tolist())
+
+
+def _check_scale(scale: Any) -> None:
+    if scale is not None and not (isinstance(scale, Real) and 0.0 < float(scale) < math.inf):
+        raise InputError(f"depth_scale is {scale!r}; expected a number above 0")
 
 
 def _depth(file: Path) -> Array:
