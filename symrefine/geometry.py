@@ -117,6 +117,14 @@ def positive(direction: Array) -> Array:
     return toward_positive(direction) * direction + 0.0  # no -0.0
 
 
+def _vector(values: ArrayLike, name: str) -> Array:
+    """A row of numbers [n]."""
+    vector = numbers(values, f"components of {name}")
+    if vector.ndim != 1:
+        raise InputError(f"{name} has shape {list(vector.shape)}; expected [n]")
+    return vector
+
+
 def _length(vector: ArrayLike, name: str) -> float:
     """Length of a vector that is to be a direction."""
     length = float(np.linalg.norm(vector))
@@ -132,16 +140,19 @@ class Plane:
     The sign of the pair is arbitrary.
 
     Raises:
-        InputError: a normal that is zero or not finite.
+        InputError: a normal that is zero, not finite or no row of numbers; an offset that is no finite number.
     """
 
     normal: Array
     offset: float
 
     def __post_init__(self) -> None:
-        length = _length(self.normal, "normal")
-        object.__setattr__(self, "normal", read_only(unit(self.normal)))
-        object.__setattr__(self, "offset", float(self.offset) / length)
+        normal, offset = _vector(self.normal, "normal"), numbers(self.offset, "offset")
+        if offset.ndim or not np.isfinite(offset):
+            raise InputError(f"offset is {offset.tolist()}; expected a finite number")
+        length = _length(normal, "normal")
+        object.__setattr__(self, "normal", read_only(unit(normal)))
+        object.__setattr__(self, "offset", float(offset) / length)
 
     def signed_distance(self, points: Array) -> Array:
         """Signed distances [N] of points [N, n]."""
@@ -157,16 +168,19 @@ class Axis:
     """Line through `point` along the unit `direction`, the sign of the direction being arbitrary.
 
     Raises:
-        InputError: a direction that is zero or not finite.
+        InputError: a direction that is zero or not finite, a point that is not finite, no rows of as many numbers.
     """
 
     point: Array
     direction: Array
 
     def __post_init__(self) -> None:
-        _length(self.direction, "direction")
-        object.__setattr__(self, "point", read_only(self.point))
-        object.__setattr__(self, "direction", read_only(unit(self.direction)))
+        point, direction = _vector(self.point, "point"), _vector(self.direction, "direction")
+        _length(direction, "direction")
+        if point.shape != direction.shape or not np.isfinite(point).all():
+            raise InputError(f"point is {point.tolist()}; expected {len(direction)} finite numbers")
+        object.__setattr__(self, "point", read_only(point))
+        object.__setattr__(self, "direction", read_only(unit(direction)))
 
 
 def householder(normal: ArrayLike) -> Array:

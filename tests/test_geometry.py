@@ -144,6 +144,24 @@ def test_a_direction_must_point_somewhere(make, vector):
         make(vector)
 
 
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Plane(normal=[0, 0, 1], offset=np.nan), "offset is nan; expected a finite number"),
+        (lambda: Plane(normal=[0, 0, 1], offset=[1, 2]), r"offset is \[1.0, 2.0\]; expected a finite number"),
+        (lambda: Plane(normal=[0, 0, 1], offset="far"), "offset are not numbers"),
+        (lambda: Plane(normal="up", offset=1), "components of normal are not numbers"),
+        (lambda: Plane(normal=np.eye(3), offset=1), r"normal has shape \[3, 3\]; expected \[n\]"),
+        (lambda: Axis(point=[0, 0, np.inf], direction=[0, 0, 1]), r"point is \[0.0, 0.0, inf\]; expected 3 finite"),
+        (lambda: Axis(point=[0, 0], direction=[0, 0, 1]), r"point is \[0.0, 0.0\]; expected 3 finite numbers"),
+        (lambda: Axis(point=None, direction=[0, 0, 1]), "components of point are not numbers"),
+    ],
+)
+def test_planes_and_axes_are_made_of_finite_numbers(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
+
+
 def test_the_sign_of_a_normal_does_not_matter():
     n, x = unit([1.0, 2.0, -1.0]), vectors(1, 9, 3)
     a, b = Plane(normal=n, offset=0.7), Plane(normal=-n, offset=-0.7)

@@ -103,6 +103,17 @@ def test_bad_names_list_what_is_valid_in_one_line(name):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("name", [None, [], ["C4v"], 4])
+def test_what_is_no_name_is_refused(name):
+    with pytest.raises(InputError, match="is not a point group; use C1"):
+        point_group(name)
+
+
+def test_frame_must_be_of_numbers():
+    with pytest.raises(InputError, match="components of the frame of C2 are not numbers"):
+        point_group("C2", "z")
+
+
 @pytest.mark.parametrize("frame", [np.eye(2), -np.eye(3), 2.0 * np.eye(3), np.full((3, 3), np.nan)])
 def test_frame_must_be_a_rotation(frame):
     with pytest.raises(InputError, match="rotation matrix"):

@@ -8,12 +8,13 @@ group acts on the object as `F' G F`.
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.errors import InputError
-from symrefine.geometry import Array, frame_with_z, orthogonal_factor, read_only, unit
+from symrefine.geometry import Array, frame_with_z, numbers, orthogonal_factor, read_only, unit
 from symrefine.groups.names import Symbol, parse
 from symrefine.groups.orthogonal import (
     about_z,
@@ -41,8 +42,8 @@ class PointGroup:
     frame: Array = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "name", parse(self.name).name)
-        frame = np.asarray(self.frame, dtype=np.float64)
+        object.__setattr__(self, "name", parse(str(self.name)).name)
+        frame = numbers(self.frame, f"components of the frame of {self.name}")
         nearest = orthogonal_factor(frame) if frame.shape == (3, 3) and np.isfinite(frame).all() else np.zeros((3, 3))
         if np.linalg.det(nearest) <= 0.0 or np.abs(nearest - frame).max() > SINGLE:
             raise InputError(f"the frame of {self.name} must be a rotation matrix [3, 3], determinant +1")
@@ -211,7 +212,8 @@ def point_group(name: str, frame: ArrayLike | None = None) -> PointGroup:
     Raises:
         InputError: no such group, or the frame is no rotation.
     """
-    return PointGroup(name=name, frame=np.eye(3) if frame is None else np.asarray(frame, dtype=np.float64))
+    placed: Any = np.eye(3) if frame is None else frame
+    return PointGroup(name=name, frame=placed)
 
 
 def is_subgroup(a: PointGroup, b: PointGroup, tolerance_rad: float = SINGLE) -> bool:
