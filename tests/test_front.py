@@ -15,7 +15,9 @@ from matplotlib import pyplot as plt
 
 import symrefine
 from symrefine.errors import InputError
+from symrefine.load import Frames
 from symrefine.load.open3d import open3d
+from symrefine.shape import Shape
 
 mpl.use("Agg")
 jsonschema = pytest.importorskip("jsonschema")
@@ -110,6 +112,9 @@ def test_a_path_is_read_like_the_object_in_it(tmp_path):
 
 WRONG = {
     "an object": (object(), "array: is of type object; expected a path"),
+    "several paths": (["a.ply", "b.ply"], "array: holds several objects; give one of them at a time"),
+    "several arrays": ([POINTS, POINTS[::-1]], "array: holds several objects"),
+    "frames": (Frames("models", 2, lambda _: Shape(POINTS)), "array: holds several objects"),
     "an empty list": ([], "array: is an empty list; expected a path"),
     "an empty name": ("", "the name of the file is empty"),
     "nothing": (None, "is of type NoneType"),
@@ -192,6 +197,7 @@ ASKED = {
         lambda: symrefine.export(POINTS, "npz", "x.npz", transform="t.json"),
         "transform does not apply to 'npz'; it is for 'canonical'",
     ),
+    "points in words": (lambda: symrefine.align(POINTS, POINTS).apply("here"), "points are not numbers"),
     "points of the plane": (
         lambda: symrefine.align(POINTS, POINTS).apply(POINTS[:, :2]),
         r"points have shape \(\d+, 2\); expected \[N, 3\]",

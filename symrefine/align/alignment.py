@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from symrefine.align.coset import Coset
 from symrefine.decide.posterior import Link, meant
 from symrefine.errors import InputError
-from symrefine.geometry import Array, ReadOnly
+from symrefine.geometry import Array, ReadOnly, numbers
 from symrefine.threads import one_thread
 
 OK = "ok"
@@ -101,9 +101,9 @@ class Alignment(ReadOnly):
         """Points [N, n] of the source, in the pose of the target.
 
         Raises:
-            InputError: another number of coordinates.
+            InputError: another number of coordinates, or no numbers.
         """
-        given, dim = np.asarray(points, dtype=np.float64), len(self.matrix)
+        given, dim = numbers(points, "points"), len(self.matrix)
         if given.shape[-1:] != (dim,):
             raise InputError(f"points have shape {given.shape}; expected [N, {dim}]")
         return np.asarray(self.scale * (given @ self.matrix.T) + self.translation)

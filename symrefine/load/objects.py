@@ -72,6 +72,8 @@ def shape_of(
         if content.labels is not None:
             bare = replace(bare, unit="A", elements=True)
         return _completed(bare, told)
+    if objects_of(given) is not None:
+        raise InputError(f"{name}: holds several objects; give one of them at a time")
     points = _array(given, name)
     with about(name):
         _check_size(points)
