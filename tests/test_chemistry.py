@@ -456,7 +456,8 @@ def test_frames_of_one_file_are_aligned(tmp_path: Path, capsys: pytest.CaptureFi
     out = capsys.readouterr().out
     assert all(f"a.xyz#{k}" in out for k in (0, 1))
     assert invoke(["align", str(path), str(path)]) == 2
-    assert f"{path}: holds 2 frames; choose one with frame" in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert err == f"symrefine: {path}: holds 2 frames; choose one with --source-frame, from 0 to 1\n"
 
 
 def test_load_frames_makes_what_is_asked_for(tmp_path: Path) -> None:

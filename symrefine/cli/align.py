@@ -72,15 +72,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Align, write the files that were asked for, print."""
-    from symrefine.load import load
-
     paths = expanded(args.target)
     _check(args, paths)
     clock = Clock()
     with counting("aligning", len(paths)) as doing:
         with clock("load"):
-            read = partial(load, measure=args.measure, labels=args.labels, frame=args.source_frame)
-            source = loaded(args.source, args.format if args.source == STDIN else None, read)
+            source = loaded(args.source, args.format if args.source == STDIN else None, partial(_source, args=args))
         given = chain.from_iterable(
             objects([path], args.format if path == STDIN else None, partial(_targets, args=args)) for path in paths
         )
@@ -118,17 +115,30 @@ def _check(args: argparse.Namespace, paths: Sequence[str]) -> None:
         check_alone(shown(args), f"B names {len(paths)}", "call `align` for each")
 
 
-def _targets(path: str, args: argparse.Namespace) -> "Frames[Shape]":
-    """The objects in a file: all, or the one that is chosen."""
-    from symrefine.load import Frames, load, load_frames
+def _source(path: str, args: argparse.Namespace) -> "Shape":
+    """The object in a file that is moved."""
+    found = _objects(path, args, args.source_frame)
+    if (last := len(found) - 1) > 0:
+        raise InputError(f"{path}: holds {last + 1} {found.what}; choose one with --source-frame, from 0 to {last}")
+    return found[0]
 
-    if args.target_frame is not None:
-        one = partial(load, path, measure=args.measure, labels=args.labels, frame=args.target_frame)
-        return Frames("objects", 1, lambda _: one())
-    found = load_frames(path, measure=args.measure, labels=args.labels)
+
+def _targets(path: str, args: argparse.Namespace) -> "Frames[Shape]":
+    """The objects in a file that it is moved onto."""
+    found = _objects(path, args, args.target_frame)
     if len(found) > FRAMES:
         raise InputError(f"{path}: holds {len(found)} {found.what}, more than {FRAMES}; choose one with --target-frame")
     return found
+
+
+def _objects(path: str, args: argparse.Namespace, frame: int | None) -> "Frames[Shape]":
+    """The objects in a file: all, or the one that is chosen."""
+    from symrefine.load import Frames, load, load_frames
+
+    if frame is None:
+        return load_frames(path, measure=args.measure, labels=args.labels)
+    one = partial(load, path, measure=args.measure, labels=args.labels, frame=frame)
+    return Frames("objects", 1, lambda _: one())
 
 
 def _aligned(
