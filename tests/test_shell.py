@@ -201,7 +201,8 @@ def test_stdin_is_a_file_like_any_other(run: Run, folder: Path, monkeypatch: pyt
         assert (status, err) == (0, "")
         assert json.loads(out) | {"timings": 0} == one | {"timings": 0, "source": "stdin"}
     give(monkeypatch, (folder / "box.xyz").read_bytes())
-    assert run("export", "-", "--format", "xyz", "--to", "bop", "--out", "m.json")[0] == 0
+    status, out, _ = run("export", "-", "--format", "xyz", "--to", "bop", "--out", "m.json")
+    assert (status, out.splitlines()[0]) == (0, "stdin: D2h")
     assert len(json.loads((folder / "m.json").read_text())["1"]["symmetries_discrete"]) == 3
 
 

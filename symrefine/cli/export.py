@@ -76,14 +76,14 @@ def run(args: argparse.Namespace) -> int:
         shape = detection.own(shape)
         package = package_of(args.to, Path(args.out), detection, shape, **_options(args))
         write_package(package, args.to, Path(args.out))
-    tell(None, {}, [f"{args.path}: {detection.point_group}"], map(str, package.files))
+    tell(None, {}, [f"{shape.source}: {detection.point_group}"], map(str, package.files))
     for text in package.notes:
         note(text)
     if "scale" in TAKES[args.to]:
         from symrefine.export.bop import diameter, metres_doubt
 
         size = (args.scale or 1.0) * diameter(shape.points)
-        if doubt := metres_doubt(args.path, size, "--scale", args.scale):
+        if doubt := metres_doubt(shape.source, size, "--scale", args.scale):
             note(doubt)
     return 0
 
