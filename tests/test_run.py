@@ -107,6 +107,7 @@ def test_what_there_is_to_run_is_listed(config: Path, capsys: pytest.CaptureFixt
         ([], "CONFIG.yaml is missing; `symrefine run --list` names"),
         (["thirds.yaml", "--set", "tabels=1"], "did you mean tables?"),
         (["none.yaml"], "none.yaml: no such config file"),
+        (["."], ".: is a directory; expected a config (`symrefine run --list .` names those in it)"),
         (["thirds.yaml", "--set", "sweep.sede=1"], "--set sweep.sede=1: sweep.sede: wait_and_divide has no field"),
         (["thirds.yaml", "--set", "fixed.wait=no"], "--set fixed.wait=no: fixed.wait: expected float, got 'no'"),
         (["thirds.yaml", "--workers", "0"], "--workers: '0' is not an integer from 1"),

@@ -52,6 +52,8 @@ def make_plan(path: Path, settings: Sequence[str] = (), *, quick: bool = False) 
     Raises:
         InputError: whatever is wrong, with file, line and key path.
     """
+    if path.is_dir():
+        raise InputError(f"{path}: is a directory; expected a config (`symrefine run --list {path}` names those in it)")
     if not path.is_file():
         raise InputError(f"{path}: no such config file; {_elsewhere(path)}")
     root = read_document(path)
