@@ -212,6 +212,7 @@ def test_the_tolerance_of_the_command_line_is_that_of_detect() -> None:
         ("align nothing.ply box.ply scalene.ply", "nothing.ply: no such file"),
         ("align box.ply *.nothing", "no file matches this pattern"),
         ("detect nothing.ply", "nothing.ply: no such file"),
+        ("detect nothing", "nothing: no such file"),
         ("detect .", "is a directory"),
         ("detect box.json", "unknown suffix"),
         ("detect cut.ply", "cut.ply"),

@@ -604,9 +604,14 @@ def test_text_ply_is_refused_wherever_it_is_cut(tmp_path: Path) -> None:
 
 
 def test_paths_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for path, part in [("none.ply", "no such file"), (".", "is a directory; expected a file")]:
+    for path, part in [
+        ("none.ply", "no such file"),
+        ("none", "no such file"),
+        (".", "is a directory; expected a file"),
+    ]:
         with pytest.raises(InputError, match=part):
             load(tmp_path / path)
+    (tmp_path / "a.tar").touch()
     with pytest.raises(InputError) as caught:
         load(str(tmp_path / "a.tar"))
     assert f"unknown suffix '.tar'; known are {' '.join(READERS)}, and images " in str(caught.value)

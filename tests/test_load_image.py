@@ -248,5 +248,6 @@ def test_options_go_with_their_kind_of_file(tmp_path: Path) -> None:
     (tmp_path / "b.png").mkdir()
     with pytest.raises(InputError, match="is a directory"):
         load(tmp_path / "b.png")
+    (tmp_path / "a.gif").touch()
     with pytest.raises(InputError, match=r"and images \.bmp \.jpeg \.jpg \.png, and \.gz of each$"):
         load(tmp_path / "a.gif")

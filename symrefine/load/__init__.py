@@ -256,6 +256,8 @@ def _contents(file: Path, wanted: Wanted, *, is_chosen: bool = False) -> Frames[
         raise InputError(f"is no name of a file: {reason}") from None
     if is_folder:
         raise InputError("is a directory; expected a file")
+    if suffix not in _FORMATS and not file.exists():
+        raise InputError("no such file")
     if suffix not in _FORMATS:
         images = " ".join(sorted(IMAGES))
         raise InputError(
