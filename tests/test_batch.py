@@ -413,6 +413,7 @@ def test_sizes_and_shards_are_read() -> None:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
+        ("batch --manifest m.csv --recursive", "--recursive: is for directories, and a manifest names files"),
         ("batch objects --shard 0/3", "'0/3' is not a shard I/N"),
         ("batch objects --shard 4/3", "'4/3' is not a shard I/N"),
         ("batch objects --memory-limit 0", "'0' is not a size of memory"),

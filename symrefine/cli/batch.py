@@ -165,6 +165,8 @@ def _sources(args: argparse.Namespace) -> list["Source"]:
         args.parser.error("expected PATH, or --manifest FILE.csv, and not both")
     if args.manifest is None:
         return sources(args.path, recursive=args.recursive)
+    if args.recursive:
+        args.parser.error("--recursive: is for directories, and a manifest names files; leave it out")
     return manifest(Path(args.manifest))
 
 
