@@ -18,7 +18,7 @@ from symrefine.surface.tree import Tree
 from symrefine.threads import one_thread
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Completion:
     """A scan with what its symmetry says of the parts that nobody saw.
 

@@ -161,7 +161,7 @@ def sharpness(noise: T, steepness: float) -> T:
     return steepness / (1.0 + noise**2)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Alternative:
     """Another group that the object may have been meant to have.
 

@@ -18,7 +18,7 @@ from symrefine.surface.misses import Deviation
 from symrefine.surface.surface import Coverage, Surface
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class FoundPlane:
     """A mirror plane in input units: its miss as fractions of the diagonal, and the probability that it is meant.
 
@@ -35,7 +35,7 @@ class FoundPlane:
     coverage: Coverage
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class FoundAxis:
     """A rotation axis (or rotoreflection, if `improper`) in input units; `order` is `math.inf` for revolution.
 
@@ -53,7 +53,7 @@ class FoundAxis:
     coverage: Coverage
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Step:
     """The answer at one tolerance: the group as a function of the tolerance is a staircase."""
 
@@ -62,7 +62,7 @@ class Step:
     undetermined: bool
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class NearMiss:
     """A candidate that was refined and turned down, with what it misses by, for a person to judge."""
 
@@ -74,7 +74,7 @@ class NearMiss:
     excess: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Candidate:
     """A group that moments or votes proposed, where a glance or a coarse fit left it, in input units.
 
@@ -87,7 +87,7 @@ class Candidate:
     excess: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Exact:
     """That the group maps the vertices of a mesh onto one another: planes, axes and centre are those of the vertices.
 
@@ -102,7 +102,7 @@ class Exact:
     point_group: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Verified:
     """What all points say, which were moved one by one, with whatever noise they have.
 
@@ -117,7 +117,7 @@ class Verified:
     beyond: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Detection(ReadOnly):
     """Everything `detect` found, in the frame and units of the input.
 

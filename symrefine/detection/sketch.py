@@ -28,7 +28,7 @@ MANY, SAMPLE = 100_000, 50_000
 BEYOND = 1.5
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Sample:
     """How many points, drawn at random, stand for the surface of a cloud, and of how many."""
 

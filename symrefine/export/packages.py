@@ -23,7 +23,7 @@ from symrefine.units import check_scale
 SCHEMA = "symrefine.canonical/1"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Package:
     """Contents by path, all to be written or none, and notes for people, a sentence each."""
 

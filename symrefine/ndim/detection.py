@@ -44,7 +44,7 @@ class Hyperplane:
     miss: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class SubspaceDetection(ReadOnly):
     """What `detect_nd` found.
 

@@ -54,7 +54,7 @@ class PlanarNearMiss:
     excess: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PlanarDetection(ReadOnly):
     """Everything `detect_planar` found, in the frame and units of the input.
 

@@ -19,7 +19,7 @@ from symrefine.poses.minimax import least_depth, least_largest
 from symrefine.poses.symmetry import Symmetry
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PoseDistance:
     """How far poses are apart modulo a symmetry: arrays [...] of the shape of the pairs, [] of a single pair.
 

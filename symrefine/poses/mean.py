@@ -18,7 +18,7 @@ from symrefine.rounding import DOUBLE, SINGLE
 _STARTS = 16
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class MeanPose(ReadOnly):
     """The mean of poses modulo a symmetry.
 

@@ -41,7 +41,7 @@ DISCS = 4
 HALVES_OF_VOLUME = 2.0 ** (1.0 / 3.0)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Deviation:
     """Distribution of the distance between a surface and its image, in fractions of the bounding-box diagonal."""
 

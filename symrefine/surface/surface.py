@@ -35,7 +35,7 @@ PATCHES = 1500
 HOPELESS = 3.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Coverage:
     """Shares of a surface that operations carry onto itself (of what moves), where it says no, where nobody looked.
 

@@ -45,7 +45,7 @@ _GENERIC = (0.8123, 0.2877, 0.5072)
 Method = Literal["vertices", "orbits", "surface"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Symmetrized(ReadOnly):
     """A shape made symmetric.
 
