@@ -472,6 +472,19 @@ def test_what_has_no_fold_has_none_by_chance(name):
     assert not by_chance(surface, replace(upright(name), center=center))
 
 
+@pytest.mark.parametrize("on_axis", [2, 3, 4])
+def test_points_on_an_axis_say_nothing_against_its_fold(on_axis):
+    """As of formaldehyde or ketene, off by a thousandth: half of the atoms and more no turn moves."""
+    rng = np.random.default_rng(on_axis)
+    row = [[0.0, 0.0, 1.25 * k] for k in range(on_axis)]
+    atoms = np.array([*row, [0.0, 0.94, -0.56], [0.0, -0.94, -0.56]])
+    for _ in range(4):
+        points = (atoms + 0.004 * rng.standard_normal(atoms.shape)) @ random_orthogonal(rng).T
+        found = detect(Shape(points=points, labels=np.array([*range(on_axis), 9, 9])), ladder=(0.0025, 0.08))
+        assert found.point_group == "C2v"
+        assert found.confidence > 0.95
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_something_round_has_no_fold_that_nothing_in_it_has(seed):
     """Noise hides the four holes of a flange from many mirrors, any two of which make some fold."""

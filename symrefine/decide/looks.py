@@ -17,6 +17,7 @@ from symrefine.geometry import Array, Isometry, rotation
 from symrefine.groups.names import far_steps
 from symrefine.propose.candidates import START_ERROR
 from symrefine.propose.votes import AGREE_RAD
+from symrefine.rounding import DOUBLE
 from symrefine.samples import COUNT, GLANCE, LOOK
 from symrefine.surface.misses import LIMITS, RIM, SURE
 from symrefine.surface.surface import Surface
@@ -204,7 +205,8 @@ def by_chance(surface: Surface, placed: Placed) -> bool:
     """Whether a fold is none of the object: turns by parts of it more are met as well, for all that a sample tells.
 
     What is round but for something small is forgiven as it moves, by any turn: folds that miss it by less than all
-    turns do are many, and say nothing. All turns go far, as noise that moves by little meets itself.
+    turns do are many, and say nothing. All turns go far, as noise that moves by little meets itself; what lies by the
+    axis does not, and counts by how far aside it lies.
     """
     fold = placed.group.symbol.fold
     if not 1 < fold < math.inf:
@@ -216,7 +218,11 @@ def by_chance(surface: Surface, placed: Placed) -> bool:
     for sources in (LOOK, COUNT):
         misses = np.nan_to_num(surface.seen(surface.misses(motions, sources=sources), motions, sources=sources))
         better = misses[len(steps) :].mean(axis=0) - misses[: len(steps)].mean(axis=0)
-        if better.mean() > SURE * better.std() / math.sqrt(better.size):
+        points = surface.cloud.points[:: surface.stride(sources)] - placed.center
+        aside = np.linalg.norm(np.cross(points, placed.group.frame[2]), axis=1)
+        aside /= max(aside.sum(), DOUBLE)
+        mean = aside @ better
+        if mean > SURE * math.sqrt(aside**2 @ (better - mean) ** 2):
             return False
     return True
 
