@@ -29,7 +29,7 @@ from symrefine.surface.openings import NEIGHBOURS, openings
 from symrefine.surface.sampling import sampling
 from symrefine.surface.skin import FEW, LocalPlanes, Skin, drawn, isolated_points, make_skin
 from symrefine.surface.surface import Surface
-from symrefine.surface.tree import Tree, side_by_side
+from symrefine.surface.tree import Tree, morton_order
 
 Outliers = Literal["auto", "floor", "none"]
 # Order of the moments.
@@ -339,7 +339,7 @@ def _surface(
 
     pick = drawn(len(local), SAMPLES if exact else PLANES, rng, uneven)
     # Neighbours stand together in memory, and any stride takes an even part of the surface.
-    pick = pick[side_by_side(local[pick])]
+    pick = pick[morton_order(local[pick])]
     near = whole.near(pick, NEIGHBOURS) if len(local) >= NEIGHBOURS else None
     cloud = whole.local_planes(pick, near=near)
     if views:

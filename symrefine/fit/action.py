@@ -3,10 +3,10 @@
 from collections.abc import Iterable
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from symrefine.geometry import Array
 from symrefine.shape import Index
+from symrefine.surface.tree import Tree
 
 
 def mean_back(counterparts: Iterable[Array], operations: Array) -> Array:
@@ -24,7 +24,7 @@ def permutations(points: Array, operations: Array, labels: Index | None, reach: 
     images[0] = np.arange(len(points))
     known, found = [0], []
     for h, table in generators(operations):
-        distance, own = tree.query(np.column_stack([points @ operations[h].T, shifted]))
+        distance, own = tree.nearest(np.column_stack([points @ operations[h].T, shifted]))
         if distance.max() > reach or not (np.bincount(own, minlength=len(points)) == 1).all():
             return None
         found.append((table, own))
@@ -40,23 +40,23 @@ def permutations(points: Array, operations: Array, labels: Index | None, reach: 
     return images
 
 
-def labelled(points: Array, labels: Index | None) -> tuple[cKDTree, Array]:
+def labelled(points: Array, labels: Index | None) -> tuple[Tree, Array]:
     """A kd-tree in which other labels are far away, and the coordinate that makes them so."""
     size = 0.0 if labels is None else 4.0 * float(np.abs(points).max())
     shifted = np.zeros(len(points)) if labels is None else np.unique(labels, return_inverse=True)[1] * size
-    return cKDTree(np.column_stack([points, shifted])), shifted
+    return Tree(np.column_stack([points, shifted])), shifted
 
 
 def generators(operations: Array) -> list[tuple[int, Index]]:
     """Few operations that generate all [K, 3, 3], the identity first: each h with the table of g h for every g."""
-    tree = cKDTree(operations.reshape(len(operations), 9))
+    tree = Tree(operations.reshape(len(operations), 9))
     known = np.zeros(len(operations), dtype=bool)
     known[0] = True
     found: list[tuple[int, Index]] = []
     for h in range(1, len(operations)):
         if known[h]:
             continue
-        found.append((h, tree.query((operations @ operations[h]).reshape(-1, 9))[1]))
+        found.append((h, tree.nearest((operations @ operations[h]).reshape(-1, 9))[1]))
         count = 0
         while count < known.sum():
             count = int(known.sum())

@@ -66,7 +66,7 @@ def permuting_group(points: Array, labels: Index | None, within: float, *, every
         some = np.arange(0, len(points), max(1, len(points) // probes))
         moved = points[some] @ np.swapaxes(operations, 1, 2)
         goal = np.dstack([moved, np.broadcast_to(shifted[some], moved.shape[:2])])
-        operations = operations[(tree.query(goal)[0] <= miss).all(axis=1)]
+        operations = operations[(tree.nearest(goal)[0] <= miss).all(axis=1)]
     if len(operations) > 4 * MAX_FOLD:
         return None
     try:

@@ -3,13 +3,13 @@
 import math
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from symrefine.fit.anchors import PROBES
 from symrefine.geometry import Array, rotation
 from symrefine.groups import MAX_FOLD, TURNS, PointGroup
 from symrefine.rounding import SINGLE
 from symrefine.shape import Index
+from symrefine.surface.tree import Tree
 
 # How near folds that are tried on the rings of a lathed mesh must come, in spacings; a larger fold is taken although it
 # misses by more, up to ALIKE times more, or LAX times where that is next to nothing.
@@ -38,8 +38,8 @@ def _ring_fold(points: Array, axis: Array) -> int:
     off = points[np.linalg.norm(np.cross(points, axis), axis=1) > SINGLE * np.abs(points).max()]
     if len(off) < 3:
         return 0
-    tree = cKDTree(off)
-    near = NEAR * float(np.median(tree.query(off, k=2)[0][:, 1]))
+    tree = Tree(off)
+    near = NEAR * float(np.median(tree.query(off, 1, skip=1)[0]))
     folds = np.arange(3, min(MAX_FOLD, len(off)) + 1)
     # A few probes turn nearly all down: by other folds rings miss by half a spacing.
     for probes in PROBES[1:]:
@@ -53,7 +53,7 @@ def _ring_fold(points: Array, axis: Array) -> int:
     return int(folds[misses <= limit].max())
 
 
-def _misses(points: Array, tree: cKDTree, axis: Array, folds: Index, index: Index) -> Array:
+def _misses(points: Array, tree: Tree, axis: Array, folds: Index, index: Index) -> Array:
     """Median distances [F] from some points, turned by each fold, to others; infinite where most meet themselves."""
     # One step tells a fold from few, many steps tell it from the next one.
     many = [next(m for m in range(round(0.382 * k), 0, -1) if math.gcd(m, k) == 1) for k in folds.tolist()]
@@ -61,7 +61,7 @@ def _misses(points: Array, tree: cKDTree, axis: Array, folds: Index, index: Inde
     along = np.outer(points[index] @ axis, axis)
     across, aside = points[index] - along, np.cross(axis, points[index])
     moved = along + np.cos(angles)[..., None, None] * across + np.sin(angles)[..., None, None] * aside
-    distance, rows = tree.query(moved)
+    distance, rows = tree.nearest(moved)
     stays = (rows == index).mean(axis=2) >= 0.5
     return np.asarray(np.where(stays, np.inf, np.median(distance, axis=2)).max(axis=0))
 

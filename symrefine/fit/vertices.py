@@ -7,7 +7,6 @@ mapped onto triangles as well. The same fit places the group for reports, export
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from symrefine.fit.action import generators, mean_back, permutations
 from symrefine.fit.anchors import LARGEST, permuting_group
@@ -20,6 +19,7 @@ from symrefine.groups.standard import GOLDEN
 from symrefine.rounding import DOUBLE, SINGLE
 from symrefine.samples import GLANCE
 from symrefine.shape import Index, Shape
+from symrefine.surface.tree import Tree
 
 # An exact shape misses the place that detection found by no more than this.
 NEAR = 2e-3
@@ -172,10 +172,10 @@ def _glanced(own: Distinct, place: Placed, within: float) -> Placed | None:
     some = own.points[:: max(1, len(own.points) // GLANCE)]
     if len(some) == len(own.points):
         return place
-    tree = cKDTree(own.points)
+    tree = Tree(own.points)
     for _ in range(MAX_OUTER):
         operations, local = place.group.operations(), some - place.center
-        found = [tree.query(local @ g.T + place.center) for g in operations]
+        found = [tree.nearest(local @ g.T + place.center) for g in operations]
         miss = max(float(distance.max()) for distance, _ in found)
         if miss > NEAR:
             return None

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from symrefine.decide.hypotheses import MOVED
 from symrefine.geometry import Array
@@ -19,6 +18,7 @@ from symrefine.moments.moments import Moments, tensor_index
 from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.samples import LOOK
 from symrefine.surface.misses import LIMITS
+from symrefine.surface.tree import Tree
 
 # Orders of the moments that are asked first, and of those that look closer.
 LOW, HIGH = (2, 3, 4), (5, 6)
@@ -163,13 +163,13 @@ class Neighbours:
         order = rng.permutation(len(points))
         asked = min(LOOK, len(points) // 2)
         self.asked = points[order[:asked]]
-        self.tree = cKDTree(points[order[asked : asked + MOVED]])
-        self.own = self.tree.query(self.asked)[0]
+        self.tree = Tree(points[order[asked : asked + MOVED]])
+        self.own = self.tree.nearest(self.asked)[0]
         self.diameter = diameter
 
     def contradict(self, normal: Array, tolerance: float) -> bool:
         """Whether reflected points lie farther from the others than chance and tolerance explain, in the mean."""
         image = self.asked - 2.0 * np.outer(self.asked @ normal, normal)
-        farther = (self.tree.query(image)[0] - self.own) / self.diameter
+        farther = (self.tree.nearest(image)[0] - self.own) / self.diameter
         error = float(farther.std()) / math.sqrt(len(farther))
         return float(farther.mean()) - SIGNIFICANT * error > LIMITS[0] * tolerance

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from symrefine.geometry import Array, ReadOnly
 from symrefine.samples import COUNT
 from symrefine.shape import Index
+from symrefine.surface.tree import Tree
 
 # Points that make a grid, and the share of their weight that must have a neighbour one step away.
 FEWEST, JOINED = 64, 0.9
@@ -60,12 +60,12 @@ def _upright_step(points: Array) -> Array | None:
 def _turned_step(points: Array) -> Array | None:
     """The step whose direction and length the nearest neighbours agree on."""
     some = points[:: max(1, len(points) // COUNT)]
-    distance, near = cKDTree(points).query(some, k=2)
-    pitch = float(np.median(distance[:, 1]))
-    close = np.abs(distance[:, 1] - pitch) < _OFF * pitch
+    distance, near = (column[:, 0] for column in Tree(points).query(some, 1, skip=1))
+    pitch = float(np.median(distance))
+    close = np.abs(distance - pitch) < _OFF * pitch
     if pitch == 0.0 or close.mean() < JOINED:
         return None
-    apart = (points[near[:, 1]] - some)[close] @ np.array([1.0, 1j])
+    apart = (points[near] - some)[close] @ np.array([1.0, 1j])
     fourfold = complex(np.mean((apart / np.abs(apart)) ** 4))
     if abs(fourfold) < 1.0 - _OFF:
         return None

@@ -7,7 +7,6 @@ were made as one, and its own if they were not. So it is looked for only where s
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from symrefine.geometry import Array, Mask, frame_with_z, tight_diagonal
 from symrefine.rounding import SINGLE
@@ -133,6 +132,8 @@ def _seen_from_above(points: Array, found: Floor, seen_from: Array | None) -> bo
 
 def _reaches_beyond(points: Array, found: Floor) -> bool:
     """Whether more of a floor than a detail lies beside what stands on it, seen along its normal; that is no detail."""
+    from scipy.spatial import ConvexHull, QhullError
+
     # What noise leaves of the floor itself lies no farther above it than once more its thickness.
     others = points[found.above(points) > found.thick]
     if len(others) <= SHARES[0] * len(points):

@@ -68,20 +68,13 @@ class Tree:
         return cKDTree(self.points, leafsize=LEAF, balanced_tree=False, compact_nodes=False)
 
     def nearest(self, queries: Array, *, bound: float = math.inf) -> tuple[Array, Index]:
-        """Distance and index, both [Q], of the point nearest to each query; see `query`."""
-        away, near = self.query(queries, 1, bound=bound)
-        return away[:, 0], near[:, 0]
-
-
-def side_by_side(points: Array) -> Index:
-    """Order [N] of points [N, d] in which neighbours stand together, and any stride takes an even part of them."""
-    from scipy.spatial import cKDTree
-
-    return np.asarray(cKDTree(points, leafsize=LEAF, balanced_tree=False, compact_nodes=False).indices)
+        """Distance and index, both [...], of the point nearest to each of queries [..., d]; see `query`."""
+        away, near = self.query(queries.reshape(-1, queries.shape[-1]), 1, bound=bound)
+        return away.reshape(queries.shape[:-1]), near.reshape(queries.shape[:-1])
 
 
 def morton_order(points: Array) -> Index:
-    """Order [N] of points [N, d] along a Morton curve.
+    """Order [N] of points [N, d] along a Morton curve: neighbours stand together, and any stride takes an even part.
 
     Through as many cells as 15 bits can number, which are sorted faster than anything wider.
     """

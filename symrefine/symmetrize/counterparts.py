@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
-from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from symrefine.fit.action import generators, labelled, mean_back
 from symrefine.geometry import Array, Mask
 from symrefine.shape import Index
+from symrefine.surface.tree import Tree
 
 # More points, or larger groups, than this are left alone: it costs their product for each orbit.
 LARGEST, LARGEST_GROUP = 1500, 240
@@ -49,7 +49,7 @@ def act(points: Array, operations: Array, labels: Index | None, reach: float) ->
     tree, shifted = labelled(points, labels)
     images, miss = np.empty((len(operations), len(points)), dtype=np.intp), np.zeros(len(points))
     for k, g in enumerate(operations):
-        distance, images[k] = tree.query(np.column_stack([points @ g.T, shifted]))
+        distance, images[k] = tree.nearest(np.column_stack([points @ g.T, shifted]))
         miss = np.maximum(miss, distance)
     closed = miss <= reach
     for h, table in generators(operations):
@@ -67,7 +67,7 @@ def with_leftovers(points: Array, operations: Array, action: Action, labels: Ind
         return action
     images, closed, miss = action.images.copy(), action.closed.copy(), action.miss.copy()
     products = (operations[:, None] @ operations[None]).reshape(-1, 9)
-    table = cKDTree(operations.reshape(-1, 9)).query(products)[1].reshape(len(operations), -1)  # of g h
+    table = Tree(operations.reshape(-1, 9)).nearest(products)[1].reshape(len(operations), -1)  # of g h
     while len(free):
         members = free[:1]
         if orbit := _orbit(points, operations, table, free, labels, reach):
