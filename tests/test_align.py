@@ -1,5 +1,6 @@
 """Alignment: exact on the same points, close on other samples, honest about what cannot be known."""
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -356,6 +357,82 @@ def test_a_symmetric_mesh_gets_a_rotation() -> None:
 
 
 # --- what the points do not span, and other dimensions ----------------------------------------------------------------
+
+
+def ring(count: int, radius: float = 1.0, turn: float = 0.0) -> Array:
+    angles = 2.0 * np.pi * np.arange(count) / count + turn
+    return radius * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def products(one: Array, other: Array) -> Array:
+    return np.array([[*p, *q] for p in one for q in other])
+
+
+POLYTOPES = {
+    "a 12-gon": (ring(12), 24),
+    "a star": (np.concatenate([ring(9), ring(9, 0.5, np.pi / 9)]), 18),
+    "two rings askew": (np.concatenate([ring(12), ring(12, 0.8, 0.1)]), 12),
+    "a 24-cell": (np.array([p for p in itertools.product((-1, 0, 1), repeat=4) if np.abs(p).sum() == 2], float), 1152),
+    "a tesseract": (np.array(list(itertools.product((-1, 1), repeat=4)), float), 384),
+    "a duoprism": (products(ring(5), ring(6)), 120),
+}
+
+
+@pytest.mark.parametrize("det", DETERMINANTS)
+@pytest.mark.parametrize(("points", "order"), POLYTOPES.values(), ids=POLYTOPES)
+def test_few_points_of_any_dimension_are_carried_onto_one_another_in_all_ways(
+    points: Array, order: int, det: int
+) -> None:
+    """Low moments leave turns of what has high folds open; the points do not."""
+    rng = rng_of(61, order)
+    matrix = random_orthogonal(rng, points.shape[1], det)
+    found = align(points, rng.permutation(points) @ matrix.T + 3.0)
+    assert (found.status, found.confidence, found.exact, found.overlap) == ("ok", 1.0, True, (1.0, 1.0))
+    assert len(found.equivalents) == order
+    assert min(np.abs(m - matrix).max() for m in found.equivalents) < 1e-9
+    for m, t in zip(found.coset.matrices, found.coset.translations, strict=True):
+        assert cKDTree(points @ matrix.T + 3.0).query(points @ m.T + t)[0].max() < 1e-9
+
+
+@pytest.mark.parametrize("noise", [1e-4, 3e-3])
+@pytest.mark.parametrize("dim", [2, 4])
+def test_few_noisy_points_of_any_dimension_agree(dim: int, noise: float) -> None:
+    """And what is off by more than noise and tolerance allow does not."""
+    rng = rng_of(62, dim)
+    points, matrix = rng.standard_normal((60, dim)), random_orthogonal(rng, dim)
+    target = rng.permutation(points @ matrix.T + noise * rng.standard_normal(points.shape))
+    found = align(points, target)
+    assert found.status == "ok"
+    assert found.confidence > 0.95
+    assert np.abs(found.matrix - matrix).max() < 4.0 * found.sigma_rad < 20.0 * noise
+    np.testing.assert_allclose(align(2.0 * points, target, scale=True).scale, 0.5, atol=3.0 * noise)
+    target[0] += 0.3 * np.ptp(target)
+    assert align(points, target).is_misfit
+
+
+def test_a_label_leaves_of_a_hexagon_what_keeps_it() -> None:
+    points, labels = ring(6), np.array([1, 0, 0, 0, 0, 0])
+    turned_, swapped = points @ random_orthogonal(rng_of(63), 2).T, np.array([1, 0, 1, 0, 0, 0])
+    found = align(Shape(points=points, labels=labels), Shape(points=turned_, labels=labels))
+    assert (found.status, len(found.equivalents)) == ("ok", 2)
+    for m in found.equivalents:
+        np.testing.assert_allclose(m @ points[0], turned_[0], atol=1e-9)
+    assert align(Shape(points=points, labels=labels), Shape(points=turned_, labels=swapped)).is_misfit
+
+
+def test_planar_molecules_that_were_rounded_agree() -> None:
+    """Moments of so few atoms know no noise; the points do."""
+    benzene = np.concatenate([ring(6, 1.39), ring(6, 2.48)])
+    labels = np.repeat([6, 1], 6)
+    rng = rng_of(64)
+    flat = np.column_stack([benzene, np.zeros(12)])
+    found = align(
+        Shape(points=flat, labels=labels),
+        Shape(points=np.round(flat @ rotation([0.0, 0.0, 1.0], rng.uniform(0.0, 6.0)).T, 2), labels=labels),
+    )
+    assert found.status == "ok"
+    assert found.confidence > 0.95
+    assert len(found.equivalents) == 24
 
 
 @pytest.mark.parametrize("det", DETERMINANTS)

@@ -82,13 +82,16 @@ def _in_words(many: str, matrices: Array) -> str:
     return f"up to {many}" + (", and the determinant is free" if signs.min() < 0.0 < signs.max() else "")
 
 
-def coset_of_list(matrices: Array, source_center: Array, target_center: Array, scale: float, free: Array) -> Coset:
-    """The coset where the moments themselves give all the maps that do equally well, about the two centres."""
+def coset_of_list(
+    matrices: Array, source_center: Array, target_center: Array, scale: float, free: Array, *, every: bool
+) -> Coset:
+    """The coset of maps that do equally well, about the two centres; `every` if no others can, in any dimension."""
     dim = matrices.shape[1]
     if len(free):
         observable = f"up to any orthogonal map within {len(free)} of the {dim} dimensions"
     else:
-        observable = _in_words(f"{'' if dim <= 3 else 'at least '}{len(matrices)} maps that do equally well", matrices)
+        least = "" if every or dim <= 3 else "at least "
+        observable = _in_words(f"{least}{len(matrices)} maps that do equally well", matrices)
     return Coset(
         matrices=matrices,
         translations=target_center - scale * (matrices @ source_center),

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from symrefine.align.alignment import Nearness
 from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.shape import Index, Shape
@@ -45,6 +46,16 @@ def nearest_both_ways(
         for points, own in zip((moved, target), labels, strict=True)
     )
     return cKDTree(other).query(one)[0] / size, cKDTree(one).query(other)[0] / size
+
+
+def nearness(
+    source: Shape, target: Shape, matrix: Array, translation: Array, scale: float, tolerance: float
+) -> Nearness:
+    """How near the points of the moved source and of the target come to one another."""
+    moved, labels = scale * (source.points @ matrix.T) + translation, (source.labels, target.labels)
+    there, back = nearest_both_ways(moved, target.points, labels, target.diagonal)
+    shares = float((there <= tolerance).mean()), float((back <= tolerance).mean())
+    return Nearness(rms=float(np.sqrt(np.mean(there**2))), overlap=shares)
 
 
 def _compared(source: Shape, target: Shape) -> tuple[Index, Index]:

@@ -189,3 +189,8 @@ def _jackknife(pair: MomentPair, matrix: Array, directions: Array) -> Array:
     both = pair.action.turned(matrix, pair.source[1:])[0], pair.target[1:]
     along = np.concatenate([deviations(replicates) for replicates in both]) @ directions.T
     return along.T @ along
+
+
+def unlikely(misfit: float) -> float:
+    """What moments differ by, over what sampling explains."""
+    return float(np.sqrt(misfit / MISFIT))

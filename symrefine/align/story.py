@@ -4,7 +4,7 @@ moments of both -> n-tuples -> Procrustes (or the landscape over O(3) where the 
 moments -> rivals judged on the points -> polish on the points -> the coset of maps that do equally well.
 Where neither moments nor surfaces agree as a whole: local planes that look alike -> consensus -> polish -> what each
 map lays on the other side, what contradicts it, and what nobody saw.
-Elsewhere than in 3-space: moments -> n-tuples -> Procrustes -> Gauss-Newton on the moments.
+Elsewhere than in 3-space, and for what spans less of it: `align.elsewhere`.
 """
 
 import math
@@ -13,12 +13,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from symrefine.align.alignment import OK, OPEN, Alignment, Nearness, Verdict
-from symrefine.align.coset import Coset, coset_of_group, coset_of_list, coset_of_maps, lifted
-from symrefine.align.kinds import nearest_both_ways, with_one_set_of_classes
+from symrefine.align.alignment import OK, Alignment, Nearness, Verdict
+from symrefine.align.coset import Coset, coset_of_group, coset_of_maps
+from symrefine.align.elsewhere import align_in_span
+from symrefine.align.kinds import nearness, with_one_set_of_classes
 from symrefine.align.landscape import least_misfit
-from symrefine.align.moment_fit import MISFIT, ROUNDING
-from symrefine.align.pair import Evidence, Side, few
+from symrefine.align.moment_fit import MISFIT, ROUNDING, unlikely
+from symrefine.align.pair import Evidence, few
 from symrefine.align.partial import Meeting, partial_meeting
 from symrefine.align.polish import Polished, Similarity
 from symrefine.align.rivals import Choice, choose, information, polished
@@ -32,9 +33,7 @@ from symrefine.align.sides import (
     size_sigma,
     thinned,
     told_sizes,
-    within,
 )
-from symrefine.align.span import span_fit
 from symrefine.clock import Clock
 from symrefine.decide.maps import SURE
 from symrefine.decide.posterior import Link, certain, meant
@@ -43,8 +42,6 @@ from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, check_tolerance, cross_matrix
 from symrefine.groups import PointGroup
 from symrefine.moments.moments import PARTS
-from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
-from symrefine.plane import detect_planar
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 from symrefine.threads import one_thread
@@ -93,7 +90,7 @@ def align(
             f"{lean.source} spans {min(ranks)} of {a.dim} dimensions, {full.source} {max(ranks)}: nothing maps them"
         )
     if a.dim != 3 or max(ranks) < 3:
-        return _align_moments(sides, scale, allow_reflection, tolerance, clock)
+        return align_in_span(sides, scale, allow_reflection, tolerance, clock)
     evidence = Evidence(
         source=sides[0], target=sides[1], scale=scale or differ_in_size(*sides), tolerance=tolerance, seed=seed
     )
@@ -275,7 +272,7 @@ def _verdict(choice: Choice, motion: Similarity, scale: bool, reflections: bool,
     evidence, status = choice.evidence, _sizes(choice, scale)
     sure = choice.determinant_confidence if reflections else 1.0
     if status != OK or not evidence.has_points:
-        return Verdict(status=status, excess=_unlikely(choice.misfit), determinant_confidence=sure)
+        return Verdict(status=status, excess=unlikely(choice.misfit), determinant_confidence=sure)
     excess = evidence.excess(motion) if excess is None else excess
     if excess > 1.0 and not choice.exact:
         farthest = float(np.quantile(evidence.misses(motion), 0.99))
@@ -302,7 +299,7 @@ def _nearness(choice: Choice, motion: Similarity, scale: bool) -> Nearness:
     if choice.exact or not surfaces:
         matrix, translation, factor = _in_input_units(evidence, motion, scale)
         shapes = evidence.source.shape, evidence.target.shape
-        points = _nearest(*shapes, matrix, translation, factor, evidence.tolerance)
+        points = nearness(*shapes, matrix, translation, factor, evidence.tolerance)
         # The same points; of the same surface either side may have others, too.
         if not surfaces or (points.rms < ROUNDING and points.overlap == (1.0, 1.0)):
             return points
@@ -316,72 +313,3 @@ def _sizes(choice: Choice, scale: bool) -> str:
     if scale or choice.excess > 1.0:
         return OK
     return told_sizes(choice.evidence.source, choice.evidence.target)
-
-
-def _unlikely(misfit: float) -> float:
-    """What moments differ by, over what sampling explains."""
-    return float(np.sqrt(misfit / MISFIT))
-
-
-def _nearest(
-    source: Shape, target: Shape, matrix: Array, translation: Array, scale: float, tolerance: float
-) -> Nearness:
-    """How near the points of the moved source and of the target come to one another."""
-    moved, labels = scale * (source.points @ matrix.T) + translation, (source.labels, target.labels)
-    there, back = nearest_both_ways(moved, target.points, labels, target.diagonal)
-    shares = float((there <= tolerance).mean()), float((back <= tolerance).mean())
-    return Nearness(rms=float(np.sqrt(np.mean(there**2))), overlap=shares)
-
-
-def _align_moments(
-    sides: tuple[Side, Side], scale: bool, reflections: bool, tolerance: float, clock: Clock
-) -> Alignment:
-    """The story elsewhere, and for sets that span fewer dimensions than they live in: moments within the span."""
-    a, b = sides
-    dim, rank = a.shape.dim, max(rank_of(a.moments), rank_of(b.moments))
-    bases = [np.eye(dim) if rank == dim else np.linalg.eigh(s.moments.covariance)[1].T[::-1] for s in (a, b)]
-    with clock("choose"):
-        source, target = within(a, bases[0][:rank]), within(b, bases[1][:rank])
-        orders = [t for t in PAPER_ORDERS if max(t) <= source.order]
-        tuples = ntuples(source, orders), ntuples(target, orders)
-        found = span_fit(source, target, tuples, reflections=reflections or rank < dim)
-    factor = b.moments.scale / a.moments.scale if scale else 1.0
-    if rank == dim:
-        coset = coset_of_list(found.matrices, a.moments.center, b.moments.center, factor, found.free)
-    else:
-        inner = coset_of_list(found.matrices, np.zeros(rank), np.zeros(rank), factor, found.free)
-        centers = (a.moments.center, b.moments.center)
-        coset = lifted(inner, bases[0], bases[1], centers, factor, reflections=reflections)
-    matrix, translation = coset.matrices[0], coset.translations[0]
-
-    def verdict() -> Verdict:
-        status = OK if scale else told_sizes(a, b)
-        if found.misfit > MISFIT and not found.exact:
-            status = f"the moments differ by {found.misfit:.0f} times what sampling explains"
-        if status == OK and not np.isfinite(found.sigma_rad) and not found.exact:
-            status = f"{OPEN}: the noise of the moments hides every direction; give more points"
-        both = len(np.unique(np.sign(np.linalg.det(coset.matrices)))) > 1
-        sure = 0.5 if both else 1.0
-        return Verdict(status=status, excess=_unlikely(found.misfit), determinant_confidence=sure)
-
-    return Alignment(
-        matrix=matrix,
-        translation=translation,
-        scale=factor,
-        scale_sigma=factor * size_sigma(a, b) if scale and not found.exact else 0.0,
-        sigma_rad=0.0 if found.exact else found.sigma_rad,
-        covariance=np.zeros((0, 0)),
-        exact=found.exact and (scale or same_size(a, b)),
-        timings=clock.seconds,
-        _coset=(lambda: _planar_coset(b.shape, coset, reflections)) if dim == rank == 2 else (lambda: coset),
-        _verdict=verdict,
-        _nearness=lambda: _nearest(a.shape, b.shape, matrix, translation, factor, tolerance),
-    )
-
-
-def _planar_coset(target: Shape, known: Coset, reflections: bool) -> Coset:
-    """In the plane, the operations of the target that `detect_planar` finds, after the map that is known."""
-    found = detect_planar(target)
-    if found.undetermined or np.isinf(found.group.order) or len(known.free):
-        return known
-    return coset_of_group(known.matrices[0], known.translations[0], found.group, found.center, reflections=reflections)
