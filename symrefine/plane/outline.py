@@ -132,21 +132,38 @@ def _telling(raster: Raster) -> Array:
     levels = _beside_tones(raster.values / top) * top
     found = outlines(raster, levels)
     soft = np.count_nonzero((raster.values >= levels[1]) & (raster.values < levels[2]))
-    if soft <= LONGER * len(found[0]):
-        return levels[:1]
     kept = levels[[_tells(p) for p in found]]
-    return kept if len(kept) else levels[:1]
+    kept = levels[:1] if soft <= LONGER * len(found[0]) or not len(kept) else kept
+    return np.concatenate([kept, _above(raster, top)])
+
+
+def _above(raster: Raster, top: float) -> Array:
+    """The level [0 or 1] of details that stand out from all the rest, as far above it as the levels are apart.
+
+    Grain has one as well, but its outline hangs on where that is.
+    """
+    step = LEVELS[0] - LEVELS[1]
+    tried = 1.0 + step + np.linspace(-0.5, 0.5, STEPS + 1) * step
+    lengths = _lengths(raster.values / top, tried)
+    level = top * (1.0 + step)
+    if lengths.max() > LONGER * max(lengths.min(), 1) or not _tells(outlines(raster, np.array([level]))[0]):
+        return np.zeros(0)
+    return np.array([level])
+
+
+def _lengths(values: Array, levels: Array) -> Index:
+    """How many neighbouring cells [...] levels [...] part."""
+    pairs = [(values[1:], values[:-1]), (values[:, 1:], values[:, :-1])]
+    low, high = (np.sort(np.concatenate([by(a, b).ravel() for a, b in pairs])) for by in (np.minimum, np.maximum))
+    return np.searchsorted(low, levels) - np.searchsorted(high, levels)
 
 
 def _beside_tones(values: Array) -> Array:
     """The levels, each where the length of its outline hangs least on it unless it hardly does where it was."""
-    pairs = [(values[1:], values[:-1]), (values[:, 1:], values[:, :-1])]
-    low, high = (np.sort(np.concatenate([by(a, b).ravel() for a, b in pairs])) for by in (np.minimum, np.maximum))
     steps = np.arange(-STEPS, STEPS + 1)
     steps = steps[np.argsort(np.abs(steps), kind="stable")]
     near = (steps[:, None] + np.arange(-STEPS // 2, STEPS // 2 + 1)) * 0.5 * (LEVELS[0] - LEVELS[1]) / STEPS
-    tried = np.array(LEVELS)[:, None, None] + near
-    lengths = np.maximum(np.searchsorted(low, tried) - np.searchsorted(high, tried), 1)
+    lengths = np.maximum(_lengths(values, np.array(LEVELS)[:, None, None] + near), 1)
     varies = lengths.max(axis=2) / lengths.min(axis=2)
     moved = np.array(LEVELS) + near[varies.argmin(axis=1), STEPS // 2]
     return np.where(varies[:, 0] <= LONGER, LEVELS, moved)
