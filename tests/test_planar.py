@@ -407,3 +407,24 @@ def test_a_fit_that_ends_beside_a_line_hides_no_better_start(seed):
     found = detect_planar(Shape(points=place, weights=grey))
     assert found.point_group == "D1"
     assert angle_off(found.lines[0].line.normal, angles[0]) < 0.2
+
+
+@pytest.mark.parametrize("fold", [37, 40, 60])
+def test_folds_of_many_points_are_no_divisors(fold):
+    angles = 2.0 * np.pi * np.arange(fold) / fold + 0.3
+    ring = np.column_stack([np.cos(angles), np.sin(angles)])
+    found = detect_planar(Shape(points=np.concatenate([ring, 0.5 * ring])), tolerance=0.005)
+    assert (found.point_group, found.confidence > 0.95) == (f"D{fold}", True)
+
+
+@pytest.mark.parametrize("grain", [0.0, 0.03])
+def test_what_stands_out_from_a_faint_object_counts(grain):
+    """Black hands on a grey clock face cover less than a twentieth of it; grain alone stands out as well."""
+    y, x = np.mgrid[-1.2:1.2:240j, -1.2:1.2:240j]
+    face = np.where(np.hypot(x, y) < 1.0, 0.35, 0.0)
+    spot = np.hypot(x - 0.5, y - 0.2) < 0.12
+    noise = grain * np.random.default_rng(5).standard_normal(face.shape) * (face > 0)
+    for tones, group in ((face, "O(2)"), (np.where(spot, 1.0, face), "D1")):
+        weights = np.maximum(tones + noise, 0.0).ravel()
+        found = detect_planar(Shape(points=np.column_stack([x.ravel(), y.ravel()]), weights=weights))
+        assert found.point_group == group

@@ -91,7 +91,6 @@ KIND_OF = {
         "moments.moments": "BLOCK WAVES PARTS",
         "ndim.matched": "FIRST",
         "ndim.sampled": "LOW HIGH STARTS",
-        "plane.chain": "MAX_FOLD",
         "plane.outline": "OUTLINED STEPS",
         "poses.mean": "_STARTS",
         "propose.candidates": "START_ERROR PRIMES ON_AXIS LONGEST",

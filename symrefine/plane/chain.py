@@ -11,15 +11,13 @@ from symrefine.decide.looks import exact_need, hopeless
 from symrefine.decide.posterior import ALIKE, NEAR
 from symrefine.fit.vertices import ROUNDED
 from symrefine.geometry import Array
+from symrefine.groups import MAX_FOLD
 from symrefine.groups.elements import DIRECTION_ERROR_RAD
 from symrefine.plane.outline import NOISES, Outlines
 from symrefine.plane.placed import Placed, fitted
 from symrefine.propose.candidates import START_ERROR
 from symrefine.samples import LOOK
 from symrefine.surface.misses import NO_MISS, Deviation
-
-# The largest fold that is looked for.
-MAX_FOLD = 36
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -65,7 +63,9 @@ def explore(outlines: Outlines, hint_rad: float | None, limit: float) -> tuple[H
     lines = list(_distinct(outlines, [*hint, *_best(around, looks)], limit))
     crossing = [h for h in lines if h.need <= limit]
     folds = [Placed(fold=n, mirrored=False, center=center) for n in range(2, MAX_FOLD + 1)]
-    spun = [*_implied(crossing), *_best(folds, _looks(outlines, folds))]
+    # Where several hold exactly the largest has all of them.
+    looks = np.maximum(_looks(outlines, folds), ROUNDED * outlines.diagonal)
+    spun = [*_implied(crossing), *_best(folds[::-1], looks[::-1])]
     turns = list(_distinct(outlines, sorted(spun, key=lambda p: -p.fold), limit))
     both = list(_distinct(outlines, _products([h for h in turns if h.need <= limit], lines), limit))
     return endless, *lines, *turns, *both
@@ -86,7 +86,8 @@ def _implied(lines: Sequence[Hypothesis]) -> Iterator[Placed]:
     for other in others:
         a, b = first.placed.line, other.placed.line
         angle = (other.placed.angle_rad - first.placed.angle_rad) / math.pi
-        folds = range(2, MAX_FOLD + 1)
+        # From some fold on any angle is as near to one of its steps as directions are known.
+        folds = range(2, math.ceil(0.5 * math.pi / DIRECTION_ERROR_RAD))
         fold = next((n for n in folds if abs(n * angle - round(n * angle)) * math.pi < n * DIRECTION_ERROR_RAD), None)
         if fold is not None:
             center = np.linalg.solve([a.normal, b.normal], [a.offset, b.offset])

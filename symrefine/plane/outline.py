@@ -138,17 +138,16 @@ def _telling(raster: Raster) -> Array:
 
 
 def _above(raster: Raster, top: float) -> Array:
-    """The level [0 or 1] of details that stand out from all the rest, as far above it as the levels are apart.
+    """The lowest level [0 or 1] above all the rest at which details stand out, by as much as the levels are apart.
 
-    Grain has one as well, but its outline hangs on where that is.
+    Grain stands out as well, but its outline hangs on where the level is.
     """
-    step = LEVELS[0] - LEVELS[1]
-    tried = 1.0 + step + np.linspace(-0.5, 0.5, STEPS + 1) * step
-    lengths = _lengths(raster.values / top, tried)
-    level = top * (1.0 + step)
-    if lengths.max() > LONGER * max(lengths.min(), 1) or not _tells(outlines(raster, np.array([level]))[0]):
-        return np.zeros(0)
-    return np.array([level])
+    step, values = LEVELS[0] - LEVELS[1], raster.values / top
+    levels = np.arange(1.0 + step, float(values.max()), step)
+    lengths = _lengths(values, levels[:, None] + np.linspace(-0.5, 0.5, STEPS + 1) * step)
+    steady = levels[lengths.max(axis=1) <= LONGER * lengths.min(axis=1)] * top
+    lines = outlines(raster, steady[:1])
+    return steady[:1] if lines and _tells(lines[0]) else np.zeros(0)
 
 
 def _lengths(values: Array, levels: Array) -> Index:
