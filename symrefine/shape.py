@@ -20,6 +20,13 @@ SAME_MASS = 0.01
 LARGEST = 1e60
 
 
+def kinds_of_mass(masses: Array) -> Index:
+    """Kinds [N] that points of masses [N] are of, by number: one ends where the next heavier is not the same."""
+    ascending = np.argsort(masses, kind="stable")
+    steps = np.diff(masses[ascending]) > SAME_MASS * masses[ascending][1:]
+    return np.concatenate([[0], np.cumsum(steps)])[np.argsort(ascending, kind="stable")]
+
+
 @dataclass(frozen=True, eq=False)
 class Shape:
     """Weighted points in n-space, with normals or triangles where the source has them: `Shape(points, faces)`.

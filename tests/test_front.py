@@ -661,3 +661,8 @@ def test_schemas_stand_beside_the_code():
         "detection", "detection2d", "detection_nd", "alignment", "alignments", "symmetrized", "completed", "info",
         "decisions", "labels",
     }  # fmt: skip
+
+
+def test_complex_numbers_are_refused_in_one_line() -> None:
+    with pytest.raises(symrefine.InputError, match="they are complex"):  # and no warning of numpy's beside it
+        symrefine.detect(np.ones((4, 2)) * 1j)

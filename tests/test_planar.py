@@ -428,3 +428,11 @@ def test_what_stands_out_from_a_faint_object_counts(grain):
         weights = np.maximum(tones + noise, 0.0).ravel()
         found = detect_planar(Shape(points=np.column_stack([x.ravel(), y.ravel()]), weights=weights))
         assert found.point_group == group
+
+
+@pytest.mark.parametrize("heavier", [1.02, 1.2, 2.0])
+def test_few_points_of_other_mass_are_other_things(heavier):
+    angles = 2.0 * np.pi * np.arange(6) / 6 + 0.3
+    ring = np.column_stack([np.cos(angles), np.sin(angles)])
+    for masses, group in (([heavier, 1, 1, 1, 1, 1], "D1"), ([1, heavier] * 3, "D3"), ([1, 1.001] * 3, "D6")):
+        assert detect_planar(Shape(points=ring, weights=np.array(masses, dtype=float))).point_group == group

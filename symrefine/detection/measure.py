@@ -18,7 +18,7 @@ from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import FixedSubspace, fixed_subspace
 from symrefine.propose.candidates import Evidence
 from symrefine.samples import COUNT
-from symrefine.shape import SAME_MASS, Index, Shape
+from symrefine.shape import Index, Shape, kinds_of_mass
 from symrefine.surface.cameras import Camera, cameras, outwards
 from symrefine.surface.clumps import Clump
 from symrefine.surface.drift import Drift
@@ -261,9 +261,7 @@ def _classes(shape: Shape) -> Index | None:
     """Classes 0, 1, ... of the points (faces, for a mesh) that must match: labels, and masses where points are few."""
     kinds = [] if shape.labels is None else [shape.labels]
     if is_few(shape) and shape.weights is not None:
-        ascending = np.argsort(shape.weights, kind="stable")
-        steps = np.diff(shape.weights[ascending]) > SAME_MASS * shape.weights[ascending][1:]
-        kinds.append(np.concatenate([[0], np.cumsum(steps)])[np.argsort(ascending, kind="stable")])
+        kinds.append(kinds_of_mass(shape.weights))
     if not kinds:
         return None
     classes = np.unique(np.stack(kinds), axis=1, return_inverse=True)[1].reshape(-1)

@@ -111,7 +111,7 @@ def stream_of(given: Any) -> Stream | None:
 def _check_size(points: Any) -> None:
     """Refuse what `load` refuses of a file: numbers so large that areas overflow. What is no array `Shape` refuses."""
     try:
-        array = np.asarray(points, dtype=np.float64)
+        array = np.asarray(points).astype(np.float64, casting="same_kind")
     except (TypeError, ValueError, OverflowError):
         return
     if array.ndim == 2 and (np.abs(array) > LARGEST).any() and np.isfinite(array).all():

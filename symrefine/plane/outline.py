@@ -10,7 +10,7 @@ import numpy as np
 from symrefine.geometry import Array, Isometry
 from symrefine.plane.raster import Raster, between, coarser, outlines, raster_of
 from symrefine.samples import COUNT
-from symrefine.shape import Index
+from symrefine.shape import Index, kinds_of_mass
 from symrefine.surface.misses import LIMITS, SHARES, Deviation, disc_distances, miss_distances, noise_distances
 from symrefine.surface.neighbourhoods import NEIGHBOURS
 from symrefine.surface.skin import FEW, LocalPlanes, isolated_points, local_planes
@@ -179,13 +179,14 @@ def _of_points(points: Array, weights: Array | None, rng: np.random.Generator) -
     kept = masses > 0
     points, masses = points[kept], masses[kept]
     diagonal = smallest_diagonal(points)
-    parts = [p for p in _levels(points, masses) if few or len(p) > FEW]
     if few:
+        kinds = kinds_of_mass(masses)
+        parts = [points[kinds == k] for k in range(kinds.max() + 1)]
         # A single point counts twice, so that it has a neighbour.
         clouds = [isolated_points(p if len(p) > 1 else np.repeat(p, 2, axis=0)) for p in parts]
         surfaces = [Surface(cloud=cloud, diagonal=diagonal) for cloud in clouds]
     else:
-        surfaces = [_sampled(p, diagonal, rng) for p in parts]
+        surfaces = [_sampled(p, diagonal, rng) for p in _levels(points, masses) if len(p) > FEW]
     return Outlines(surfaces=tuple(surfaces), sampled=not few, pixel_noise=0.0)
 
 
