@@ -410,6 +410,24 @@ def test_few_noisy_points_of_any_dimension_agree(dim: int, noise: float) -> None
     assert align(points, target).is_misfit
 
 
+@pytest.mark.parametrize("dim", [2, 4])
+def test_many_points_that_come_nearest_to_their_own_are_told_by_them(dim: int) -> None:
+    rng = rng_of(65, dim)
+    points, matrix = rng.standard_normal((400, dim)), random_orthogonal(rng, dim)
+    target = rng.permutation(points @ matrix.T + 1e-3 * rng.standard_normal(points.shape))
+    found = align(points, target)
+    assert (found.status, len(found.equivalents)) == ("ok", 1)
+    assert np.abs(found.matrix - matrix).max() < 4.0 * found.sigma_rad < 1e-3
+
+
+def test_what_neither_moments_nor_points_tell_is_open() -> None:
+    """The cube of eight dimensions has ten million maps, and moments to the third order know none of its axes."""
+    points = np.array(list(itertools.product((-1, 1), repeat=8)), dtype=float)
+    found = align(points, points @ random_orthogonal(rng_of(66), 8).T)
+    assert found.status.startswith("not determined: moments to order 3 allow maps that carry no point onto another")
+    assert found.confidence == 0.0
+
+
 def test_a_label_leaves_of_a_hexagon_what_keeps_it() -> None:
     points, labels = ring(6), np.array([1, 0, 0, 0, 0, 0])
     turned_, swapped = points @ random_orthogonal(rng_of(63), 2).T, np.array([1, 0, 1, 0, 0, 0])

@@ -5,6 +5,7 @@ moments within the span -> n-tuples -> Procrustes -> Gauss-Newton on the moments
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -23,8 +24,9 @@ from symrefine.decide.posterior import ALIKE
 from symrefine.geometry import Array
 from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
 from symrefine.plane import detect_planar
-from symrefine.shape import Index, Shape
+from symrefine.shape import Shape
 from symrefine.surface.misses import ATOM_LIMITS, needs_of_atoms
+from symrefine.surface.tree import Tree
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,7 +71,7 @@ def align_in_span(
     """The story elsewhere; arguments as of `align`, which has checked them."""
     span = _Span.of(sides, reflections)
     one, other = (s.shape for s in sides)
-    if few(one, other) and len(one.points) == len(other.points):
+    if one.faces is None and other.faces is None and len(one.points) == len(other.points):
         with clock("choose"):
             found = _by_points(span, scale, tolerance, clock)
         if found is not None:
@@ -78,7 +80,7 @@ def align_in_span(
 
 
 def _by_points(span: _Span, scale: bool, tolerance: float, clock: Clock) -> Alignment | None:
-    """The answer for as many points on either side that stand for themselves; None where no map was found."""
+    """The answer for as many points on either side, each with one of its own; None where no map was found."""
     a, b = (s.shape for s in span.sides)
     centers = a.points.mean(axis=0), b.points.mean(axis=0)
     source, target = (
@@ -86,7 +88,12 @@ def _by_points(span: _Span, scale: bool, tolerance: float, clock: Clock) -> Alig
         for s, c, basis in zip((a, b), centers, span.bases, strict=True)
     )
     factor = float(np.linalg.norm(target) / np.linalg.norm(source)) if scale else 1.0
-    found = _maps(factor * source, target, (a.labels, b.labels), tolerance, reflections=span.either_hand)
+    onto, most = partial(maps_onto, factor * source, target, (a.labels, b.labels)), ATOM_LIMITS[-1] * tolerance
+    if not few(a, b):
+        # Of many points, which may be samples, each has to be the nearest to its own, and nearer than its neighbours.
+        onto = partial(onto, crowded=False)
+        most = min(most, float(np.median(Tree(target).query(target, 1, skip=1)[0])))
+    found = _maps(onto, most, tolerance, reflections=span.either_hand)
     if found is None:
         return None
     matrices, misses, complete = found
@@ -119,7 +126,7 @@ def _by_points(span: _Span, scale: bool, tolerance: float, clock: Clock) -> Alig
 
 
 def _maps(
-    source: Array, target: Array, labels: tuple[Index | None, Index | None], tolerance: float, *, reflections: bool
+    onto: Callable[[float], tuple[Array, Array] | None], most: float, tolerance: float, *, reflections: bool
 ) -> tuple[Array, Array, bool] | None:
     """Maps within the tolerance with what they miss by, and whether these are all; None if there is none, or too many.
 
@@ -127,10 +134,10 @@ def _maps(
     points near one another few have the same distances then. What is found so stands for all where a larger error
     leaves too many to be asked.
     """
-    most = ATOM_LIMITS[-1] * tolerance
+    most = max(most, ROUNDING)
     allowed, known = np.geomspace(ROUNDING, most, 1 + math.ceil(math.log10(most / ROUNDING))).tolist(), None
     while allowed:
-        found = maps_onto(source, target, labels, allowed.pop(0))
+        found = onto(allowed.pop(0))
         if found is None:
             return known
         matrices, misses = found
@@ -173,10 +180,12 @@ def _by_moments(span: _Span, scale: bool, tolerance: float, clock: Clock) -> Ali
 
     def verdict() -> Verdict:
         status, excess = OK if scale else told_sizes(a, b), unlikely(found.misfit)
-        if few(a.shape, b.shape):
+        if few(a.shape, b.shape) or (found.exact and a.shape.faces is None and b.shape.faces is None):
             excess = _missed(span, matrix, translation, factor) / tolerance
             if status == OK and excess > 1.0:
                 status = f"the points differ by {excess:.1f} times what the tolerance allows"
+                if found.exact:
+                    status = f"{OPEN}: moments to order {source.order} allow maps that carry no point onto another"
         elif found.misfit > MISFIT and not found.exact:
             status = f"the moments differ by {found.misfit:.0f} times what sampling explains"
         if status == OK and not np.isfinite(found.sigma_rad) and not found.exact:

@@ -15,7 +15,7 @@ from symrefine.surface.tree import Tree
 
 
 def maps_onto(
-    source: Array, target: Array, labels: tuple[Index | None, Index | None], within: float
+    source: Array, target: Array, labels: tuple[Index | None, Index | None], within: float, *, crowded: bool = True
 ) -> tuple[Array, Array] | None:
     """All orthogonal maps of points onto as many others of their labels, each onto one of its own.
 
@@ -24,11 +24,12 @@ def maps_onto(
         target: [N, n] likewise.
         labels: [N] of both, with one meaning, or None.
         within: by how much the image of a point may miss.
+        crowded: whether points may come to lie nearer to others than to their own.
 
     Returns:
         Matrices [K, n, n] and the misses [K, N] of the points; None where too many maps would have to be asked.
     """
-    known = _anchored(source, target, labels, within)
+    known = _anchored(source, target, labels, within) if len(source) ** 2 <= LARGEST else None
     if known is None:
         return None
     maps, lever = known
@@ -41,11 +42,17 @@ def maps_onto(
             return None
         maps = maps[(_counterparts(tree, source, labels[0], size, maps, some)[0] <= slack).all(axis=1)]
     every = np.arange(len(source))
+    near: Index = np.zeros((len(maps), 0), dtype=np.int64)
     for _ in range(MAX_OUTER):
-        near = _counterparts(tree, source, labels[0], size, maps, every)[1]
+        before, near = near, _counterparts(tree, source, labels[0], size, maps, every)[1]
+        if np.array_equal(before, near):
+            break
         maps = nearest_orthogonal(np.einsum("kni,nj->kij", target[near], source))
     # Where noise brings points to the place of others, the nearest are not one for each.
-    shared = np.flatnonzero((np.sort(near, axis=1) != every).any(axis=1))
+    single = (np.sort(near, axis=1) == every).all(axis=1)
+    if not crowded:
+        near, single = near[single], single[single]
+    shared = np.flatnonzero(~single)
     if len(shared) * len(source) ** 2 > LARGEST:
         return None
     for k in shared:
