@@ -9,7 +9,7 @@ import numpy as np
 
 from symrefine.fit.anchors import LARGEST, LEVER, PROBES
 from symrefine.fit.refine import MAX_OUTER
-from symrefine.geometry import Array
+from symrefine.geometry import Array, orthogonal_factor
 from symrefine.shape import Index
 from symrefine.surface.tree import Tree
 
@@ -38,7 +38,7 @@ def maps_onto(
     slack = within * (1.0 + lever)
     for probes in (*PROBES, len(source)):
         some = np.arange(0, len(source), max(1, len(source) // probes))
-        if len(maps) * len(some) > LARGEST:
+        if len(maps) * source[some].size > LARGEST:
             return None
         maps = maps[(_counterparts(tree, source, labels[0], size, maps, some)[0] <= slack).all(axis=1)]
     every = np.arange(len(source))
@@ -47,7 +47,7 @@ def maps_onto(
         before, near = near, _counterparts(tree, source, labels[0], size, maps, every)[1]
         if np.array_equal(before, near):
             break
-        maps = nearest_orthogonal(np.einsum("kni,nj->kij", target[near], source))
+        maps = orthogonal_factor(np.einsum("kni,nj->kij", target[near], source))
     # Where noise brings points to the place of others, the nearest are not one for each.
     single = (np.sort(near, axis=1) == every).all(axis=1)
     if not crowded:
@@ -58,9 +58,11 @@ def maps_onto(
     for k in shared:
         near[k] = _one_each(source @ maps[k].T, target, labels)
     near = np.unique(near, axis=0)
-    maps = nearest_orthogonal(np.einsum("kni,nj->kij", target[near], source))
+    maps = orthogonal_factor(np.einsum("kni,nj->kij", target[near], source))
     misses = np.linalg.norm(source @ np.swapaxes(maps, 1, 2) - target[near], axis=2)
     good = misses.max(axis=1) <= within
+    if labels[0] is not None and labels[1] is not None:
+        good &= (labels[1][near] == labels[0]).all(axis=1)
     return maps[good], misses[good]
 
 
@@ -72,12 +74,6 @@ def _one_each(moved: Array, target: Array, labels: tuple[Index | None, Index | N
     if labels[0] is not None and labels[1] is not None:
         apart = np.where(labels[0][:, None] == labels[1], apart, apart.max() * len(moved))
     return np.asarray(linear_sum_assignment(apart**2)[1])
-
-
-def nearest_orthogonal(matrices: Array) -> Array:
-    """The orthogonal matrices [K, n, n] nearest to others; of sums of y x' those that take x to y best."""
-    left, _, right = np.linalg.svd(matrices)
-    return np.asarray(left @ right)
 
 
 def _anchored(
@@ -97,7 +93,7 @@ def _anchored(
         allowed = np.flatnonzero(aside >= min(LEVER * far, aside.max()))
         anchor = int(allowed[np.lexsort((-aside[allowed], alike[allowed].sum(axis=1)))[0]])
         goals = np.flatnonzero(alike[anchor])
-        if len(images) * len(goals) > LARGEST:
+        if len(images) * len(goals) * source.shape[1] > LARGEST:
             return None
         fits = np.ones((len(images), len(goals)), dtype=bool)
         for k, known in enumerate(anchors):
@@ -108,7 +104,7 @@ def _anchored(
         basis = np.vstack([basis, off[anchor] / aside[anchor]])
         anchors.append(anchor)
         lever += far / float(aside[anchor])
-    return nearest_orthogonal(np.einsum("kai,aj->kij", target[images], source[anchors])), lever
+    return orthogonal_factor(np.einsum("kai,aj->kij", target[images], source[anchors])), lever
 
 
 def _counterparts(
