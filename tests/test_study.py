@@ -252,10 +252,12 @@ def test_a_config_that_is_not_there_is_told_with_those_that_are(
     (configs / "other.yaml").write_text("seeds: 10\n")
     (configs / "folder.yaml").mkdir()
     there = re.escape(f"in {configs} there are toy.yaml")
-    for path in (configs / "tyo.yaml", configs / "folder.yaml", lab / "nowhere" / "toy.yaml"):
+    for path in (configs / "tyo.yaml", lab / "nowhere" / "toy.yaml"):
         monkeypatch.chdir(lab / "lab")
         with pytest.raises(InputError, match=f"{path.name}: no such config file; {there}$"):
             make_plan(path)
+    with pytest.raises(InputError, match="folder.yaml: is a directory; expected a config"):
+        make_plan(configs / "folder.yaml")
     with pytest.raises(InputError, match=f"other.yaml:1: config: missing experiment, .*; {there}$"):
         make_plan(configs / "other.yaml")
     (configs / "toy.yaml").unlink()
