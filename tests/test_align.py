@@ -428,6 +428,16 @@ def test_what_neither_moments_nor_points_tell_is_open() -> None:
     assert found.confidence == 0.0
 
 
+def test_points_on_a_line_are_not_denied_those_that_noise_put_beside_one() -> None:
+    """One side of the line is as good as the other, which no anchor tells."""
+    line = np.column_stack([np.arange(6.0) ** 1.3, np.zeros(6)])
+    beside = line + 1e-3 * rng_of(67).standard_normal(line.shape)
+    for one, other in ((line, beside), (beside, line)):
+        found = align(one, other)
+        assert not found.is_misfit
+        assert found.overlap == (1.0, 1.0)
+
+
 def test_a_label_leaves_of_a_hexagon_what_keeps_it() -> None:
     points, labels = ring(6), np.array([1, 0, 0, 0, 0, 0])
     turned_, swapped = points @ random_orthogonal(rng_of(63), 2).T, np.array([1, 0, 1, 0, 0, 0])

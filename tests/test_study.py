@@ -256,7 +256,7 @@ def test_a_config_that_is_not_there_is_told_with_those_that_are(
         monkeypatch.chdir(lab / "lab")
         with pytest.raises(InputError, match=f"{path.name}: no such config file; {there}$"):
             make_plan(path)
-    with pytest.raises(InputError, match="folder.yaml: is a directory; expected a config"):
+    with pytest.raises(InputError, match=r"folder\.yaml: is a directory; expected a config"):
         make_plan(configs / "folder.yaml")
     with pytest.raises(InputError, match=f"other.yaml:1: config: missing experiment, .*; {there}$"):
         make_plan(configs / "other.yaml")

@@ -71,7 +71,8 @@ def align_in_span(
     """The story elsewhere; arguments as of `align`, which has checked them."""
     span = _Span.of(sides, reflections)
     one, other = (s.shape for s in sides)
-    if one.faces is None and other.faces is None and len(one.points) == len(other.points):
+    spanned = all(rank_of(s.moments) == span.rank for s in sides)
+    if spanned and one.faces is None and other.faces is None and len(one.points) == len(other.points):
         with clock("choose"):
             found = _by_points(span, scale, tolerance, clock)
         if found is not None:
