@@ -35,21 +35,32 @@ class _Span:
 
     Attributes:
         sides: source and target.
+        ranks: how many dimensions each spans.
         bases: [n, n] of each, orthonormal rows of which the first `rank` span it.
-        rank: how many dimensions the larger spans.
         reflections: whether determinant -1 is an answer.
     """
 
     sides: tuple[Side, Side]
+    ranks: tuple[int, int]
     bases: tuple[Array, Array]
-    rank: int
     reflections: bool
 
     @classmethod
     def of(cls, sides: tuple[Side, Side], reflections: bool) -> "_Span":
-        dim, rank = sides[0].shape.dim, max(rank_of(s.moments) for s in sides)
-        one, other = (np.eye(dim) if rank == dim else np.linalg.eigh(s.moments.covariance)[1].T[::-1] for s in sides)
-        return cls(sides=sides, bases=(one, other), rank=rank, reflections=reflections)
+        dim, ranks = sides[0].shape.dim, (rank_of(sides[0].moments), rank_of(sides[1].moments))
+        whole = max(ranks) == dim
+        one, other = (np.eye(dim) if whole else np.linalg.eigh(s.moments.covariance)[1].T[::-1] for s in sides)
+        return cls(sides=sides, ranks=ranks, bases=(one, other), reflections=reflections)
+
+    @property
+    def rank(self) -> int:
+        """How many dimensions the larger side spans."""
+        return max(self.ranks)
+
+    @property
+    def of_points(self) -> bool:
+        """Whether both sides are points, and no meshes."""
+        return all(s.shape.faces is None for s in self.sides)
 
     @property
     def either_hand(self) -> bool:
@@ -70,9 +81,8 @@ def align_in_span(
 ) -> Alignment:
     """The story elsewhere; arguments as of `align`, which has checked them."""
     span = _Span.of(sides, reflections)
-    one, other = (s.shape for s in sides)
-    spanned = all(rank_of(s.moments) == span.rank for s in sides)
-    if spanned and one.faces is None and other.faces is None and len(one.points) == len(other.points):
+    one, other = (len(s.shape.points) for s in sides)
+    if span.of_points and min(span.ranks) == span.rank and one == other:
         with clock("choose"):
             found = _by_points(span, scale, tolerance, clock)
         if found is not None:
@@ -181,7 +191,7 @@ def _by_moments(span: _Span, scale: bool, tolerance: float, clock: Clock) -> Ali
 
     def verdict() -> Verdict:
         status, excess = OK if scale else told_sizes(a, b), unlikely(found.misfit)
-        if few(a.shape, b.shape) or (found.exact and a.shape.faces is None and b.shape.faces is None):
+        if few(a.shape, b.shape) or (found.exact and span.of_points):
             excess = _missed(span, matrix, translation, factor) / tolerance
             if status == OK and excess > 1.0:
                 status = f"the points differ by {excess:.1f} times what the tolerance allows"

@@ -41,11 +41,15 @@ def nearest_both_ways(
     """
     from scipy.spatial import cKDTree
 
-    one, other = (
-        points if own is None else np.column_stack([points, size * own])
-        for points, own in zip((moved, target), labels, strict=True)
-    )
+    one, other = (set_apart(points, own, size) for points, own in zip((moved, target), labels, strict=True))
     return cKDTree(other).query(one)[0] / size, cKDTree(one).query(other)[0] / size
+
+
+def set_apart(points: Array, labels: Index | None, size: float) -> Array:
+    """Points [..., N, n] of the classes [N] with one more coordinate, in which these stand apart by a size."""
+    if labels is None:
+        return points
+    return np.concatenate([points, np.broadcast_to(size * labels, points.shape[:-1])[..., None]], axis=-1)
 
 
 def nearness(

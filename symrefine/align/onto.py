@@ -7,6 +7,7 @@ whose distances few others share leave few maps to ask.
 
 import numpy as np
 
+from symrefine.align.kinds import set_apart
 from symrefine.fit.anchors import LARGEST, LEVER, PROBES
 from symrefine.fit.refine import MAX_OUTER
 from symrefine.geometry import Array, orthogonal_factor
@@ -33,18 +34,24 @@ def maps_onto(
     if known is None:
         return None
     maps, lever = known
-    size = 4.0 * float(np.abs(target).max())  # sets other labels apart
-    tree = Tree(target if labels[1] is None else np.column_stack([target, size * labels[1]]))
+    size = 4.0 * float(np.abs(target).max())
+    tree = Tree(set_apart(target, labels[1], size))
+
+    def counterparts(maps: Array, some: Index) -> tuple[Array, Index]:
+        """Distances and indices [K, S] of the nearest point of its label to each image of some points."""
+        own = None if labels[0] is None else labels[0][some]
+        return tree.nearest(set_apart(source[some] @ np.swapaxes(maps, 1, 2), own, size))
+
     slack = within * (1.0 + lever)
     for probes in (*PROBES, len(source)):
         some = np.arange(0, len(source), max(1, len(source) // probes))
         if len(maps) * source[some].size > LARGEST:
             return None
-        maps = maps[(_counterparts(tree, source, labels[0], size, maps, some)[0] <= slack).all(axis=1)]
+        maps = maps[(counterparts(maps, some)[0] <= slack).all(axis=1)]
     every = np.arange(len(source))
     near: Index = np.zeros((len(maps), 0), dtype=np.int64)
     for _ in range(MAX_OUTER):
-        before, near = near, _counterparts(tree, source, labels[0], size, maps, every)[1]
+        before, near = near, counterparts(maps, every)[1]
         if np.array_equal(before, near):
             break
         maps = orthogonal_factor(np.einsum("kni,nj->kij", target[near], source))
@@ -56,23 +63,20 @@ def maps_onto(
     if len(shared) * len(source) ** 2 > LARGEST:
         return None
     for k in shared:
-        near[k] = _one_each(source @ maps[k].T, target, labels)
+        near[k] = _one_each(set_apart(source @ maps[k].T, labels[0], size), tree.points)
     near = np.unique(near, axis=0)
     maps = orthogonal_factor(np.einsum("kni,nj->kij", target[near], source))
-    misses = np.linalg.norm(source @ np.swapaxes(maps, 1, 2) - target[near], axis=2)
+    moved = set_apart(source @ np.swapaxes(maps, 1, 2), labels[0], size)
+    misses = np.linalg.norm(moved - tree.points[near], axis=2)
     good = misses.max(axis=1) <= within
-    if labels[0] is not None and labels[1] is not None:
-        good &= (labels[1][near] == labels[0]).all(axis=1)
     return maps[good], misses[good]
 
 
-def _one_each(moved: Array, target: Array, labels: tuple[Index | None, Index | None]) -> Index:
-    """Which point of its label each point [N, n] has for its own, the squares of all distances being least."""
+def _one_each(moved: Array, target: Array) -> Index:
+    """Which of points [N, .] each of as many has for its own, the squares of all distances being least."""
     from scipy.optimize import linear_sum_assignment
 
     apart = np.linalg.norm(moved[:, None] - target, axis=2)
-    if labels[0] is not None and labels[1] is not None:
-        apart = np.where(labels[0][:, None] == labels[1], apart, apart.max() * len(moved))
     return np.asarray(linear_sum_assignment(apart**2)[1])
 
 
@@ -105,13 +109,3 @@ def _anchored(
         anchors.append(anchor)
         lever += far / float(aside[anchor])
     return orthogonal_factor(np.einsum("kai,aj->kij", target[images], source[anchors])), lever
-
-
-def _counterparts(
-    tree: Tree, source: Array, labels: Index | None, size: float, maps: Array, some: Index
-) -> tuple[Array, Index]:
-    """Distances and indices [K, S] of the nearest point of its label to each image of some points."""
-    moved = source[some] @ np.swapaxes(maps, 1, 2)
-    if labels is not None:
-        moved = np.dstack([moved, np.broadcast_to(size * labels[some], moved.shape[:2])])
-    return tree.nearest(moved)

@@ -62,10 +62,10 @@ def explore(outlines: Outlines, hint_rad: float | None, limit: float) -> tuple[H
     hint = [] if hint_rad is None else [replace(around[0], angle_rad=hint_rad)]
     lines = list(_distinct(outlines, [*hint, *_best(around, looks)], limit))
     crossing = [h for h in lines if h.need <= limit]
-    folds = [Placed(fold=n, mirrored=False, center=center) for n in range(2, MAX_FOLD + 1)]
+    folds = [Placed(fold=n, mirrored=False, center=center) for n in range(MAX_FOLD, 1, -1)]
     # Where several hold exactly the largest has all of them.
     looks = np.maximum(_looks(outlines, folds), ROUNDED * outlines.diagonal)
-    spun = [*_implied(crossing), *_best(folds[::-1], looks[::-1])]
+    spun = [*_implied(crossing), *_best(folds, looks)]
     turns = list(_distinct(outlines, sorted(spun, key=lambda p: -p.fold), limit))
     both = list(_distinct(outlines, _products([h for h in turns if h.need <= limit], lines), limit))
     return endless, *lines, *turns, *both

@@ -1,7 +1,7 @@
 """What the decision looks at: the outlines of a picture, or the points themselves, for each level of weight."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 
@@ -129,40 +129,41 @@ def _seen(line: Array, aside: Array, diagonal: float, least: float, rng: np.rand
 def _telling(raster: Raster) -> Array:
     """The levels whose outlines tell apart: one, if the weights between the levels are only the soft edge."""
     top = float(np.quantile(raster.values[raster.values > 0], 0.95))
-    levels = _beside_tones(raster.values / top) * top
+    lengths_at = _lengths_at(raster.values / top)
+    levels = _beside_tones(lengths_at) * top
     found = outlines(raster, levels)
     soft = np.count_nonzero((raster.values >= levels[1]) & (raster.values < levels[2]))
     kept = levels[[_tells(p) for p in found]]
     kept = levels[:1] if soft <= LONGER * len(found[0]) or not len(kept) else kept
-    return np.concatenate([kept, _above(raster, top)])
+    return np.concatenate([kept, _above(raster, top, lengths_at)])
 
 
-def _above(raster: Raster, top: float) -> Array:
+def _above(raster: Raster, top: float, lengths_at: Callable[[Array], Index]) -> Array:
     """The lowest level [0 or 1] above all the rest at which details stand out, by as much as the levels are apart.
 
     Grain stands out as well, but its outline hangs on where the level is.
     """
-    step, values = LEVELS[0] - LEVELS[1], raster.values / top
-    levels = np.arange(1.0 + step, float(values.max()), step)
-    lengths = _lengths(values, levels[:, None] + np.linspace(-0.5, 0.5, STEPS + 1) * step)
+    step = LEVELS[0] - LEVELS[1]
+    levels = np.arange(1.0 + step, float(raster.values.max()) / top, step)
+    lengths = lengths_at(levels[:, None] + np.linspace(-0.5, 0.5, STEPS + 1) * step)
     steady = levels[lengths.max(axis=1) <= LONGER * lengths.min(axis=1)] * top
     lines = outlines(raster, steady[:1])
     return steady[:1] if lines and _tells(lines[0]) else np.zeros(0)
 
 
-def _lengths(values: Array, levels: Array) -> Index:
-    """How many neighbouring cells [...] levels [...] part."""
+def _lengths_at(values: Array) -> Callable[[Array], Index]:
+    """What tells how many neighbouring cells [...] levels [...] part; the cells are put in order once."""
     pairs = [(values[1:], values[:-1]), (values[:, 1:], values[:, :-1])]
     low, high = (np.sort(np.concatenate([by(a, b).ravel() for a, b in pairs])) for by in (np.minimum, np.maximum))
-    return np.searchsorted(low, levels) - np.searchsorted(high, levels)
+    return lambda levels: np.searchsorted(low, levels) - np.searchsorted(high, levels)
 
 
-def _beside_tones(values: Array) -> Array:
+def _beside_tones(lengths_at: Callable[[Array], Index]) -> Array:
     """The levels, each where the length of its outline hangs least on it unless it hardly does where it was."""
     steps = np.arange(-STEPS, STEPS + 1)
     steps = steps[np.argsort(np.abs(steps), kind="stable")]
     near = (steps[:, None] + np.arange(-STEPS // 2, STEPS // 2 + 1)) * 0.5 * (LEVELS[0] - LEVELS[1]) / STEPS
-    lengths = np.maximum(_lengths(values, np.array(LEVELS)[:, None, None] + near), 1)
+    lengths = np.maximum(lengths_at(np.array(LEVELS)[:, None, None] + near), 1)
     varies = lengths.max(axis=2) / lengths.min(axis=2)
     moved = np.array(LEVELS) + near[varies.argmin(axis=1), STEPS // 2]
     return np.where(varies[:, 0] <= LONGER, LEVELS, moved)
