@@ -113,15 +113,16 @@ def slid(surface: Surface, placed: Placed, needs: float, useful: float = math.in
     """A group that seems to need so much, moved sideways to where it needs least; of open surfaces only.
 
     Of a sofa one view shows no two sides that a mirror exchanges, and where their middle is no pair of local planes
-    tells: the edges of the seat do, which have to meet one another. Where it needs more than is `useful` nowhere, it
-    stays.
+    tells: the edges of the seat do, which have to meet one another. Where it needs no less than it does, and than is
+    `useful`, it stays.
     """
     if not surface.is_open or not exact_need(surface.floor) < needs <= mended(surface):
         return placed, needs
     steps = start_error(surface) / ASIDE * np.arange(-ASIDE, ASIDE + 1.0)
     for way in _sideways(placed):
-        needs_there = _valley(surface, placed, way, steps, useful)
-        found = _lowest(steps, needs_there, surface.tolerance) if needs_there.min() <= useful else 0.0
+        most = min(needs, useful)  # where it needs more it will not go
+        needs_there = _valley(surface, placed, way, steps, most)
+        found = _lowest(steps, needs_there, surface.tolerance) if needs_there.min() <= most else 0.0
         moved = replace(placed, center=placed.center + found * way)
         if found != 0.0 and (least := seems(surface, moved)) < needs:
             placed, needs = moved, least
