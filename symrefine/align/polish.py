@@ -102,14 +102,14 @@ def polish(
         source: what moves, in the source's own axes but in units of the target.
         target: what it is to meet.
         error: how far the start may be off, radians and RMS radii; sets the first gate and the first robust scale.
-        known: [6, 6] information (inverse covariance) that the start carries; zeros if none. Under noise the moments
-            know some motions better than the points do; without noise the points know all of them better.
+        known: [6, 6], or [7, 7] with the scale, information (inverse covariance) that the start carries; zeros if none.
+            Under noise the moments know some motions better than the points do; without noise the points know all of
+            them better.
         scale: whether the scale is an unknown too.
         worthwhile: asked of a map that is not settled when most are, whether to go on.
     """
-    prior: Array = np.zeros((7, 7))
-    prior[:6, :6] = known
-    prior = prior if scale else prior[:6, :6]
+    prior: Array = np.zeros((7, 7) if scale else (6, 6))
+    prior[: len(known), : len(known)] = known
     x, reach = np.zeros(len(prior)), error
     covariance: Array = np.linalg.pinv(prior, rcond=1e-12, hermitian=True)
     few = COARSE if len(source.points) > COARSE * GLANCE else 1

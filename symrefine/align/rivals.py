@@ -17,6 +17,7 @@ from symrefine.align.landscape import hills, landscape
 from symrefine.align.moment_fit import LONGEST, MISFIT, Fits, as_good, best_fits, covariance, exact, misfit
 from symrefine.align.pair import Evidence, few
 from symrefine.align.polish import Polished, Similarity, polish
+from symrefine.align.sides import size_sigma
 from symrefine.geometry import Array, frame_with_z, rotation
 from symrefine.groups.names import CLOSED_FOLD
 from symrefine.moments.harmonics import FLOOR
@@ -216,9 +217,13 @@ def _error(covariance: Array) -> float:
 
 
 def information(evidence: Evidence, covariance: Array) -> Array:
-    """Inverse covariance [6, 6] of rotation and shift (RMS radii) that the moments carry."""
-    known: Array = np.zeros((6, 6))
+    """Inverse covariance of rotation and shift (RMS radii) that the moments carry, and of log scale where it is open.
+
+    [6, 6] or [7, 7].
+    """
+    known: Array = np.zeros((7, 7))
     known[:3, :3] = np.linalg.inv(covariance + FLOOR * np.eye(3))
     counts = [np.sum(s.weights**2) for s in (evidence.source, evidence.target)]
-    known[3:, 3:] = np.eye(3) / (sum(counts) / 3.0 + FLOOR)
-    return known
+    known[3:6, 3:6] = np.eye(3) / (sum(counts) / 3.0 + FLOOR)
+    known[6, 6] = 1.0 / (size_sigma(evidence.source, evidence.target) ** 2 + FLOOR)
+    return known if evidence.scale else known[:6, :6]

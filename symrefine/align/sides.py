@@ -92,9 +92,11 @@ def same_size(source: Side, target: Side) -> bool:
 
 def told_sizes(source: Side, target: Side) -> str:
     """The status where sizes agree, or by how much they differ."""
-    if not differ_in_size(source, target):
-        return OK
-    ratio = target.moments.scale / source.moments.scale
+    return unlike_sizes(target.moments.scale / source.moments.scale) if differ_in_size(source, target) else OK
+
+
+def unlike_sizes(ratio: float) -> str:
+    """The status where objects agree at one size only."""
     return f"the target is {ratio:.3g} times as large as the source: ask for the scale"
 
 

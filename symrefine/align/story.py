@@ -32,7 +32,7 @@ from symrefine.align.sides import (
     side_of,
     size_sigma,
     thinned,
-    told_sizes,
+    unlike_sizes,
 )
 from symrefine.clock import Clock
 from symrefine.decide.maps import SURE
@@ -43,7 +43,7 @@ from symrefine.geometry import Array, check_tolerance, cross_matrix
 from symrefine.groups import PointGroup
 from symrefine.moments.moments import PARTS
 from symrefine.shape import Shape
-from symrefine.surface.misses import TOLERANCE
+from symrefine.surface.misses import RIM, TOLERANCE
 from symrefine.threads import one_thread
 
 __all__ = ["Alignment", "align"]
@@ -127,22 +127,18 @@ def _align_solid(
     partly = surfaces and not scale
     tried = partly and least_misfit(evidence.harmonics) > MISFIT
     if tried and (part := _in_part(evidence, reflections, clock)) is not None:
-        return part
+        return _unless_of_other_size(part, evidence, reflections, clock)
     with clock("choose"):
         choice = choose(evidence, reflections=reflections, brief=partly)
     whole, motion = choice.evidence, choice.motion
-    covariance = np.zeros((6, 6)) if choice.exact else np.linalg.inv(information(whole, choice.covariance))
     # Where the sizes differ though nobody said so, it may be that one shows more than the other.
     agree, done = choice.excess <= 1.0 and whole.scale == scale, None
-    scale_sigma = 0.0 if choice.exact else size_sigma(whole.source, whole.target)
     if polish and (agree or not partly) and not choice.exact and whole.has_points:
         with clock("planes"):
             _ = whole.moving, whole.met
         with clock("polish"):
             done = polished(whole, whole.met, motion, choice.covariance)
-            motion, covariance = done.motion, done.covariance
-            # Noise may move all planes of a side outwards or inwards at once, by half of their thickness.
-            scale_sigma = float(np.hypot(done.scale_sigma, 0.5 * np.median(whole.moving.thickness)))
+            motion = done.motion
     excess = _excess(choice, motion, None if scale else done, agree=agree) if surfaces else 0.0
     likely = meant(Link(need=excess), 1.0) if excess <= 1.0 else 0.0
     if likely < SURE and not cleaned and (clean := evidence.cleaned()) is not None:
@@ -151,15 +147,53 @@ def _align_solid(
     if partly and not tried and likely < SURE:
         part = _in_part(evidence, reflections, clock)
         if part is not None and part.confidence >= likely:
-            return part
+            return _unless_of_other_size(part, evidence, reflections, clock)
     if scale and surfaces and likely < SURE:
         part = _in_part(evidence, reflections, clock, scale=True)
         if part is not None and part.confidence >= max(likely, SURE):
             return part
-    evidence = whole
+    known = excess if surfaces and agree else None
+    found = _as_whole(choice, motion, done, clock, scale=scale, reflections=reflections, excess=known)
+    return found if likely >= SURE or not partly else _unless_of_other_size(found, evidence, reflections, clock)
+
+
+def _unless_of_other_size(found: Alignment, evidence: Evidence, reflections: bool, clock: Clock) -> Alignment:
+    """What was found of surfaces as they are, unless it is not sure and they surely agree at one size."""
+    if found.confidence >= SURE:
+        return found
+    sized = replace(evidence, scale=True)
+    with clock("choose"):
+        choice = choose(sized, reflections=reflections, brief=True)
+    whole = choice.evidence
+    blurred = math.hypot(size_sigma(whole.source, whole.target), _blurred(whole))
+    apart = abs(_factor(whole, choice.motion) - 1.0) > RIM * blurred
+    if not apart or meant(Link(need=choice.excess), 1.0) < SURE:
+        return found
+    return _as_whole(choice, choice.motion, None, clock, scale=False, reflections=reflections, excess=None)
+
+
+def _as_whole(
+    choice: Choice,
+    motion: Similarity,
+    done: Polished | None,
+    clock: Clock,
+    *,
+    scale: bool,
+    reflections: bool,
+    excess: float | None,
+) -> Alignment:
+    """The answer for objects that are compared as wholes: a map, after the polish if there was one, and its excess."""
+    evidence = choice.evidence
+    covariance: Array = np.zeros((6, 6))
+    scale_sigma = 0.0
+    if done is not None:
+        covariance, scale_sigma = done.covariance, math.hypot(done.scale_sigma, _blurred(evidence))
+    elif not choice.exact:
+        covariance = np.linalg.inv(information(evidence, choice.covariance))[:6, :6]
+        scale_sigma = size_sigma(evidence.source, evidence.target)
     # Copies of another size have the same moments at one size, which says nothing of how they miss as they are.
-    exact = choice.exact and (scale or same_size(whole.source, whole.target))
-    known = excess if surfaces and agree and exact == choice.exact else None
+    exact = choice.exact and (scale or same_size(evidence.source, evidence.target))
+    known = excess if exact == choice.exact else None
     matrix, translation, factor = _in_input_units(evidence, motion, scale)
 
     def coset() -> Coset:
@@ -256,9 +290,18 @@ def _symmetry(evidence: Evidence, motion: Similarity) -> tuple[PointGroup, Array
 
 def _in_input_units(evidence: Evidence, motion: Similarity, scale: bool) -> tuple[Array, Array, float]:
     """Matrix, translation and scale for the input's own coordinates."""
-    a, b = evidence.source.moments, evidence.target.moments
-    factor = motion.scale * b.scale / a.scale if scale else 1.0
+    factor = _factor(evidence, motion) if scale else 1.0
     return *_placed(evidence, motion, factor), factor
+
+
+def _factor(evidence: Evidence, motion: Similarity) -> float:
+    """How many times as large the target is."""
+    return motion.scale * evidence.target.moments.scale / evidence.source.moments.scale
+
+
+def _blurred(evidence: Evidence) -> float:
+    """How far off noise may put a size: it moves all planes of a side out or in at once, by half of their thickness."""
+    return 0.5 * float(np.median(evidence.moving.thickness))
 
 
 def _placed(evidence: Evidence, motion: Similarity, factor: float) -> tuple[Array, Array]:
@@ -310,6 +353,6 @@ def _nearness(choice: Choice, motion: Similarity, scale: bool) -> Nearness:
 
 def _sizes(choice: Choice, scale: bool) -> str:
     """The status as the sizes have it: of objects that do not agree at any size, the size is not to blame."""
-    if scale or choice.excess > 1.0:
+    if scale or not choice.evidence.scale or choice.excess > 1.0:
         return OK
-    return told_sizes(choice.evidence.source, choice.evidence.target)
+    return unlike_sizes(_factor(choice.evidence, choice.motion))
