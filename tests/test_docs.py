@@ -16,7 +16,9 @@ import pytest
 
 import symrefine
 from experiments.studies import pages
+from symrefine.cli import BAD_INPUT, BROKEN_PIPE, BUG, INTERRUPTED
 from symrefine.cli.parser import parse
+from symrefine.cli.several import UNDETERMINED
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.export.records import detection_record
@@ -80,6 +82,15 @@ def test_every_command_has_its_help_on_the_page_of_commands(capsys: pytest.Captu
     told = re.findall(r"^\[\[help (\w+)\]\]$", (DOCS / "commands.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert len(told) > 5
     assert set(told) == set(listed)
+
+
+def test_every_exit_status_has_its_place_in_the_help_and_on_the_page(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        parse(["--help"])
+    closing = capsys.readouterr().out.partition("Exit status:")[2]
+    told = re.findall(r"^\| (\d+) \|", (DOCS / "commands.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert [int(status) for status in told] == [0, 1, BAD_INPUT, UNDETERMINED, BUG, INTERRUPTED, BROKEN_PIPE]
+    assert all(re.search(rf"\b{status}\b", closing) for status in told)
 
 
 def test_every_public_name_is_explained() -> None:

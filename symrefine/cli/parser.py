@@ -28,7 +28,8 @@ _COMMANDS = (detect, info, align, derive, export, symmetrize, complete, batch, l
 _DESCRIPTION = "Symmetry of 3-D shapes: mirror planes, rotation axes and the point group of a mesh or a point cloud."
 _EPILOG = (
     "`symrefine COMMAND --help` explains a command. Exit status: 0 done, 1 some files of a batch or runs failed, 2 bad "
-    "input or options, 3 undetermined (`--strict`), 130 interrupted, 141 nobody read on."
+    "input or options, 3 undetermined (`--strict`), 70 a fault of symrefine itself (one line names it, "
+    "SYMREFINE_DEBUG=1 shows where), 130 interrupted, 141 nobody read on."
 )
 
 
