@@ -470,7 +470,7 @@ def test_an_inversion_alone_has_its_line_and_its_place_in_a_batch(record: dict[s
 
     miss = {"mean": 0.001, "p95": 0.00321, "p99": 0.004, "max": 0.005}
     alone = record | {"point_group": "Ci", "planes": [], "axes": [], "near_misses": []}
-    alone |= {"inversion_residual": miss, "inversion_confidence": 0.75}
+    alone |= {"inversion_residual": miss, "inversion_confidence": 0.75, "confidence": 0.65}
     early = {name: value for name, value in alone.items() if not name.startswith("inversion_")}
     out = console()
     with out.capture() as capture:
@@ -480,10 +480,20 @@ def test_an_inversion_alone_has_its_line_and_its_place_in_a_batch(record: dict[s
     assert ["about", "the", "centre", "0.100", "0.321", "0.500", "0.75"] in [line.split() for line in lines]
     assert any("misses in % of the diagonal" in line for line in lines)
     told = [row_line("a.ply", r | {"error": None}) for r in (alone, early)]
-    assert told[0].split()[:5] == ["Ci", "0", "0", "0.321", "0.75"]
-    assert told[1].split()[:3] == ["Ci", "0", "0"]
-    assert len(told[1].split()) == 5
+    assert told[0].split()[:5] == ["Ci", "0", "0", "0.321", "0.65"]
+    assert told[1].split()[:4] == ["Ci", "0", "0", "0.65"]
+    assert len(told[1].split()) == 6
     assert all(line.index("a.ply") == ROW_HEAD.index("file") for line in told)
+
+
+def test_a_row_is_as_sure_as_the_answer_and_tells_why_there_is_none(record: dict[str, Any]) -> None:
+    row = record | {"error": None, "confidence": 0.625}
+    assert row_line("a.ply", row).split()[4] == "0.62", "that of the worst element is another one"
+    alone = row | {"point_group": "C1", "planes": [], "axes": [], "inversion_residual": None}
+    assert row_line("a.ply", alone).split()[:4] == ["C1", "0", "0", "0.62"]
+    told = row_line("a.ply", alone | {"undetermined": "40 points are too few", "confidence": 0.0})
+    assert told.split()[:4] == ["undetermined", "0", "0", f"{sum(record['timings'].values()):.2f}"], "no confidence"
+    assert told.endswith("a.ply: 40 points are too few")
 
 
 # --- align ------------------------------------------------------------------------------------------------------------

@@ -21,7 +21,10 @@ MAP_HEAD = _MAP_ROW.format(
 
 
 def row_line(name: str, row: Record) -> str:
-    """What was found in one of many files, or what was wrong with it; the name stands last and whole."""
+    """What was found in one of many files, or what was wrong with it; the name stands last and whole.
+
+    The confidence is that of the answer, as a table of one object has it; behind the name stands why there is none.
+    """
     if row["error"] is not None:
         return _failed(name, row["error"])
     if "hyperplanes" in row:
@@ -32,14 +35,16 @@ def row_line(name: str, row: Record) -> str:
         turns = ([row["rotation"]] if row["rotation"] else []) if "lines" in row else row["axes"]
         told = f"at least {row['point_group']}" if row.get("at_least") else row["point_group"]
     elements = [] if turns is None else mirrors + turns + inversions(row)
+    sure = None if row["undetermined"] else row.get("confidence")
+    reason = f": {one_line(row['undetermined'])}" if row["undetermined"] else ""
     return _ROW.format(
         "undetermined" if row["undetermined"] else told,
         len(mirrors),
         "" if turns is None else len(turns),
         percentage(max(e["residual"]["p95"] for e in elements)) if elements else "",
-        f"{min(e['confidence'] for e in elements):.2f}" if elements else "",
+        "" if sure is None else f"{sure:.2f}",
         seconds(row),
-        one_line(name),
+        f"{one_line(name)}{reason}",
     )
 
 
