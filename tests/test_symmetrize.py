@@ -19,6 +19,7 @@ from symrefine.geometry import Array, random_orthogonal, rotation
 from symrefine.groups import PointGroup, is_subgroup, point_group
 from symrefine.load import load
 from symrefine.moments.quadrature import sample_surface
+from symrefine.picture.words import percent
 from symrefine.shape import Shape
 from symrefine.symmetrize import Symmetrized, exact_place, placed_subgroup, symmetrize
 from symrefine.symmetrize.counterparts import act
@@ -441,7 +442,23 @@ def test_the_command_writes_the_mesh_and_tells_by_how_much_it_moved(
 def test_a_continuous_group_is_told_to_become_finite(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = written(tmp_path / "a.ply", somewhere(lathe(24), 2))
     assert invoke(["symmetrize", str(path), "-o", str(tmp_path / "b.ply")]) == 0
-    assert "Cinfv is continuous" in capsys.readouterr().err
+    out, err = capsys.readouterr()
+    assert "C∞v, confidence" in out
+    assert "C∞v is continuous, no finite set of points has it: C24v stands for it" in err
+
+
+def test_a_mesh_whose_triangles_are_not_symmetric_is_not_told_to_be_exact(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = written(tmp_path / "a.ply", somewhere(table(4, cut=1), 5))
+    assert invoke(["symmetrize", str(path), "-o", str(tmp_path / "b.ply"), "--json", str(tmp_path / "r.json")]) == 0
+    record = json.loads((tmp_path / "r.json").read_text())
+    assert (record["method"], record["residual"] > 1e-9) == ("surface", True)
+    first = capsys.readouterr().out.splitlines()[0]
+    between = percent(record["residual"])
+    assert first.endswith(
+        f"C4v, vertices moved onto the symmetric surface; the triangles between them miss by {between}"
+    )
 
 
 @pytest.mark.parametrize(

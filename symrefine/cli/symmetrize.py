@@ -42,6 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from symrefine.export.models import check_suffix, keeps_labels
     from symrefine.front.lines import summary
     from symrefine.front.made import symmetrize
+    from symrefine.picture.words import symbol
 
     check_outputs({"--out": args.out, "--json": args.json} | shown(args), [Path(args.path)])
     check_suffix(out := Path(args.out))
@@ -58,5 +59,6 @@ def run(args: argparse.Namespace) -> int:
     if not keeps_labels(out.suffix.lower(), shape):
         note("labels are not written")
     if not detection.group.is_finite and args.group is None:
-        note(f"{detection.point_group} is continuous, no finite set of points has it: {made.group.name} was made exact")
+        whole = symbol(detection.point_group)
+        note(f"{whole} is continuous, no finite set of points has it: {made.group.name} stands for it")
     return 0

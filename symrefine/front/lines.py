@@ -67,7 +67,7 @@ def _completed(record: Record) -> dict[str, str]:
 def answer(record: Record) -> str:
     """The answer with how sure it is, or why there is none."""
     if "found" in record:
-        return f"{symbol(record['point_group'])}, made exact"
+        return f"{symbol(record['point_group'])}, {_how_exact(record)}"
     if record.get("undetermined"):
         return f"undetermined: {record['undetermined']}"
     if "hyperplanes" in record:
@@ -76,6 +76,14 @@ def answer(record: Record) -> str:
         return f"{least}{len(record['hyperplanes'])} hyperplanes" + (f", a group of order {order}" if order else "")
     least = "at least " if record.get("at_least") else ""
     return f"{least}{symbol(record['point_group'])}, confidence {record['confidence']:.3f}"
+
+
+def _how_exact(record: Record) -> str:
+    """Whether all of a shape was made exact, or its vertices alone."""
+    if record["method"] != "surface":
+        return "made exact"
+    between = percent(record["residual"])
+    return f"vertices moved onto the symmetric surface; the triangles between them miss by {between}"
 
 
 def mirrors(record: Record) -> Sequence[Record]:
