@@ -4,7 +4,7 @@ import copy
 import json
 import pickle
 import re
-from dataclasses import FrozenInstanceError, is_dataclass
+from dataclasses import FrozenInstanceError, is_dataclass, replace
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
@@ -15,10 +15,12 @@ import pytest
 from matplotlib import pyplot as plt
 
 import symrefine
+from symrefine.detection.result import NearMiss
 from symrefine.errors import InputError
 from symrefine.load import Frames
 from symrefine.load.open3d import open3d
 from symrefine.shape import Shape
+from symrefine.surface.misses import Deviation
 
 mpl.use("Agg")
 jsonschema = pytest.importorskip("jsonschema")
@@ -507,6 +509,23 @@ def test_verbs_take_what_detect_takes_and_what_it_found(tmp_path):
     with pytest.raises(InputError, match="2 coordinates; this is for objects in space"):
         symrefine.export(RNG.random((40, 2)), "bop", tmp_path / "y.json")
     assert not (tmp_path / "y.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("excess", "at_least", "said"),
+    [
+        (1.44, False, "a mirror plane, misses by 1.4 times what a tolerance of 2 % allows: choose a larger tolerance"),
+        (1.44, True, "times what a tolerance of 2 % allows; parts of the surface were not seen: choose"),
+        (0.8, False, "by 0.8 times what a tolerance of 2 % allows, more than what was meant so mostly does: choose"),
+    ],
+)
+def test_what_has_nothing_to_make_symmetric_tells_by_how_much_the_nearest_misses(excess, at_least, said):
+    odd = symrefine.detect(([[0, 0, 0], [7, 0, 0], [1.5, 3, 0], [4, -1, 2]], [[0, 2, 1], [0, 1, 3], [0, 3, 2]]))
+    plane = {"kind": "plane", "direction": np.eye(3)[0], "point": np.zeros(3), "order": 1.0}
+    miss = NearMiss(**plane, residual=Deviation(mean=0.0, p95=0.006, p99=0.0, max=0.1), excess=excess)
+    found = replace(odd, point_group="C1", near_misses=(miss,), at_least=at_least, undetermined="")
+    with pytest.raises(InputError, match=re.escape(said)):
+        symrefine.symmetrize(odd.shape, found)
 
 
 def test_completion_takes_a_cloud_and_what_was_found_in_it():
