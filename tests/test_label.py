@@ -174,6 +174,10 @@ def test_what_a_person_chooses_has_its_rotations(run: Run, out: Path, tmp_path: 
     status, said, _ = run("--decisions", decisions)
     assert status == 0
     assert "1 settled (0 by confidence, 1 by a person), 2 to look at" in said
+    row = rows(out)[4]
+    lines = said.splitlines()
+    assert f"{group:<13}decided  obj_000004.ply  (found {row['answer']} {row['confidence']:.3f})" in lines
+    assert any(line.split()[2] == "obj_000012.ply" for line in lines), "of the others what was found stands there"
     entry = of(out, "models_info.json")["4"]
     motions = np.array([np.eye(4).ravel(), *entry.get("symmetries_discrete", [])]).reshape(-1, 4, 4)
     assert len(motions) == {"C1": 1, "D2h": 4, "D4h": 8}[group]

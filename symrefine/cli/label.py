@@ -39,8 +39,8 @@ DESCRIPTION = (
     "labels.json with who settled them and what is still open, and review.html, a page that needs no server, on which "
     "a person chooses the group of each object and saves the choices as decisions.json. Run again with --decisions "
     "they are applied, and kept in the folder. An object is settled where a person decided it, or its confidence is "
-    "that of --accept; no other has an entry in models_info.json. What was detected with the same options is not "
-    "detected again."
+    "that of --accept or more; no other has an entry in models_info.json. What was detected with the same options is "
+    "not detected again."
 )
 # Of a group that was not found: the least probability that is worth a word.
 _WORTH = 0.01
@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
     _check(args.decisions, given, asked)
     with opened(out) as held:
         kept = read_decisions(out / DECISIONS) if (out / DECISIONS).is_file() else {}
-        rows = _detected(args, does, asked, held)
+        rows = _detected(args, does, asked, held, merged(kept, given))
         _check(args.decisions, given, rows)
         decisions = merged(_fitting(kept, rows, out / DECISIONS), given)
         labels = labelled(rows, decisions, args.accept)
@@ -125,8 +125,13 @@ def _fitting(kept: "Decisions", rows: "Rows", place: Path) -> "Decisions":
     return {number: decision for number, decision in kept.items() if not told[number]}
 
 
-def _detected(args: argparse.Namespace, does: "Executor", asked: "Rows", held: "Journal") -> "Rows":
-    """The rows of all objects, on disk; those that still tell of their files are not made again."""
+def _detected(
+    args: argparse.Namespace, does: "Executor", asked: "Rows", held: "Journal", decisions: "Decisions"
+) -> "Rows":
+    """The rows of all objects, on disk; those that still tell of their files are not made again.
+
+    A line tells of each, and what was decided of it.
+    """
     from symrefine.fleet.tasks import finish
     from symrefine.review.store import ROWS, holds
 
@@ -136,13 +141,13 @@ def _detected(args: argparse.Namespace, does: "Executor", asked: "Rows", held: "
     latest = held.latest
     kept = {n: None for n, row in asked.items() if holds(out, cast("Row | None", latest.get(n)), row, does.limits)}
     jobs = [(row, args.dir, args.out) for number, row in asked.items() if number not in kept]
-    print_lines(_line(row) for row in cast("Rows", held.among(kept)).values())
+    print_lines(_line(row, decisions) for row in cast("Rows", held.among(kept)).values())
     with progress("detecting", len(asked), len(kept)) as advance:
         for made in finish(does, examine_model, jobs, lost, held):
             row = cast("Row", made)
             if is_quiet() and row["error"] is not None:
                 complain(row["error"])
-            print_lines([_line(row)])
+            print_lines([_line(row, decisions)])
             advance()
     return cast("Rows", held.among(sorted(asked)))
 
@@ -223,15 +228,21 @@ def _again(argv: list[str]) -> list[str]:
     return ["symrefine", *words[:end], "--decisions", "decisions.json", *words[end:]]
 
 
-def _line(row: "Row") -> str:
-    """What was found in an object, or what was wrong with it, and what else it may be."""
+def _line(row: "Row", decisions: "Decisions") -> str:
+    """What was found in an object and what else it may be, or what a person decided, or what was wrong with it."""
+    from symrefine.review.labels import trouble
+
     if row["error"] is not None:
         return f"failed: {one_line(row['error'])}"
+    found, name = row["answer"] or "undetermined", one_line(row["file"])
+    decision = decisions.get(row["object"])
+    if decision is not None and decision.point_group is not None and not trouble(decision, {row["object"]: row}):
+        return f"{decision.point_group:<13}{'decided':<9}{name}  (found {found} {row['confidence']:.3f})"
     asked = row["tolerances"].index(row["tolerance"])
     likely = {choice["point_group"]: choice["probabilities"][asked] or 0.0 for choice in row["choices"]}
-    others = [f"{name} {p:.2g}" for name, p in likely.items() if name != row["answer"] and p >= _WORTH]
+    others = [f"{group} {p:.2g}" for group, p in likely.items() if group != row["answer"] and p >= _WORTH]
     told = f"  or {', '.join(others)}" if others else ""
-    return f"{row['answer'] or 'undetermined':<13}{row['confidence']:<7.3f}{one_line(row['file'])}{told}"
+    return f"{found:<13}{row['confidence']:<9.3f}{name}{told}"
 
 
 def _tell(args: argparse.Namespace, objects: int, failed: int, labels: "Labels") -> None:
