@@ -62,7 +62,8 @@ def _unit(asked: str, shape: Shape, units: str | None) -> str:
 def object_diagonal(shape: Shape, *, outliers: Outliers = "auto") -> float:
     """Diagonal of the smallest box around an object, over all orientations, in input units.
 
-    A detection tells that of the surface which it judged by, within a percent or so of this one.
+    This is that of the points with their noise; a detection tells that of the surface which it judged by, the noise
+    taken out: within a percent where there is none, 4 % less where noise is 0.5 % of it, 9 % less at 1 %.
 
     Raises:
         InputError: points of more than three coordinates.

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from symrefine.cli import invoke
+from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.geometry import random_orthogonal
 from symrefine.lengths import object_diagonal, relative_tolerance
@@ -79,6 +80,17 @@ def test_the_same_length_is_the_same_fraction_in_every_unit() -> None:
             found = relative_tolerance(asked, scaled, units=unit)
             assert found * diagonal == pytest.approx(0.1, rel=1e-9)
     assert relative_tolerance(0.05, shape) == 0.05
+
+
+@pytest.mark.parametrize(("noise_rel", "larger"), [(0.0, 0.0), (0.005, 0.04), (0.01, 0.09)])
+def test_noise_is_in_the_diagonal_of_points_and_not_in_that_of_a_detection(noise_rel: float, larger: float) -> None:
+    """As docs/conventions.md says it."""
+    rng = np.random.default_rng(0)
+    side, points = rng.choice(3, 6000, p=np.array([6.0, 3.0, 2.0]) / 11.0), rng.random((6000, 3))
+    points[np.arange(6000), side] = rng.integers(0, 2, 6000)
+    points *= [1.0, 2.0, 3.0]
+    shape = Shape(points=points + noise_rel * np.sqrt(14.0) * rng.standard_normal(points.shape))
+    assert object_diagonal(shape) / detect(shape).diagonal == pytest.approx(1.0 + larger, abs=0.01)
 
 
 def test_strays_do_not_stretch_the_diagonal() -> None:
