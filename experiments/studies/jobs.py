@@ -46,3 +46,19 @@ def in_order(work: Callable[[C], R], cases: Sequence[C], jobs: int) -> Iterator[
         while following in early:
             yield early.pop(following)
             following += 1
+
+
+def counted(text: str, work: Callable[[C], R], cases: Sequence[C], jobs: int) -> list[R]:
+    """The same, all at the end, for tables of all cases: how many are done is shown on stderr meanwhile.
+
+    Args:
+        text: what is being done.
+    """
+    from symrefine.cli.signs import progress
+
+    rows = []
+    with progress(text, len(cases), 0) as advance:
+        for row in in_order(work, cases, jobs):
+            rows.append(row)
+            advance()
+    return rows

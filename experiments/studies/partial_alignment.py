@@ -24,7 +24,7 @@ from experiments.objects.built_symmetry import Truth, specimen
 from experiments.objects.catalogue import catalogue
 from experiments.objects.shapes import sample
 from experiments.peers.registration import PEERS, installed, register
-from experiments.studies.jobs import add_jobs, in_order
+from experiments.studies.jobs import add_jobs, counted
 from symrefine.align.story import align
 from symrefine.files import whole
 from symrefine.geometry import Array, Isometry, random_orthogonal, unit
@@ -337,7 +337,7 @@ def main() -> None:
     if options.quick:
         names, conditions = names[::3], [c for c in QUICK if c in conditions]
     every = list(cases(options.methods, conditions, names, seeds))
-    rows = list(in_order(run, every, options.jobs))
+    rows = counted("aligning", run, every, options.jobs)
     told = rows + [row for path in options.beside for row in read(path)]
     methods = [m for m in METHODS if m in {*options.methods, *(r.case.method for r in told)}]
     print("\n".join(table(told, methods)))

@@ -19,7 +19,7 @@ import numpy as np
 from experiments.objects.drawings import DRAWINGS, Drawing, Layer
 from experiments.objects.pictures import Pose, coverage, fit, picture, random_pose
 from experiments.studies.calibration import Judged, bins, plausible, plot, summary
-from experiments.studies.jobs import add_jobs, in_order
+from experiments.studies.jobs import add_jobs, counted
 from experiments.studies.planar_images import Trial, examine
 from symrefine.errors import InputError
 from symrefine.files import check_target
@@ -229,7 +229,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"error: {error}", file=sys.stderr)
         return 2
     cases = list(plan(quick=args.quick, seed=args.seed))
-    rows = [row for found in in_order(elements, cases, args.jobs) for row in found]
+    rows = [row for found in counted("looking", elements, cases, args.jobs) for row in found]
     print(f"{len(cases)} looks at {len({c.drawing for c in cases})} drawings")
     print("\n".join(report(rows)))
     if args.figure is not None:

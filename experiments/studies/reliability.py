@@ -33,7 +33,7 @@ from experiments.studies.answers import SURE, answer_confidence, claims, outcome
 from experiments.studies.boundary import HALVES, Case, View, check_known, shown
 from experiments.studies.boundary import VIEWS as BOUNDARY_VIEWS
 from experiments.studies.calibration import Judged, bins, plausible, plot, summary
-from experiments.studies.jobs import add_jobs, in_order
+from experiments.studies.jobs import add_jobs, counted
 from symrefine.clock import Clock
 from symrefine.decide.posterior import BLURRED, EVEN, EVEN_MIRROR, STEEPNESS, UNKNOWN, sharpness, strain
 from symrefine.detection.examination import examined
@@ -314,7 +314,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"error: {error}", file=sys.stderr)
         return 2
     cases = list(plan(QUICK_EVERY if options.quick else options.every, options.seed))
-    rows = list(in_order(answered, cases, options.jobs))
+    rows = counted("looking", answered, cases, options.jobs)
     links = [link for r in rows for link in r.chain]
     if options.chains is not None:
         keep(links, options.chains)

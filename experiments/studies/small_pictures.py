@@ -17,7 +17,7 @@ from PIL import Image
 
 from experiments.objects.icons import ICONS
 from experiments.objects.pictures import coverage, picture, random_pose
-from experiments.studies.jobs import add_jobs, in_order
+from experiments.studies.jobs import add_jobs, counted
 from symrefine.load.content import Wanted
 from symrefine.load.image import read_image
 from symrefine.plane import PlanarDetection, detect_planar
@@ -117,7 +117,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=0, help="of the poses (default: %(default)s)")
     add_jobs(parser)
     args = parser.parse_args(argv)
-    answers = list(in_order(answer, list(plan(args.poses, args.seed)), args.jobs))
+    answers = counted("looking", answer, list(plan(args.poses, args.seed)), args.jobs)
     print("\n".join(report(answers)))
     return int(any(a.verdict == "sure and wrong" for a in answers))
 
