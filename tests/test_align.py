@@ -1,6 +1,7 @@
 """Alignment: exact on the same points, close on other samples, honest about what cannot be known."""
 
 import itertools
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -297,6 +298,7 @@ def test_the_coset_of_a_symmetric_object(make: Callable[[], Shape], group: str, 
     assert found.determinant == 1
     assert (found.coset.symmetry, len(found.equivalents)) == (group, order)
     assert found.observable == f"up to the {order} operations of {group}, and the determinant is free"
+    assert found.determinant_confidence == 0.5
     np.testing.assert_allclose(found.equivalents[0], found.matrix, atol=1e-12)
     np.testing.assert_allclose(found.equivalent_transforms[0], found.transform, atol=1e-12)
     assert min(angle_deg(m, matrix) for m in found.equivalents) < 0.6
@@ -757,6 +759,29 @@ def painted(points: Array, matrix: Array, shift: float) -> Shape:
     return Shape(points=points @ matrix.T + shift, labels=labels)
 
 
+@pytest.mark.parametrize("factor", [0.5, 0.9, 1.1, 2.0])
+@pytest.mark.parametrize("name", ["airplane", "fan7", "chair"])
+def test_objects_that_agree_at_one_size_only_are_told_so(name: str, factor: float) -> None:
+    rng = rng_of(94, round(10 * factor))
+    body, _ = specimen("shape" if name == "fan7" else "household", name)
+    source, target = (sample(body, 10000, 0.0, rng) for _ in range(2))
+    found = align(source, factor * target @ random_orthogonal(rng).T + 3.0)
+    assert found.confidence == 0.0
+    assert found.observable == "nothing"
+    told = re.fullmatch(r"the target is (\S+) times as large as the source: ask for the scale", found.status)
+    assert told is not None, found.status
+    assert float(told[1]) == pytest.approx(factor, rel=0.02)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_thin_parts_in_noise_leave_the_scale_where_the_moments_have_it(seed: int) -> None:
+    rng = rng_of(95, seed)
+    body, _ = specimen("shape", "propeller4")
+    source, target = (sample(body, 10000, 0.01, rng) for _ in range(2))
+    found = align(source, 0.6 * target @ random_orthogonal(rng).T, scale=True)
+    assert found.scale == pytest.approx(0.6, rel=0.015)
+
+
 @pytest.mark.parametrize("det", DETERMINANTS)
 @pytest.mark.parametrize("parts", [False, True])
 def test_classes_choose_between_equivalents(det: int, parts: bool) -> None:
@@ -782,6 +807,17 @@ def test_what_has_another_class_does_not_meet() -> None:
     assert same.overlap[0] > 0.95
     assert other.status != "ok"
     assert other.overlap == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("factor", [1.0, 3.0])
+def test_faces_meet_faces_of_their_class(factor: float) -> None:
+    mesh, matrix = join([box((0.0, 0.0, 0.0), (1.0, 1.6, 2.7))]), random_orthogonal(rng_of(96))
+    labels = (mesh.points[mesh.faces].mean(axis=1)[:, 0] > 0.3).astype(int)
+    source = replace(mesh, labels=labels)
+    found = align(source, replace(source, points=factor * mesh.points @ matrix.T), scale=True)
+    assert (found.status, found.exact, found.scale) == ("ok", True, pytest.approx(factor))
+    assert found.overlap == (1.0, 1.0)
+    assert len(found.equivalents) == 4, "of the eight of the box those that keep one end apart"
 
 
 def test_atoms_meet_atoms_of_their_element() -> None:

@@ -118,6 +118,12 @@ def test_points_that_stand_for_themselves_are_asked_one_by_one() -> None:
 # --- the ways ---------------------------------------------------------------------------------------------------------
 
 
+def test_few_points_onto_a_surface_are_shown_although_no_border_is_told_of_so_few(tmp_path: Path) -> None:
+    few = np.random.default_rng(8).normal(size=(9, 3))
+    symrefine.align(few, sample(WHOLE, 4000, 0.0, np.random.default_rng(9))).save(tmp_path / "page.html")
+    assert "meet" in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("case", ["parted", "symmetric"])
 def test_every_way_leads_from_beside_to_where_the_map_takes_it(case: str, request: pytest.FixtureRequest) -> None:
     found = request.getfixturevalue(case)

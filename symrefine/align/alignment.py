@@ -40,14 +40,14 @@ class Verdict:
         status: "ok", or why the result should not be relied upon.
         excess: what the map misses by over what the tolerance, or the noise of the moments, allows; where that is sure
             even so, as if no miss were noise.
-        determinant_confidence: probability that the determinant is right.
+        determinant_confidence: probability that the determinant is right, unless either does equally well.
         hand: probability that the determinant is right, or that the object is its own mirror image and has either.
         confidence: probability that the map is, where it was not told from the excess.
     """
 
     status: str
     excess: float
-    determinant_confidence: float
+    determinant_confidence: float = 1.0
     hand: float = 1.0
     confidence: float | None = None
 
@@ -127,8 +127,8 @@ class Alignment(ReadOnly):
 
     @property
     def observable(self) -> str:
-        """What the pair determines: "full", or up to what."""
-        return self.coset.observable
+        """What the pair determines: "full", up to what, or "nothing" where the status is not "ok"."""
+        return self.coset.observable if self.status == OK else "nothing"
 
     @property
     def free_axis(self) -> Array:
@@ -186,7 +186,7 @@ class Alignment(ReadOnly):
     @property
     def determinant_confidence(self) -> float:
         """Probability that the determinant is right, 0.5 where a reflection does as well; 1 where none is admitted."""
-        return self._said.determinant_confidence
+        return min(self._said.determinant_confidence, 0.5 if self.coset.has_both_hands else 1.0)
 
     @property
     def is_misfit(self) -> bool:

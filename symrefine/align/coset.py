@@ -32,6 +32,11 @@ class Coset(ReadOnly):
     symmetry: str
     observable: str
 
+    @property
+    def has_both_hands(self) -> bool:
+        """Whether a rotation and a reflection do equally well."""
+        return _both_signs(self.matrices)
+
 
 def coset_of_group(
     matrix: Array, translation: Array, group: PointGroup | PointGroup2D, center: Array, *, reflections: bool = True
@@ -78,8 +83,12 @@ def _in_words(many: str, matrices: Array) -> str:
     """What finitely many maps leave open: nothing if there is only one."""
     if len(matrices) == 1:
         return "full"
+    return f"up to {many}" + (", and the determinant is free" if _both_signs(matrices) else "")
+
+
+def _both_signs(matrices: Array) -> bool:
     signs = np.linalg.det(matrices)
-    return f"up to {many}" + (", and the determinant is free" if signs.min() < 0.0 < signs.max() else "")
+    return bool(signs.min() < 0.0 < signs.max())
 
 
 def coset_of_list(

@@ -114,12 +114,7 @@ def _by_points(span: _Span, scale: bool, tolerance: float, clock: Clock) -> Alig
     order = np.lexsort((rms, -hands * well, ~well))
     best = misses[order[0]]
     coset = span.coset(matrices[order], np.zeros((0, span.rank)), centers, factor, every=complete)
-    both = span.reflections and (span.rank < a.dim or len(np.unique(hands[well])) > 1)
-    verdict = Verdict(
-        status=OK,
-        excess=float(needs_of_atoms(best)) / tolerance,
-        determinant_confidence=0.5 if both else 1.0,
-    )
+    verdict = Verdict(status=OK, excess=float(needs_of_atoms(best)) / tolerance)
     exact, matrix, translation = bool(rms[order[0]] < ROUNDING), coset.matrices[0], coset.translations[0]
     return Alignment(
         matrix=matrix,
@@ -201,8 +196,7 @@ def _by_moments(span: _Span, scale: bool, tolerance: float, clock: Clock) -> Ali
             status = f"the moments differ by {found.misfit:.0f} times what sampling explains"
         if status == OK and not np.isfinite(found.sigma_rad) and not found.exact:
             status = f"{OPEN}: the noise of the moments hides every direction; give more points"
-        both = len(np.unique(np.sign(np.linalg.det(coset.matrices)))) > 1
-        return Verdict(status=status, excess=excess, determinant_confidence=0.5 if both else 1.0)
+        return Verdict(status=status, excess=excess)
 
     return Alignment(
         matrix=matrix,

@@ -55,8 +55,10 @@ def set_apart(points: Array, labels: Index | None, size: float) -> Array:
 def nearness(
     source: Shape, target: Shape, matrix: Array, translation: Array, scale: float, tolerance: float
 ) -> Nearness:
-    """How near the points of the moved source and of the target come to one another."""
+    """How near the points of the moved source and of the target come to one another; of meshes those of any class."""
     moved, labels = scale * (source.points @ matrix.T) + translation, (source.labels, target.labels)
+    if source.faces is not None or target.faces is not None:  # classes are those of faces, and points are vertices
+        labels = (None, None)
     there, back = nearest_both_ways(moved, target.points, labels, target.diagonal)
     shares = float((there <= tolerance).mean()), float((back <= tolerance).mean())
     return Nearness(rms=float(np.sqrt(np.mean(there**2))), overlap=shares)

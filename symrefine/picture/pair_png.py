@@ -63,7 +63,7 @@ def _after(pair: Pair) -> list[tuple[str, Colour]]:
     one, other = pair.shares(0)
     shown = [("contradicted", one.contradicted, other.contradicted, CONTRADICTED)]
     shown += [("where nobody looked", one.unseen, other.unseen, INFERRED)]
-    met = f"after: {100 * one.met:.0f} % of the source meet {100 * other.met:.0f} % of the target"
+    met = f"after, as drawn: {100 * one.met:.0f} % of the source meet {100 * other.met:.0f} % of the target"
     rest = [(f"{name} {100 * a:.0f} % and {100 * b:.0f} %", colour) for name, a, b, colour in shown]
     return [(met, AXIS), *rest]
 

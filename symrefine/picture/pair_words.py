@@ -28,12 +28,12 @@ def summary(found: Alignment, pair: Pair) -> str:
     """How well the answer holds, or why there is none, as sentences."""
     if found.is_misfit or found.status.startswith(OPEN):
         return sentence(found.status)
-    one, other = pair.shares(0)
+    source, target = found.overlap
     others = "" if pair.equivalents == 1 else f" It is one of {pair.equivalents} maps that do equally well."
     if len(found.coset.free):
         others = f" Determined {found.observable}."
     return (
-        f"{percent(one.met)} of the source meet {percent(other.met)} of the target, RMS distance "
+        f"{percent(source)} of the source meet {percent(target)} of the target, RMS distance "
         f"{percent(found.rms)} of the diagonal; confidence {found.confidence:.3f}, of the determinant "
         f"{found.determinant_confidence:.3f}.{others}"
     )

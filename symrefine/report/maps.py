@@ -74,8 +74,8 @@ def _list(found: Alignment, pair: Pair) -> str:
     if found.observable != "full" and not found.is_misfit:
         more += f"Determined {found.observable}. "
     more += (
-        "The bars show the shares of source and target that meet the other (blue), contradict (red), and that nobody "
-        "looked for (green)."
+        "The bars show what shares of the places that are drawn of source and target meet the other (blue), contradict "
+        "(red), and nobody looked for (green)."
     )
     heads = "".join(f'<th scope="col">{h}</th>' for h in ("", "what it does", "source", "target", "4 × 4"))
     return (
@@ -116,7 +116,7 @@ def _facts(found: Alignment, pair: Pair) -> str:
         ("Scale", f"{found.scale:.6g}"),
         ("RMS distance", percent(found.rms)),
         ("Rotation known to", known),
-        *((f"{name}: {side.name}", str(shares)) for name, side, shares in _told(pair)),
+        *((f"{name} as drawn: {side.name}", str(shares)) for name, side, shares in _told(pair)),
     ]
     return facts(pairs)
 

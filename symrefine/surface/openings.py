@@ -257,6 +257,8 @@ def openings(
     none = np.zeros(len(cloud.points), dtype=bool)
     if cameras:
         return Openings(line=none, border=none, evident=True, cameras=cameras, clumps=clumps, floor=floor)
+    if len(points) < NEIGHBOURS:
+        return None
     aside, width = _aside(cloud, points, tree, near)
     if floor is not None:
         aside[floor.meets(cloud.points, cloud.beside)] = 0.0
