@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+import symrefine
 from symrefine.cli import invoke
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
@@ -24,6 +25,8 @@ from symrefine.shape import Shape
 from symrefine.symmetrize import Symmetrized, exact_place, placed_subgroup, symmetrize
 from symrefine.symmetrize.counterparts import act
 from symrefine.symmetrize.surface import closest_on
+
+APPLE = Path(__file__).resolve().parents[2] / "shared" / "objects" / "apple.ply"
 
 GROUPS = ["Cs", "Ci", "C2", "C4v", "C5", "C3h", "S4", "D3", "D6h", "D3d", "Td", "Oh", "I", "Ih"]
 
@@ -307,6 +310,37 @@ def test_the_rings_of_a_lathed_mesh_give_the_fold() -> None:
     assert (made.group.name, made.method) == ("C24v", "vertices")
     assert made.largest < 1e-12
     assert miss(made) < 1e-13
+
+
+def test_what_is_made_exact_is_what_was_told_to_be() -> None:
+    shape = somewhere(subdivided(lathe(48), 2), 6)
+    # Midpoints of the diagonals that quads were cut along have no mirrors.
+    shape = replace(shape, points=shape.points.astype(np.float32).astype(float))
+    found = symrefine.detect(shape)
+    assert found.exact is not None
+    made = symrefine.symmetrize(shape, found)
+    assert made.group.name == found.exact.point_group == "C48"
+    assert made.residual < 1e-13
+
+
+@pytest.mark.skipif(not APPLE.is_file(), reason="no shared meshes beside the repository")
+def test_the_fold_of_vertices_is_taken_as_it_was_told() -> None:
+    # Of the rings of an apple nearly all have 36 vertices, one has 12.
+    found = symrefine.detect(APPLE)
+    assert found.exact is not None
+    assert symrefine.symmetrize(APPLE, found).group.name == found.exact.point_group == "C12v"
+
+
+def subdivided(mesh: Shape, times: int) -> Shape:
+    for _ in range(times):
+        points, faces = mesh.points, mesh.faces
+        edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        once, own = np.unique(edges, axis=0, return_inverse=True)
+        a, b, c = faces.T
+        ab, bc, ca = (len(points) + own.reshape(-1, 3)).T
+        every = np.concatenate([np.column_stack(t) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+        mesh = replace(mesh, points=np.vstack([points, points[once].mean(axis=1)]), faces=every)
+    return mesh
 
 
 def lathe(count: int) -> Shape:

@@ -49,7 +49,7 @@ def _ring_fold(points: Array, axis: Array) -> int:
         if not folds.size:
             return 0
     best = float(misses.min())
-    limit = max(ALIKE * best, min(CLEAN * near, LAX * best)) + SINGLE * near
+    limit = max(ALIKE * best, min(CLEAN * near, LAX * best)) + SINGLE * float(np.abs(points).max())
     return int(folds[misses <= limit].max())
 
 

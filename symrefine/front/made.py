@@ -59,7 +59,9 @@ def symmetrize(
         raise InputError(f"{shape.source}: no symmetry to make exact: {found.undetermined}")
     if found.point_group == "C1":
         raise InputError(f"{shape.source}: is C1, nothing to make symmetric{_nearest_miss(found)}")
-    chosen = found.group if group is None else placed_subgroup(found.group, group)
+    # Of a continuous group what the vertices have of it was told already.
+    wanted = found.exact.point_group if group is None and found.exact is not None else group
+    chosen = found.group if wanted is None else placed_subgroup(found.group, wanted)
     used, clock, seed = relative_tolerance(tolerance, shape, units=units), Clock(), seed_of(seed)
     with clock("symmetrize"):
         made = symmetrize(shape, chosen, found.center, tolerance=used, seed=seed)
