@@ -27,7 +27,10 @@ from symrefine.geometry import Array, rotation
 from symrefine.ndim import detect_nd
 from symrefine.picture import words
 from symrefine.picture.draw import Found
+from symrefine.picture.palette import OBJECT, PALETTE
 from symrefine.picture.rows import found_rows
+from symrefine.picture.scene import make_scene
+from symrefine.picture.surface import make_surface
 from symrefine.plane import detect_planar
 from symrefine.report import model
 from symrefine.report.charts import bar_chart, decision_chart, line_chart
@@ -378,6 +381,37 @@ def test_the_model_shows_the_texture(most: int, monkeypatch: pytest.MonkeyPatch)
     assert clear.sum() > 50
     red = np.array(made["palette"])[unpacked(made["colours"], "u1"), 1] == 30
     assert np.array_equal(red[clear], middles[clear] > 0.0)
+
+
+@pytest.mark.parametrize("most", [pytest.param(model.MOST_TRIANGLES, marks=pytest.mark.slow), 200])
+def test_the_model_shows_the_classes(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A brick of which a class is less than half, whether all of its triangles are shown or a few."""
+    monkeypatch.setattr(model, "MOST_TRIANGLES", most)
+    brick = trimesh.creation.box((1, 1.5, 2)).subdivide().subdivide().subdivide()
+    upper = brick.vertices[brick.faces][:, :, 2].mean(axis=1) > 0.2
+    shape = Shape(points=brick.vertices, faces=brick.faces, labels=upper.astype(int))
+    found = replace(symrefine.detect(shape), options={"tolerance": 0.02, "labels": "color"})
+    assert found.point_group == "C2v"
+    page = html_page(found, shape)
+    assert "Labels color, 2 classes" in text_of(page)
+    made = data_of(page)["object"]
+    assert sorted(made["palette"]) == sorted(map(list, (OBJECT, PALETTE[1])))
+    heights = unpacked(made["positions"], "<u2").reshape(-1, 3)[:, 2] * made["step"] + made["low"][2]
+    middles = heights[unpacked(made["faces"], "<u2").reshape(-1, 3)].mean(axis=1) * found.diagonal
+    clear = np.abs(middles + found.center[2] - 0.25) > 0.2
+    assert clear.sum() > 50
+    tinted = np.array(made["palette"])[unpacked(made["colours"], "u1")] == PALETTE[1]
+    assert np.array_equal(tinted.all(axis=1)[clear], middles[clear] + found.center[2] > 0.25)
+
+
+def test_points_of_a_scan_have_the_colours_of_their_classes() -> None:
+    points = cut(table(), 0.2, np.random.default_rng(6)).points
+    shape = Shape(points=points, labels=(points[:, 2] > np.quantile(points[:, 2], 0.7)).astype(int))
+    found = detect(shape)
+    for least in (True, False):
+        scene = replace(make_scene(replace(found, at_least=least, strewn=False), shape), planes=())
+        colours = {tuple(c) for c in np.rint(255.0 * make_surface(shape, scene).colours).astype(int).tolist()}
+        assert {PALETTE[1], OBJECT} <= colours
 
 
 def test_atoms_have_one_miss_each(atoms: Case, pages: Pages) -> None:

@@ -1,5 +1,10 @@
 """The colours of all pictures."""
 
+import numpy as np
+
+from symrefine.geometry import Array
+from symrefine.shape import Index
+
 Colour = tuple[int, int, int]
 
 # Okabe and Ito's colours, which colour-blind people tell apart too, without those that white swallows.
@@ -15,6 +20,16 @@ MISS: Colour = (120, 120, 128)
 INFERRED: Colour = (116, 190, 96)
 CONTRADICTED: Colour = (200, 30, 70)
 OUTLIER: Colour = (190, 70, 110)
+
+
+def class_colours(labels: Index | None, count: int) -> Array:
+    """Colours [count, 3], 0 to 1, by class: grey what most are of, or all where there are no classes."""
+    if labels is None:
+        return np.tile(np.array(OBJECT) / 255.0, (count, 1))
+    _, which, sizes = np.unique(labels, return_inverse=True, return_counts=True)
+    colours = np.array([PALETTE[k % len(PALETTE)] for k in range(len(sizes))])
+    colours[sizes.argmax()] = OBJECT
+    return np.asarray(colours[which.reshape(-1)] / 255.0)
 
 
 def plane_colour(index: int) -> Colour:

@@ -12,7 +12,7 @@ from symrefine.complete import Verdicts, verdicts
 from symrefine.detection.result import Detection, FoundAxis
 from symrefine.geometry import Array, Mask, Plane, ReadOnly, unit
 from symrefine.picture.atoms import Balls, balls
-from symrefine.picture.palette import AXIS, CONTRADICTED, INFERRED, MISS, OBJECT, Colour, plane_colour
+from symrefine.picture.palette import AXIS, CONTRADICTED, INFERRED, MISS, Colour, class_colours, plane_colour
 from symrefine.picture.upright import sign, upright
 from symrefine.picture.words import order_name
 from symrefine.shape import Index, Shape
@@ -123,12 +123,14 @@ class Scan(ReadOnly):
 
     Attributes:
         seen: [N, 3] without outliers.
+        plain: [N, 3] their colours, 0 to 1, where nothing speaks against them.
         contradicted: [N] which of them have an image where the scan says that there is nothing.
         inferred: [K, 3] images where nobody looked.
         rays: [R, 2, 3] from a camera to what it saw: space that is free; none where cameras are not known.
     """
 
     seen: Array
+    plain: Array
     contradicted: Mask
     inferred: Array
     rays: Array
@@ -141,8 +143,8 @@ class Scan(ReadOnly):
     @property
     def colours(self) -> Array:
         """[N + K, 3] of these points, 0 to 1."""
-        seen = np.where(self.contradicted[:, None], CONTRADICTED, OBJECT)
-        return np.concatenate([seen, np.tile(INFERRED, (len(self.inferred), 1))]) / 255.0
+        seen = np.where(self.contradicted[:, None], np.array(CONTRADICTED) / 255.0, self.plain)
+        return np.concatenate([seen, np.tile(np.array(INFERRED) / 255.0, (len(self.inferred), 1))])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -213,6 +215,7 @@ def _scan(detection: Detection, shape: Shape) -> Scan:
         said = verdicts(detection, seen)
     return Scan(
         seen=seen - detection.center,
+        plain=class_colours(shape.labels, len(shape.points))[kept],
         contradicted=said.contradicted,
         inferred=said.inferred - detection.center,
         rays=rays,

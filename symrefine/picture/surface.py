@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from symrefine.geometry import Array, ReadOnly
 from symrefine.moments.quadrature import triangle_areas_and_normals
-from symrefine.picture.palette import OBJECT, OUTLIER
+from symrefine.picture.palette import OUTLIER, class_colours
 from symrefine.picture.scene import Quad, Scene
 from symrefine.shape import Index, Shape
 from symrefine.texture import Texture
@@ -44,7 +44,7 @@ class Surface(ReadOnly):
 
 
 def make_surface(shape: Shape, scene: Scene) -> Surface:
-    """The shape, or a part of the points of a large cloud; those that lie in a plane have its colour.
+    """The shape, or a part of the points of a large cloud, by class; points that lie in a plane have its colour.
 
     Points that stand for themselves are balls. Of a scan that shows a part of an object, its points without outliers
     and what is inferred.
@@ -64,11 +64,10 @@ def make_surface(shape: Shape, scene: Scene) -> Surface:
     if shape.faces is not None:
         corners, scale = shape.points - stage.center, 0.03 * stage.diagonal
         _, normals = triangle_areas_and_normals(corners, shape.faces)
-        plain = _plain(len(normals))
         return Surface(
             points=corners,
             normals=normals,
-            colours=plain,
+            colours=class_colours(shape.labels, len(shape.faces)),
             faces=shape.faces,
             radius=0.0,
             depth_scale=scale,
@@ -78,7 +77,7 @@ def make_surface(shape: Shape, scene: Scene) -> Surface:
     step = max(1, -(-len(every) // MOST_POINTS))
     points = every[::step]
     radius = COVER * stage.diagonal * _spacing(points / stage.diagonal)
-    colours = _plain(len(every)) if scene.scan is None else scene.scan.colours.copy()
+    colours = class_colours(shape.labels, len(every)) if scene.scan is None else scene.scan.colours.copy()
     if scene.scan is None:
         colours[scene.outliers] = np.array(OUTLIER) / 255.0
     plain = colours[::step]
@@ -91,10 +90,6 @@ def make_surface(shape: Shape, scene: Scene) -> Surface:
         radius=radius,
         depth_scale=0.06 * stage.diagonal,
     )
-
-
-def _plain(count: int) -> Array:
-    return np.tile(np.array(OBJECT) / 255.0, (count, 1))
 
 
 def _tinted(plain: Array, points: Array, planes: tuple[Quad, ...], width: float) -> Array:

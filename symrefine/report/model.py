@@ -98,7 +98,7 @@ def _mesh(surface: Surface, scene: Scene, most: int) -> dict[str, Any]:
     assert surface.faces is not None
     points, faces = simplified(surface.points, surface.faces, most)
     is_whole = len(faces) == len(surface.faces)
-    colours = surface.colours if is_whole else np.tile(surface.colours[:1], (len(faces), 1))
+    colours = surface.colours if is_whole else surface.colours[_nearest(surface, points[faces].mean(axis=1))]
     edge = EDGE if surface.texture is None else EDGE_TEXTURED
     points, faces, owner = subdivided(points, faces, edge * diagonal, max(most, len(faces) + 1))
     points, faces, kept = _joined(points, faces, diagonal)
@@ -107,9 +107,13 @@ def _mesh(surface: Surface, scene: Scene, most: int) -> dict[str, Any]:
     middles = points[faces].mean(axis=1)
     if is_whole:
         return _solid(points, faces, _textured(surface, middles, owner[kept]), diagonal)
-    # Triangles that were simplified are small: that of the object which is nearest shows what they do.
-    near = Tree(surface.points[surface.faces].mean(axis=1)).nearest(middles)[1]
-    return _solid(points, faces, _textured(surface, middles, near), diagonal)
+    return _solid(points, faces, _textured(surface, middles, _nearest(surface, middles)), diagonal)
+
+
+def _nearest(surface: Surface, middles: Array) -> Index:
+    """Which triangle of a surface stands for each of those that were simplified, which are small: the nearest one."""
+    assert surface.faces is not None
+    return Tree(surface.points[surface.faces].mean(axis=1)).nearest(middles)[1]
 
 
 def _textured(surface: Surface, places: Array, triangles: Index) -> Array:

@@ -8,6 +8,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from symrefine.detection.result import Detection
 from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.picture.draw import picture_png
@@ -33,7 +35,7 @@ from symrefine.report.elements import Element, drawn, space_elements
 from symrefine.report.listing import HEIGHT, WIDTH, Group, Heads, Row, listing, stage, still
 from symrefine.report.markup import Page, facts, head, plain, section
 from symrefine.report.model import DEEPEST, model
-from symrefine.shape import Shape
+from symrefine.shape import Index, Shape
 from symrefine.surface.misses import LIMITS
 
 # Values of options that are as if they were not given, and options that `symrefine.detect` has too.
@@ -97,12 +99,20 @@ def _facts(d: Detection, shape: Shape) -> str:
         ("Tolerance", percent(d.tolerance)),
         ("Confidence", "none" if d.undetermined else f"{d.confidence:.2f}"),
     ]
+    if shape.labels is not None:
+        pairs.append(("Labels", _classes(d, shape.labels)))
     if d.textured is not None:
         sure = "" if d.textured.undetermined else f", {d.textured.confidence:.2f}"
         pairs.append(("With its texture", f"{symbol(d.textured.point_group)}{sure}"))
     if said := scanned(d):
         pairs.append(("Scan" if d.exact is None else "Vertices", said))
     return facts(pairs)
+
+
+def _classes(d: Detection, labels: Index) -> str:
+    """What tells points or triangles apart, if it has a name, and into how many classes."""
+    name, number = getattr(d, "options", {}).get("labels"), len(np.unique(labels))
+    return ", ".join(filter(None, (name, f"{number:,} {'class' if number == 1 else 'classes'}")))
 
 
 def _list(d: Detection, elements: Sequence[Element]) -> str:
