@@ -28,7 +28,7 @@ def page(detection: SubspaceDetection, shape: Shape) -> Page:
         title=f"{plain(name)} · {plain(shape.source)}",
         sections=(
             head(about, name, "" if d.undetermined else means, sentence(d.undetermined or summary)),
-            _views(projections(d, shape)),
+            _views(projections(d, shape), len(d.hyperplanes or d.rejected)),
             _facts(d, shape),
             _hyperplanes("Hyperplanes of symmetry", d.hyperplanes, 0, d.diameter),
             _hyperplanes("Candidates turned down", d.rejected, len(d.hyperplanes), d.diameter),
@@ -39,7 +39,8 @@ def page(detection: SubspaceDetection, shape: Shape) -> Page:
     )
 
 
-def _views(shown: Sequence[Projection]) -> str:
+def _views(shown: Sequence[Projection], of: int) -> str:
+    """Projections of the best of so many hyperplanes."""
     if not shown:
         return ""
     radius = 1.12 * max(float(np.abs(p.points).max()) for p in shown)
@@ -48,7 +49,8 @@ def _views(shown: Sequence[Projection]) -> str:
         "other. Upwards is the direction within the hyperplane along which the points reach farthest."
     )
     figures = "".join(_view(p, radius) for p in shown)
-    return section("Projections", told, f'<div class="views">{figures}</div>')
+    title = "Projections" if len(shown) == of else f"Projections: the best {len(shown)} of {of} hyperplanes"
+    return section(title, told, f'<div class="views">{figures}</div>')
 
 
 def _view(projection: Projection, radius: float) -> str:
