@@ -242,7 +242,7 @@ def test_pages_of_all_kinds_are_whole(others: list[tuple[Found, Shape]]) -> None
 
 def test_projections_say_of_how_many_hyperplanes_they_are(others: list[tuple[Found, Shape]]) -> None:
     simplex = Shape.of(np.eye(5))
-    assert "Projections: the best 6 of 10 hyperplanes" in text_of(html_page(detect_nd(simplex), simplex))
+    assert "Projections: the best 6 of 11 hyperplanes" in text_of(html_page(detect_nd(simplex), simplex))
     assert "Projections Each" in text_of(html_page(*others[2]))
 
 
