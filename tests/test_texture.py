@@ -308,6 +308,13 @@ def test_the_command_tells_both_groups(kind: str, tmp_path: Path, capsys: pytest
     assert alone["textured"] is None
 
 
+def test_what_a_line_is_about_stands_apart_from_what_it_says() -> None:
+    shape = box(BOX, dot((0, 0, 0.2), 0.15))
+    lines = repr(symrefine.detect(shape)).splitlines()
+    assert [line for line in lines if line.startswith("  with texture C2v, confidence ")]
+    assert {line[14:15] + str(line[15:16] != " ") for line in lines[1:]} == {" True"}, "in one column"
+
+
 def test_exports_are_of_the_shape_with_its_texture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_obj(tmp_path, (1.0, 1.0, 2.0), quarters)
     found = symrefine.detect(load(path, texture=True))

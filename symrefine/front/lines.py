@@ -10,7 +10,7 @@ from symrefine.picture.words import order_name, percent, symbol
 
 Record = dict[str, Any]
 # Width of what a line is about, elements and alternatives that are told one by one, decimals of a direction.
-LABEL, TOLD = 12, 4
+LABEL, TOLD = 13, 4
 # What a detection calls its mirrors, in space, in the plane, and beyond.
 MIRRORS = ("planes", "lines", "hyperplanes")
 # How a shape was made symmetric.
