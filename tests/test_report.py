@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from experiments.objects.damage import cut
 from experiments.objects.molecule_sets import molecule
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
 from symrefine.detection.result import Detection
@@ -21,6 +22,7 @@ from symrefine.ndim import detect_nd
 from symrefine.picture import words
 from symrefine.picture.atoms import balls
 from symrefine.picture.camera import Camera, look_at
+from symrefine.picture.canvas import Canvas
 from symrefine.picture.draw import Found, picture_png
 from symrefine.picture.measures import rms_series, theta_series_deg, turn_series_deg
 from symrefine.picture.painter import paint
@@ -301,6 +303,24 @@ def test_outliers_have_a_colour_and_do_not_shrink_the_rest(shapeless: Case) -> N
     scene = make_scene(replace(shapeless[0], outliers=np.array([2000]), near_misses=()), shape)
     assert np.linalg.norm(scene.stage.points, axis=1).max() < 2.0
     assert len(np.unique(make_surface(shape, scene).colours, axis=0)) == 2
+
+
+def test_a_picture_of_a_scan_tells_what_its_colours_mean(shapeless: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    points = np.concatenate([sample(table(), 2000, 0.0, np.random.default_rng(0)), [[2.0, 0, 0]]])
+    strays = replace(shapeless[0], outliers=np.array([2000]), near_misses=(), at_least=False)
+    part = Shape(points=cut(table(), 0.2, np.random.default_rng(6)).points)
+    written: list[str] = []
+    monkeypatch.setattr(Canvas, "name", lambda _, text, *__: written.append(text))
+    picture_png(strays, Shape(points=points), width=200, height=200)
+    assert "1 outlier, no part of it" in written
+    found = detect(part)
+    assert found.is_partial
+    picture_png(found, part, width=200, height=200)
+    assert "inferred, where nobody looked" in written
+    written.clear()
+    picture_png(found, part, width=200, height=200, title=False)
+    picture_png(detect(table()), table(), width=200, height=200)
+    assert not any("looked" in text or "outlier" in text for text in written)
 
 
 def test_pictures_of_the_plane_and_of_many_dimensions(tmp_path: Path) -> None:

@@ -9,14 +9,15 @@ from symrefine.geometry import Array
 from symrefine.picture.camera import FOV_RAD, Camera, look_at
 from symrefine.picture.canvas import TITLE, Canvas
 from symrefine.picture.painter import paint
-from symrefine.picture.palette import Colour
+from symrefine.picture.palette import CONTRADICTED, INFERRED, OUTLIER, Colour
 from symrefine.picture.scene import Scene, make_scene
 from symrefine.picture.surface import make_surface
 from symrefine.picture.words import headline, symbol
 from symrefine.shape import Shape
 
-# Size of a letter and room for a label, in pixels of the finished picture.
+# Size of a letter and room for a label, in pixels of the finished picture; letters and lines of what colours mean.
 LETTER, ROOM = 21, 26
+SMALL, LINE = 17, 24
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,17 +31,34 @@ class Label:
 
 
 def space_png(detection: Detection, shape: Shape, *, width: int, height: int, title: bool) -> bytes:
-    """PNG of `width` x `height` pixels: the shape with the planes and axes that were found, told above with `title`."""
+    """PNG of `width` x `height` pixels: the shape with the planes and axes that were found.
+
+    With `title` the group is told above, and below what the colours of a scan mean.
+    """
     scene = _shown(make_scene(detection, shape))
-    top = TITLE if title else 0
-    camera = look_at(scene, aspect=width / (height - top), fov_rad=FOV_RAD, fill=0.88)
-    painted = paint(scene, make_surface(shape, scene), camera, width, height - top)
+    told = _meanings(scene) if title else []
+    top, below = TITLE if title else 0, LINE * len(told)
+    camera = look_at(scene, aspect=width / (height - top - below), fov_rad=FOV_RAD, fill=0.88)
+    painted = paint(scene, make_surface(shape, scene), camera, width, height - top - below)
     labels = place_labels(scene, camera, painted)
     canvas = Canvas(width, height, headline(detection) if title else "")
-    canvas.figure.figimage(np.concatenate([np.ones((top, width, 3)), painted]), origin="upper")
+    blank = np.ones((top, width, 3)), np.ones((below, width, 3))
+    canvas.figure.figimage(np.concatenate([blank[0], painted, blank[1]]), origin="upper")
     for label in labels:
         canvas.name(label.text, label.x, label.y + top, label.colour, LETTER)
+    for row, (text, colour) in enumerate(told):
+        canvas.name(text, 0.5 * width, height - below + (row + 0.4) * LINE, colour, SMALL)
     return canvas.png()
+
+
+def _meanings(scene: Scene) -> list[tuple[str, Colour]]:
+    """What the colours of points mean, of those that are there, each in its colour."""
+    if scene.scan is None:
+        out = len(scene.outliers)
+        return [(f"{out:,} {'outlier' if out == 1 else 'outliers'}, no part of it", OUTLIER)] if out else []
+    against = bool(scene.scan.contradicted.any())
+    inferred = [("inferred, where nobody looked", INFERRED)] if len(scene.scan.inferred) else []
+    return inferred + [("seen, with an image where the scan says that there is nothing", CONTRADICTED)] * against
 
 
 def _shown(scene: Scene) -> Scene:
