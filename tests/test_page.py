@@ -15,12 +15,14 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 from scipy.spatial import cKDTree
 
 import symrefine
 from experiments.objects.damage import cut
 from experiments.objects.molecule_sets import molecule
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
+from symrefine.cli import invoke
 from symrefine.detection.result import Detection
 from symrefine.detection.story import LADDER, detect
 from symrefine.geometry import Array, rotation
@@ -218,6 +220,51 @@ def test_the_call_in_python_gives_the_result_again(tmp_path: Path, monkeypatch: 
     call = unescape(page.partition("# or in Python: ")[2].partition("</pre>")[0])
     again = eval(call, {"symrefine": symrefine})
     assert (again.options, again.point_group) == (found.options, found.point_group)
+
+
+ASKED = {
+    "labels": ("detect a.csv --labels kind", "labels='kind')"),
+    "weights and a tolerance": ("detect b.csv --weights mass --tolerance 0.03", "detect(shape, tolerance=0.03)"),
+    "a frame": ("detect a.xyz --frame 1", "frame=1)"),
+    "a camera": ("detect a.npy --viewpoint=5,5,5 --outliers none", "viewpoint=(5.0, 5.0, 5.0))"),
+    "a grey value": ("detect a.png --threshold 0.4", "threshold=0.4)"),
+    "frames of two files": ("align a.xyz a.xyz --source-frame 1 --target-frame 0", "target = symrefine.load("),
+    "labels of two files": ("align a.csv a.csv --labels kind", "source = symrefine.load("),
+    "no reflection": ("align a.npy a.npy --rotations-only", "allow_reflection=False"),
+}
+
+
+@pytest.mark.parametrize(("line", "part"), ASKED.values(), ids=ASKED)
+def test_the_lines_in_python_give_the_result_again(
+    line: str, part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With options that the function itself has not: what is read with them is a shape."""
+    monkeypatch.chdir(tmp_path)
+    corners = np.array([[x, y, z] for x in (-3, 3) for y in (-2, 2) for z in (-1, 1)], dtype=float)
+    for name, column in (("a", "kind"), ("b", "mass")):
+        rows = [f"{x},{y},{z},{1 + (z > 0)}" for x, y, z in corners]
+        Path(f"{name}.csv").write_text("\n".join([f"x,y,z,{column}", *rows]))
+    water = ["3", "water", "O 0 0 0.117", "H 0 0.757 -0.469", "H 0 -0.757 -0.469"]
+    Path("a.xyz").write_text("\n".join([*water, *water[:4], "H 0 -0.9 -0.469"]))
+    np.save("a.npy", on_sides(corners))
+    grey = [[[255, 90, 0][(x > 20) + (x > y + 14)] for x in range(40)] for y in range(40)]
+    Image.fromarray(np.array(grey, dtype=np.uint8)).save("a.png")
+    assert invoke([*line.split(), "--report", "x.html", "--json", "x.json"]) == 0
+    told = unescape(Path("x.html").read_text(encoding="utf-8").partition("# or in Python:")[2].partition("</pre>")[0])
+    assert part in told
+    *before, last = told.strip().split("\n")
+    variables: dict[str, Any] = {"symrefine": symrefine}
+    for read in before:
+        exec(read, variables)
+    again, record = eval(last, variables).to_dict(), json.loads(Path("x.json").read_text())
+    for name in set(record) - {"options", "timings", "status"}:
+        assert again[name] == record[name], name
+
+
+def on_sides(corners: Array) -> Array:
+    """Points on the faces of a box."""
+    points = trimesh.convex.convex_hull(corners).sample(2000, seed=0)
+    return np.asarray(points)
 
 
 def test_page_of_what_is_undetermined(shapeless: Case) -> None:

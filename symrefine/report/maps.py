@@ -26,7 +26,7 @@ _BUTTONS = "".join(
 )
 # Options of the command line that Python has under other names, or not at all.
 _IN_PYTHON = ("tolerance", "units", "scale", "seed")
-_SAID = ("source_frame", "target_frame", "measure", "rotations_only", *_IN_PYTHON)
+_SAID = ("source_frame", "target_frame", "measure", "labels", "rotations_only", *_IN_PYTHON)
 
 
 def page(found: Alignment, pair: Pair, options: Mapping[str, Any]) -> Page:
@@ -135,7 +135,8 @@ def _matrix(found: Alignment, pair: Pair) -> str:
 
 
 def _reproduce(pair: Pair, options: Mapping[str, Any]) -> str:
-    asked = {name: v for name in _SAID if (v := options.get(name)) not in (None, False) and (name, v) != ("seed", 0)}
+    given = {name: v for name in _SAID if (v := options.get(name)) is not None and v is not False}  # a frame may be 0
+    asked = {name: v for name, v in given.items() if (name, v) != ("seed", 0)}
     python = {name: asked[name] for name in _IN_PYTHON if name in asked}
     python |= {"allow_reflection": False} if asked.get("rotations_only") else {}
     return again("align", {"source": pair.source.name, "target": pair.target.name}, asked, python)

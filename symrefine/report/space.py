@@ -40,7 +40,10 @@ from symrefine.surface.misses import LIMITS
 
 # Values of options that are as if they were not given, and options that `symrefine.detect` has too.
 _UNSAID = {"seed": 0, "outliers": "auto"}
-_IN_PYTHON = ("tolerance", "units", "seed", "outliers")
+_IN_PYTHON = ("tolerance", "units", "seed", "outliers", "viewpoint", "verify")
+# Options that functions have which read a file, and the labels that are the colours of images.
+_IN_LOAD = tuple("measure labels weights frame threshold invert texture intrinsics depth_scale mask".split())
+_TEXTURE = "texture"
 
 
 def page(detection: Detection, shape: Shape) -> Page:
@@ -267,14 +270,39 @@ def again(verb: str, given: Mapping[str, str], asked: Mapping[str, Any], python:
     # What came as an object has the name of its kind, and no suffix.
     are_files = all(Path(name).suffix for name in files)
     # What is read with options of the command alone is a shape that was read so.
-    named = list(map(repr, files)) if are_files and len(python) == len(asked) else list(given)
-    words = [*named, *(f"{name}={value!r}" for name, value in python.items())]
-    lines = [f"symrefine.{verb}({', '.join(words)})"]
+    is_read = are_files and any(_reading(name, asked) for name in given)
+    named = list(map(repr, files)) if are_files and not is_read else list(given)
+    call = f"symrefine.{verb}({_words(named, python)}){'.textured' if asked.get('labels') == _TEXTURE else ''}"
+    lines = [call]
     if are_files:
         options = [word for name, value in asked.items() for word in _option(name, value)]
-        lines = [shlex.join(["symrefine", verb, *files, *options]), f"# or in Python: {lines[0]}"]
+        lines = [shlex.join(["symrefine", verb, *files, *options])]
+        read = [_read(name, file, asked) for name, file in given.items()]
+        lines += ["# or in Python:", *read, call] if is_read else [f"# or in Python: {call}"]
     told = f"symrefine {version('symrefine')}. The result is a function of the input and these options alone."
     return section("Reproduce", told, "<pre>" + "\n".join(plain(line) for line in lines) + "</pre>")
+
+
+def _read(name: str, file: str, asked: Mapping[str, Any]) -> str:
+    """How a file is read into a variable."""
+    options = _reading(name, asked)
+    camera = [repr(tuple(options.pop("intrinsics")))] if "intrinsics" in options else []
+    return f"{name} = symrefine.load{'_depth' if camera else ''}({_words([repr(file), *camera], options)})"
+
+
+def _reading(name: str, asked: Mapping[str, Any]) -> dict[str, Any]:
+    """The options with which the file of a variable is read."""
+    options = {option: asked[option] for option in _IN_LOAD if option in asked}
+    if f"{name}_frame" in asked:
+        options["frame"] = asked[f"{name}_frame"]
+    if options.get("labels") == _TEXTURE:
+        options = {option: value for option, value in options.items() if option != "labels"} | {"texture": True}
+    return options
+
+
+def _words(named: Sequence[str], options: Mapping[str, Any]) -> str:
+    """The arguments of a call."""
+    return ", ".join([*named, *(f"{name}={value!r}" for name, value in options.items())])
 
 
 def _option(name: str, value: Any) -> list[str]:
