@@ -29,7 +29,7 @@ from symrefine.align.rivals import Choice, choose, polished
 from symrefine.align.shown import Shown
 from symrefine.align.sides import side_of
 from symrefine.align.span import monomial_pair, span_fit
-from symrefine.align.story import Alignment, align
+from symrefine.align.story import Alignment, _percent, align
 from symrefine.decide.maps import Merit, said_by_both, score
 from symrefine.decide.maps import as_good as as_well
 from symrefine.errors import DegenerateShapeError, InputError
@@ -117,6 +117,11 @@ def test_without_a_scale_there_is_no_doubt_of_it() -> None:
     source, target = (sample(asymmetric(), 3000, 0.0, rng) for _ in range(2))
     assert align(source, target).scale_sigma == 0.0
     assert align(source, 2.0 * source, scale=True).scale_sigma == 0.0
+
+
+@pytest.mark.parametrize(("fraction", "told"), [(0.0314, "3.1 %"), (0.99, "99 %"), (0.9999, "100 %"), (12.3, "1230 %")])
+def test_how_far_objects_differ_is_told_without_powers_of_ten(fraction: float, told: str) -> None:
+    assert _percent(fraction) == told
 
 
 def test_unlike_sizes_are_named_when_scale_is_not_asked_for() -> None:

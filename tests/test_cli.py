@@ -17,7 +17,7 @@ import symrefine
 from symrefine.cli import batch, invoke, objects, values
 from symrefine.cli.objects import Job
 from symrefine.cli.rows import MAP_HEAD, ROW_HEAD, row_line, turn_rad
-from symrefine.cli.tables import detection_lines, headline
+from symrefine.cli.tables import detection_lines, headline, partial
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.files import naming, whole
@@ -484,6 +484,24 @@ def test_an_inversion_alone_has_its_line_and_its_place_in_a_batch(record: dict[s
     assert told[1].split()[:4] == ["Ci", "0", "0", "0.65"]
     assert len(told[1].split()) == 6
     assert all(line.index("a.ply") == ROW_HEAD.index("file") for line in told)
+
+
+def test_a_mirror_that_holds_as_well_as_what_was_found_is_told_so(record: dict[str, Any]) -> None:
+    axis = record["axes"][0]
+    miss = {k: axis[k] for k in ("direction", "point", "residual")} | {"kind": "plane", "order": 1}
+    told = "One of 0.00 holds as well as what was found: the two exclude one another."
+    for excess, group, is_told in ((0.001, "D2h", True), (0.001, "C1", False), (0.7, "D2h", False)):
+        changed = record | {"point_group": group, "near_misses": [miss | {"excess": excess}]}
+        assert (told in list(detection_lines(changed))) is is_told
+
+
+def test_what_speaks_for_a_scan_is_told_in_shares(record: dict[str, Any]) -> None:
+    covered = [{"supported": 0.73, "contradicted": 0.012, "unseen": 0.27}, {"supported": 0.9, "contradicted": 0.0}]
+    planes = [record["planes"][0] | {"coverage": {"unseen": 0.1} | c} for c in covered]
+    assert partial(record | {"planes": planes, "axes": []}).endswith(
+        "at least 73 % of what was seen supports each element, at most 1.2 % contradicts it, "
+        "up to 27 % has its image where nobody looked"
+    )
 
 
 def test_a_row_is_as_sure_as_the_answer_and_tells_why_there_is_none(record: dict[str, Any]) -> None:

@@ -600,6 +600,13 @@ def test_an_alignment_says_how_sure_it_is(found):
     assert unlike.status != "ok"
 
 
+def test_an_answer_that_is_no_such_file_is_told_with_its_article(found, tmp_path):
+    with pytest.raises(InputError, match=r"x\.stl: an Alignment cannot be written as \.stl"):
+        found["alignment"].save(tmp_path / "x.stl")
+    with pytest.raises(InputError, match=r"x\.stl: a Detection cannot be written as \.stl"):
+        found["detection"].save(tmp_path / "x.stl")
+
+
 def test_one_object_is_aligned_with_several(tmp_path):
     np.savetxt(tmp_path / "a.xyz", POINTS[::2])
     turned = POINTS[1::2] @ [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]

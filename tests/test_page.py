@@ -23,7 +23,7 @@ from experiments.objects.damage import cut
 from experiments.objects.molecule_sets import molecule
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
 from symrefine.cli import invoke
-from symrefine.detection.result import Detection
+from symrefine.detection.result import Detection, NearMiss
 from symrefine.detection.story import LADDER, detect
 from symrefine.geometry import Array, rotation
 from symrefine.ndim import detect_nd
@@ -189,6 +189,17 @@ def test_an_inversion_alone_has_its_row() -> None:
     assert "The inversion" in text
     assert "about the centre" in text
     assert "Under it, 95 % of the points meet their images" in text
+
+
+def test_a_near_miss_that_holds_is_told_to_be_excluded() -> None:
+    assert words.turned_down(1.25, 0.02, "Cs") == "It was turned down: 1.25 times what a tolerance of 2 % allows."
+    assert words.turned_down(0.004, 0.02, "C1").startswith("It was turned down: 0.00 times")
+    found = detect(table())
+    excess = {"residual": found.planes[0].residual, "kind": "plane", "direction": np.eye(3)[0], "point": found.center}
+    miss = NearMiss(**excess, order=1.0, excess=0.0)
+    page = html_page(replace(found, near_misses=(miss,)), table())
+    assert data_of(page)["elements"][-1]["told"].endswith(words.turned_down(0.0, 0.02, "C4v"))
+    assert words.turned_down(0.0, 0.02, "C4v").startswith("It holds as well as what was found")
 
 
 def test_a_cube_is_three_lines_that_open() -> None:

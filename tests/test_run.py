@@ -71,6 +71,8 @@ def test_run_prints_its_tables_and_tells_failures(config: Path, capsys: pytest.C
     assert invoke(["run", str(config), "--set", "sweep.seed=[0, 1]", "--out", "few", "--replace"]) == 0
     assert invoke(["run", str(config), "--set", "sweep.seed=[0, 1]", "--out", "few"]) == 0
     assert "2 runs, 2 done before, written to few" in capsys.readouterr().out
+    assert invoke(["run", str(config), "--limit", "1", "--out", "one"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "1 run, written to one"
 
 
 def test_what_there_is_to_run_is_listed(config: Path, capsys: pytest.CaptureFixture[str]) -> None:

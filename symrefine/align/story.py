@@ -321,11 +321,16 @@ def _verdict(choice: Choice, motion: Similarity, scale: bool, reflections: bool,
         farthest = float(np.quantile(evidence.misses(motion), 0.99))
         status = (
             f"the objects differ by {excess:.1f} times what the tolerance allows: 99 % of the source comes within "
-            f"{100 * farthest:.2g} % of the diagonal"
+            f"{_percent(farthest)} of the diagonal"
         )
     asked = status == OK and reflections and choice.hand_is_open
     hand = sure + (1.0 - sure) * _has_both_hands(choice) if asked else 1.0
     return Verdict(status=status, excess=excess, determinant_confidence=sure, hand=hand)
+
+
+def _percent(fraction: float) -> str:
+    """A fraction in percent, to two digits, and never as a power of ten."""
+    return f"{100 * fraction:{'.2g' if fraction < 0.995 else '.0f'}} %"
 
 
 def _has_both_hands(choice: Choice) -> float:

@@ -84,7 +84,8 @@ def run(args: argparse.Namespace) -> int:
     print_lines(outcome.tables.split("\n") if outcome.tables else [])
     for row in islice((row for row in outcome.rows if row["error"] is not None), 5):
         (complain if is_quiet() else note)(f"a run failed: {row['error']}")
-    parts = [f"{len(outcome.rows)} runs", f"{outcome.resumed} done before" if outcome.resumed else ""]
+    runs = len(outcome.rows)
+    parts = [f"{runs} {'run' if runs == 1 else 'runs'}", f"{outcome.resumed} done before" if outcome.resumed else ""]
     parts += [f"{outcome.failed} failed" if outcome.failed else "", f"written to {folder}"]
     print_lines([", ".join(part for part in parts if part)])
     write_rows(args.table, outcome.untimed)

@@ -14,6 +14,7 @@ from symrefine.picture.words import (
     DOUBLETS,
     NO_FLOOR,
     TUPLES,
+    as_well,
     evened,
     exactly,
     kind_name,
@@ -70,6 +71,8 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
         yield "Offsets in units of the file, misses in % of the diagonal; axes go through the centre."
     if record["near_misses"]:
         yield f"{_REFINED}, or, below 1, by more than what was meant so mostly does."
+        if record["point_group"] != "C1" and any(as_well(miss["excess"]) for miss in record["near_misses"]):
+            yield "One of 0.00 holds as well as what was found: the two exclude one another."
     if record["alternatives"]:
         yield f"It may be meant otherwise: {otherwise(record)}."
     if record["staircase"]:
@@ -95,13 +98,13 @@ def partial(record: Record) -> str:
         return "parts of the surface were not seen: there may be more"
     most = max(seen, key=lambda c: c["unseen"])
     told = (
-        "parts of the surface were not seen: there may be more; of what was seen "
-        f"{100 * min(c['supported'] for c in seen):.0f} % and more support each element, "
-        f"{100 * max(c['contradicted'] for c in seen):.2g} % and less contradict it"
+        "parts of the surface were not seen: there may be more; at least "
+        f"{100 * min(c['supported'] for c in seen):.0f} % of what was seen supports each element, at most "
+        f"{100 * max(c['contradicted'] for c in seen):.2g} % contradicts it"
     )
     if not most["unseen"]:
         return told
-    return f"{told}, {100 * most['unseen']:.0f} % and less have an image where nobody looked"
+    return f"{told}, up to {100 * most['unseen']:.0f} % has its image where nobody looked"
 
 
 def _place(record: Record) -> str:

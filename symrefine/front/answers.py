@@ -107,10 +107,9 @@ class Answer:
         """What makes such a writer."""
         kinds = self.kinds()
         if suffix not in kinds:
-            raise InputError(
-                f"a {type(self).__name__} cannot be written as {suffix or 'a file without suffix'}; expected a name "
-                f"that ends in {', '.join(kinds)}"
-            )
+            name = type(self).__name__
+            kind, named = f"{'an' if name[0] in 'AEIOU' else 'a'} {name}", suffix or "a file without suffix"
+            raise InputError(f"{kind} cannot be written as {named}; expected a name that ends in {', '.join(kinds)}")
         return kinds[suffix]
 
     def kinds(self) -> dict[str, Callable[[], Writer]]:

@@ -205,6 +205,18 @@ def evened(sample: int | None) -> str:
     return "" if sample is None else f"the density falls off: decided by {sample:,} points, more evenly spread"
 
 
+def as_well(excess: float) -> bool:
+    """Whether what was turned down misses by nothing: it holds as well as what was found, which excludes it."""
+    return round(excess, 2) == 0.0
+
+
+def turned_down(excess: float, tolerance: float, group: str) -> str:
+    """Why something was turned down where a group was found, in a sentence."""
+    if as_well(excess) and group != "C1":
+        return "It holds as well as what was found, and the two exclude one another."
+    return f"It was turned down: {excess:.2f} times what a tolerance of {percent(tolerance)} allows."
+
+
 def kind_name(kind: str, order: float = 0.0) -> str:
     """What an element is called: a plane, an axis, an improper one, the inversion."""
     return "revolution" if kind == "axis" and math.isinf(order) else _KINDS[kind]

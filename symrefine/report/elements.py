@@ -13,7 +13,7 @@ from symrefine.geometry import Array, Isometry, Plane, ReadOnly, householder, ro
 from symrefine.picture.palette import AXIS, MISS
 from symrefine.picture.rows import Row, found_rows, near_miss_rows
 from symrefine.picture.scene import SAME_LINE_RAD, Line, Quad, Scene
-from symrefine.picture.words import body_name, length, order_name, percent
+from symrefine.picture.words import body_name, length, order_name, percent, turned_down
 from symrefine.report.markup import homogeneous_rows, rounded
 
 # Cosine of the angle up to which two axes are one line.
@@ -197,19 +197,19 @@ def drawn(elements: Sequence[Element], detection: Detection, scene: Scene) -> li
                 "corners": None if element.quad is None else _short(element.quad.corners / diagonal),
                 "ends": None if element.line is None else _short(element.line.ends / diagonal),
                 "mark": [] if element.line is None else _short(element.line.mark / diagonal),
-                "told": told(element, detection.tolerance, body_name(detection.surface.cloud.body)),
+                "told": told(element, detection, body_name(detection.surface.cloud.body)),
                 "matrix": element.matrix(diagonal),
             }
         )
     return found
 
 
-def told(element: Element, tolerance: float, body: str) -> str:
+def told(element: Element, detection: Detection, body: str) -> str:
     """What there is to say of an element, in sentences."""
     miss = element.row.residual
     said = f"95 % of the {body} meet their image within {percent(miss.p95)}, the worst within {percent(miss.max)}."
     if element.missed:
-        said += f" It was turned down: {element.row.score:.2f} times what a tolerance of {percent(tolerance)} allows."
+        said += f" {turned_down(element.row.score, detection.tolerance, detection.point_group)}"
     return f"{said} {element.coverage}".rstrip()
 
 

@@ -22,6 +22,7 @@ from symrefine.picture.words import (
     percent,
     planar_headline,
     sentence,
+    turned_down,
     turns_name,
 )
 from symrefine.plane.detection import PlanarDetection
@@ -152,7 +153,7 @@ def _drawn(d: PlanarDetection, scene: FlatScene) -> list[dict[str, Any]]:
             f"Near miss {k}: {'mirror line' if m.line is not None else turns_name(m.order)}",
             m.order if m.line is None else m.line,
             m.residual,
-            f"It was turned down: {m.excess:.2f} times what a tolerance of {percent(d.tolerance)} allows.",
+            turned_down(m.excess, d.tolerance, d.point_group),
             m.center,
         )
         for k, m in enumerate(d.near_misses, start=1)
