@@ -1,5 +1,6 @@
 """Shapes with a texture: the group that colours keep, from arrays and from files; what is missing is refused."""
 
+import itertools
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,19 +14,23 @@ import jsonschema
 import numpy as np
 import pytest
 from PIL import Image
+from rich.table import Table
 
 import symrefine
 from experiments.objects.shapes import join, revolve
 from symrefine.cli import invoke
+from symrefine.cli.tables import detection_lines
 from symrefine.decide.subgroups import subgroup_chain
 from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
 from symrefine.detection.textured import with_texture
 from symrefine.errors import InputError
+from symrefine.export.records import detection_record
 from symrefine.geometry import Array, random_orthogonal
 from symrefine.groups import is_subgroup, point_group
 from symrefine.load import image as pictures
 from symrefine.load import load, paint
+from symrefine.report.page import html_page
 from symrefine.shape import Shape
 from symrefine.texture import Texture, corner_weights
 
@@ -206,6 +211,14 @@ def labels(count: int) -> Colour:
 def test_of_what_is_round_colours_keep_turns_and_mirrors(colour: Colour, group: str) -> None:
     found, kept = both(can(colour, seed=2))
     assert (found.point_group, kept.point_group) == ("Dinfh", group)
+    shape = can(colour, seed=2)
+    told = html_page(found, shape)
+    lines = list(detection_lines(detection_record(found, shape, options={"tolerance": 0.02})))
+    rows = [str(column.header) for line in lines if isinstance(line, Table) for column in line.columns]
+    if group == "D2h":  # its mirrors through the axis are some of endless ones
+        assert "with its texture: normal" in rows
+        assert "as C2" in told
+        assert "mirror plane (" in told
 
 
 def test_the_chain_of_subgroups_obeys_the_needs() -> None:
@@ -290,13 +303,25 @@ def test_files_show_the_colours_they_were_made_with(kind: str, tmp_path: Path) -
     assert np.abs(shape.texture.colours(face, weights) - ramp(places)).max() < 3.0
 
 
+def table_under(out: str, head: str) -> list[str]:
+    """The rows of a table that was printed."""
+    lines = out.splitlines()
+    first = next(k for k, line in enumerate(lines) if line.startswith(head)) + 1
+    return list(itertools.takewhile(str.strip, lines[first:]))
+
+
 @pytest.mark.parametrize("kind", [k if k == "glb" else pytest.param(k, marks=SLOW) for k in WRITERS])
 def test_the_command_tells_both_groups(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = WRITERS[kind](tmp_path, BOX, dot((0, 0, 0.2), 0.15))
     page = tmp_path / "x.html"
     assert invoke(["detect", str(path), "--texture", "--json", str(tmp_path / "x.json"), "--report", str(page)]) == 0
     assert "With its texture</dt><dd>C2v, 1.00" in page.read_text(encoding="utf-8")
-    assert "with its texture: C2v, confidence" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "with its texture: C2v, confidence" in out
+    assert [line.split()[-1] == "kept" for line in table_under(out, "mirror planes")].count(True) == 2
+    assert [line.split()[-1] == "kept" for line in table_under(out, "axes")].count(True) == 1
+    assert [line.split()[-1] == "kept" for line in table_under(out, "inversion")] == [False]
+    assert page.read_text(encoding="utf-8").count("with its texture kept") == 3
     record = json.loads((tmp_path / "x.json").read_text())
     assert (record["point_group"], record["textured"]["point_group"]) == ("D2h", "C2v")
     assert len(record["textured"]["planes"]) == 2

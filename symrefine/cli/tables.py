@@ -10,6 +10,7 @@ from rich.table import Table
 from symrefine.cli.rows import inversions, percentage, seconds
 from symrefine.front.lines import handedness, map_rows
 from symrefine.groups import point_group
+from symrefine.picture.rows import Said, kept, said_of
 from symrefine.picture.words import (
     DOUBLETS,
     NO_FLOOR,
@@ -290,14 +291,44 @@ def _known(record: Record) -> str:
 
 def _spatial(record: Record) -> Iterator[Table]:
     """Planes, axes, the inversion and near misses of a detection in space."""
+    marks = _kept(record)
     planes = [(_mirror(p, record), p) for p in record["planes"]]
-    yield _elements(("mirror planes: normal", "offset"), "confidence", planes)
+    yield _elements(("mirror planes: normal", "offset"), "confidence", planes, marks[: len(planes)])
     turns = [_turn("improper" if a["improper"] else "axis", a["order"]) for a in record["axes"]]
     axes = [((_direction(a["direction"]), turn), a) for a, turn in zip(record["axes"], turns, strict=True)]
-    yield _elements(("axes: direction", "kind"), "confidence", axes)
-    yield _elements(("inversion",), "confidence", [(("about the centre",), found) for found in inversions(record)])
+    yield _elements(("axes: direction", "kind"), "confidence", axes, marks[len(planes) :])
+    inversion = [(("about the centre",), found) for found in inversions(record)]
+    yield _elements(("inversion",), "confidence", inversion, marks and [_inverted(record["textured"])])
+    if record.get("textured"):
+        yield from _only_textured(record)
     near = [(_near(m, record), m) for m in record["near_misses"]]
     yield _elements(("near misses: direction", "offset", "kind"), "x limit", near)
+
+
+def _said(record: Record) -> list[Said]:
+    """Planes and axes of a record, or of what of them is told with a texture."""
+    turns = ((a["direction"], float(a["order"]), a["improper"]) for a in record["axes"])
+    return said_of((p["normal"] for p in record["planes"]), turns)
+
+
+def _kept(record: Record) -> list[str]:
+    """What the texture keeps of each plane and axis; nothing where no texture was read or nothing is decided."""
+    told = record.get("textured")
+    return [] if not told or told["undetermined"] else [kept(one, _said(told)) for one in _said(record)]
+
+
+def _inverted(told: Record) -> str:
+    return "kept" if told["inversion"] else ""
+
+
+def _only_textured(record: Record) -> Iterator[Table]:
+    """What the texture keeps of endless planes and axes, which are no rows of their own."""
+    told, own = record["textured"], _said(record)
+    planes = [p for p in told["planes"] if not kept(("plane", p["normal"], 1.0), own)]
+    yield _elements(("with its texture: normal", "offset"), "confidence", [(_mirror(p, record), p) for p in planes])
+    axes = [a for a in told["axes"] if not any(kept(s, own) for s in _said({"planes": [], "axes": [a]}))]
+    rows = [((_direction(a["direction"]), _turn("improper" if a["improper"] else "axis", a["order"])), a) for a in axes]
+    yield _elements(("with its texture: axis", "kind"), "confidence", rows)
 
 
 def _near(miss: Record, record: Record) -> tuple[str, ...]:
@@ -314,13 +345,18 @@ def _mirror(mirror: Record, record: Record) -> tuple[str, str]:
     return _direction(mirror["normal"]), _length(mirror["offset"], record)
 
 
-def _elements(heads: Sequence[str], last: str, rows: Sequence[tuple[Sequence[str], Record]]) -> Table:
-    """A line for each element: what it is, what it misses by, and how sure it is or how far beyond the limit."""
-    table = _table(*heads, *_RESIDUALS, last)
+def _elements(
+    heads: Sequence[str], last: str, rows: Sequence[tuple[Sequence[str], Record]], marks: Sequence[str] = ()
+) -> Table:
+    """A line for each element: what it is, what it misses by, and how sure it is or how far beyond the limit.
+
+    With `marks`, one for each, also what its texture keeps of it.
+    """
+    table = _table(*heads, *_RESIDUALS, last, *(["texture"] if marks else []))
     score = "excess" if last == "x limit" else "confidence"
-    for named, element in rows:
+    for k, (named, element) in enumerate(rows):
         misses = [percentage(element["residual"][name]) for name in _RESIDUALS]
-        table.add_row(*named, *misses, f"{element[score]:.2f}")
+        table.add_row(*named, *misses, f"{element[score]:.2f}", *marks[k : k + 1])
     return table
 
 

@@ -1,9 +1,13 @@
 """What was found and what was turned down, as rows of a table."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from symrefine.detection.result import Detection
 from symrefine.picture.palette import AXIS, MISS, Colour, plane_colour
+from symrefine.picture.scene import SAME_LINE_RAD
 from symrefine.picture.words import direction, kind_name, order_name
 from symrefine.surface.misses import Deviation
 
@@ -37,6 +41,25 @@ def found_rows(detection: Detection) -> list[Row]:
     if miss is None or sure is None:
         return rows
     return [*rows, Row("i", AXIS, kind_name("inversion"), "about the centre", miss, sure)]
+
+
+# What there is to say of an element: "plane", "axis", "improper" or "inversion"; its direction; its order.
+Said = tuple[str, Sequence[float], float]
+
+
+def said_of(planes: Iterable[Sequence[float]], turns: Iterable[tuple[Sequence[float], float, bool]]) -> list[Said]:
+    """Mirrors with their normals, and turns with direction, order and whether they are improper."""
+    mirrors: list[Said] = [("plane", normal, 1.0) for normal in planes]
+    return mirrors + [("improper" if improper else "axis", u, order) for u, order, improper in turns]
+
+
+def kept(element: Said, textured: Iterable[Said]) -> str:
+    """What a texture keeps of an element, of all that it keeps: all, a part of an axis, or nothing, which is empty."""
+    kind, along, order = element
+    for other, beside, least in textured:
+        if other == kind and abs(np.dot(along, beside)) > np.cos(SAME_LINE_RAD):
+            return "kept" if least == order else f"as {order_name(least, kind == 'improper')}"
+    return ""
 
 
 def near_miss_rows(detection: Detection) -> list[Row]:

@@ -14,6 +14,7 @@ from symrefine.detection.result import Detection
 from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.picture.draw import picture_png
 from symrefine.picture.measures import rms_series, series, turn_series_deg
+from symrefine.picture.rows import Said, kept, said_of
 from symrefine.picture.scene import make_scene
 from symrefine.picture.words import (
     TUPLES,
@@ -23,6 +24,7 @@ from symrefine.picture.words import (
     direction,
     fit,
     headline,
+    kind_name,
     meaning,
     percent,
     scanned,
@@ -44,6 +46,8 @@ _IN_PYTHON = ("tolerance", "units", "seed", "outliers", "viewpoint", "verify")
 # Options that functions have which read a file, and the labels that are the colours of images.
 _IN_LOAD = tuple("measure labels weights frame threshold invert texture intrinsics depth_scale mask".split())
 _TEXTURE = "texture"
+# Of what the texture alone has: so many are told one by one.
+_TOLD = 4
 
 
 def page(detection: Detection, shape: Shape) -> Page:
@@ -106,7 +110,8 @@ def _facts(d: Detection, shape: Shape) -> str:
         pairs.append(("Labels", _classes(d, shape.labels)))
     if d.textured is not None:
         sure = "" if d.textured.undetermined else f", {d.textured.confidence:.2f}"
-        pairs.append(("With its texture", f"{symbol(d.textured.point_group)}{sure}"))
+        only = "" if d.textured.undetermined else _only_textured(d, d.textured)
+        pairs.append(("With its texture", f"{symbol(d.textured.point_group)}{sure}{only}"))
     if said := scanned(d):
         pairs.append(("Scan" if d.exact is None else "Vertices", said))
     return facts(pairs)
@@ -125,7 +130,7 @@ def _list(d: Detection, elements: Sequence[Element]) -> str:
             index=k,
             name=e.row.name,
             colour=e.row.colour,
-            kind=_kind(e),
+            kind=_kind(e, d),
             vector="" if e.kind == "inversion" else direction(e.direction),
             place=_place(e),
             misses=e.row.residual,
@@ -148,9 +153,35 @@ def _list(d: Detection, elements: Sequence[Element]) -> str:
     return listing(groups, heads, nothing)
 
 
-def _kind(element: Element) -> str:
-    """What a row says of its kind where its group does not."""
-    return "" if element.kind in ("plane", "axis") and not element.missed else element.row.kind
+def _kind(element: Element, d: Detection) -> str:
+    """What a row says of its kind where its group does not, and what the texture keeps of it."""
+    if element.missed:
+        return element.row.kind
+    told = "" if element.kind in ("plane", "axis") else element.row.kind
+    mark = _kept(element, d.textured)
+    return " · ".join(filter(None, (told, f"with its texture {mark}" if mark else "")))
+
+
+def _kept(element: Element, textured: Detection | None) -> str:
+    """What the texture keeps of an element that was found: all, a part, or nothing."""
+    if textured is None or textured.undetermined:
+        return ""
+    if element.kind == "inversion":
+        return "kept" if textured.inversion else ""
+    return kept((element.kind, element.direction.tolist(), element.order), _said(textured))
+
+
+def _said(d: Detection) -> list[Said]:
+    turns = ((a.axis.direction.tolist(), a.order, a.improper) for a in d.axes)
+    return said_of((p.plane.normal.tolist() for p in d.planes), turns)
+
+
+def _only_textured(d: Detection, textured: Detection) -> str:
+    """The directions of what the texture keeps of endless planes and axes, which are no rows of their own."""
+    own = _said(d)
+    alone = [one for one in _said(textured) if not kept(one, own)]
+    told = [f"{kind_name(kind, order)} {direction(np.array(along))}" for kind, along, order in alone]
+    return "; ".join(["", *told[:_TOLD]]) + "; ..." * (len(told) > _TOLD)
 
 
 def _place(element: Element) -> str:
