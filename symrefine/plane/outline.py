@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from symrefine.geometry import Array, Isometry
 from symrefine.plane.raster import Raster, between, coarser, outlines, raster_of
@@ -209,7 +210,13 @@ def _levels(points: Array, weights: Array) -> list[Array]:
 def smallest_diagonal(points: Array) -> float:
     """Diagonal of the smallest box around points [N, 2] over all orientations, to a ten-thousandth."""
     angles = np.radians(np.arange(0.0, 180.0, 0.5))
-    reach = points @ np.stack([np.cos(angles), np.sin(angles)])
-    hull = points[np.unique(np.concatenate([reach.argmax(axis=0), reach.argmin(axis=0)]))]
-    width = np.ptp(hull @ np.stack([np.cos(angles), np.sin(angles)]), axis=0)
+    width = np.ptp(_corners(points) @ np.stack([np.cos(angles), np.sin(angles)]), axis=0)
     return float(np.hypot(width, np.roll(width, 180)).min())
+
+
+def _corners(points: Array) -> Array:
+    """The corners of the convex hull, a few of the many pixels of a picture; all points if they lie on a line."""
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except QhullError:
+        return points
