@@ -279,6 +279,15 @@ def test_verbose_tells_stages_with_seconds_and_a_rate(run: Run) -> None:
         assert re.search(rf"^symrefine: {stage} \d+\.\d\d s, 4 points, [\d,]+ points/s$", err, re.MULTILINE)
 
 
+def test_what_is_drawn_has_stages_of_its_own(run: Run) -> None:
+    """Drawing takes longer than detecting as a rule, and was told as that."""
+    shown = ("--report", "a.html", "--picture", "a.png", "--recording", "a.rrd")
+    status, _, err = run("detect", "box.xyz", *shown, "-v")
+    assert status == 0
+    for stage in ("page", "picture", "recording"):
+        assert re.search(rf"^symrefine: {stage} [0-9.]+ s$", err, re.MULTILINE), stage
+
+
 def test_whoever_watches_is_told_of_stages_and_nobody_else_is() -> None:
     told: list[tuple[str, bool]] = []
     clock = Clock()

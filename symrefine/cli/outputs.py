@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from symrefine.cli.streams import aside, check_stdout
+from symrefine.clock import Clock
 from symrefine.errors import InputError, one_line, printable
 from symrefine.files import Writer, check_target, json_text, naming, place_of, text_writer
 from symrefine.files import write_all as write_all
@@ -108,8 +109,23 @@ def shown(args: "argparse.Namespace") -> dict[str, str | None]:
 
 
 def shown_writers(args: "argparse.Namespace", answer: "Answer") -> dict[str, Writer]:
-    """The writers of the files that show an answer, as far as they are asked for."""
-    return {name: answer.writer(SHOWN[option[2:]]) for option, name in shown(args).items() if name is not None}
+    """The writers of the files that show an answer, as far as they are asked for, each a stage of its own."""
+    asked = {option.removeprefix("--"): name for option, name in shown(args).items() if name is not None}
+    return {name: _staged(answer, option) for option, name in asked.items()}
+
+
+def _staged(answer: "Answer", option: str) -> Writer:
+    """What writes one of the files that show an answer: pages and pictures are drawn now, recordings as they go."""
+    if option == "recording":
+        write = answer.writer(SHOWN[option])
+
+        def recorded(path: Path) -> None:
+            with Clock()(option):
+                write(path)
+
+        return recorded
+    with Clock()("page" if option == "report" else option):
+        return answer.writer(SHOWN[option])
 
 
 def json_writer(name: str | None, record: Mapping[str, Any]) -> dict[str, Writer]:
