@@ -600,6 +600,17 @@ def test_an_alignment_says_how_sure_it_is(found):
     assert unlike.status != "ok"
 
 
+@pytest.mark.parametrize("given", ["cup.ply", Path("cup.ply"), POINTS], ids=["text", "path", "array"])
+def test_names_of_what_is_in_a_file_are_for_reading_it(given):
+    file = "FILE" if given is POINTS else "cup.ply"
+    call = f"symrefine.detect(symrefine.load('{file}', labels='color'))"
+    with pytest.raises(InputError, match=re.escape("labels is 'color', a name; ")) as refused:
+        symrefine.detect(given, labels="color")
+    assert str(refused.value).endswith(call)
+    with pytest.raises(InputError, match="weights is 'mass', a name"):
+        symrefine.detect(given, weights="mass")
+
+
 def test_an_answer_that_is_no_such_file_is_told_with_its_article(found, tmp_path):
     with pytest.raises(InputError, match=r"x\.stl: an Alignment cannot be written as \.stl"):
         found["alignment"].save(tmp_path / "x.stl")

@@ -51,7 +51,8 @@ def detect(
 
     Args:
         shape: a path, points [N, n], `(vertices, faces)`, a `Shape`, a `Stream`, or a mesh, a cloud or a molecule of
-            trimesh, Open3D, pyvista, ASE, pymatgen or torch (see `symrefine.load.objects.shape_of`).
+            trimesh, Open3D, pyvista, ASE, pymatgen or torch (see `symrefine.load.objects.shape_of`). What else a file
+            has, labels, one of several frames, a texture, is asked of `symrefine.load`, and the shape given.
         weights: [N] masses of the points. Of up to 250 points those of different mass are different things, which no
             symmetry exchanges; of more, masses are a sampling density.
         normals: [N, n] normals, any sign; estimated where absent.

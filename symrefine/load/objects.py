@@ -53,6 +53,7 @@ def shape_of(
     """
     extra = {"weights": weights, "normals": normals, "labels": labels, "viewpoint": viewpoint}
     told: dict[str, Any] = {key: value for key, value in extra.items() if value is not None}
+    _check_values(given, told)
     if isinstance(given, Shape):
         if told:
             raise InputError(f"{', '.join(told)}: belong to the Shape; give them there, or give an array of points")
@@ -78,6 +79,17 @@ def shape_of(
     with about(name):
         _check_size(points)
     return Shape(points, **told, source=name)
+
+
+def _check_values(given: Any, told: dict[str, Any]) -> None:
+    """Refuse the name of what is in a file where its values are expected: reading a file has such an option."""
+    for key, value in told.items():
+        if isinstance(value, str):
+            file = str(given) if isinstance(given, str | PathLike) else "FILE"
+            raise InputError(
+                f"{key} is {value!r}, a name; expected a value for each point. What a file calls so is read with it: "
+                f"symrefine.detect(symrefine.load({file!r}, {key}={value!r}))"
+            )
 
 
 def objects_of(given: Any) -> Sequence[Any] | None:
