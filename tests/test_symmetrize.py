@@ -473,6 +473,23 @@ def test_the_command_writes_the_mesh_and_tells_by_how_much_it_moved(
     assert out.read_bytes() != first
 
 
+def test_outliers_are_left_out_and_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shape = somewhere(table(4), 3)
+    points, _, _ = sample_surface(shape, 4000, np.random.default_rng(1))
+    center, size = points.mean(axis=0), float(np.linalg.norm(np.ptp(points, axis=0)))
+    strays = center + size * np.array([[3.0, 0.5, 0.2], [0.3, -4.0, 1.0]])
+    np.save(tmp_path / "a.npy", np.vstack([points, strays]))
+    argv = ["symmetrize", tmp_path / "a.npy", "-o", tmp_path / "b.ply", "--json", tmp_path / "r.json"]
+    assert invoke([str(word) for word in [*argv, "--picture", tmp_path / "c.png"]]) == 0
+    out, err = capsys.readouterr()
+    assert "; 2 outliers left out" in out
+    assert "2 points were taken as outliers: they are left out" in err
+    assert json.loads((tmp_path / "r.json").read_text())["outliers"] == 2
+    assert np.linalg.norm(load(tmp_path / "b.ply").points - center, axis=1).max() < size
+    assert invoke(["symmetrize", str(tmp_path / "b.ply"), "-o", str(tmp_path / "d.ply")]) == 0
+    assert "left out" not in "".join(capsys.readouterr())
+
+
 def test_a_continuous_group_is_told_to_become_finite(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = written(tmp_path / "a.ply", somewhere(lathe(24), 2))
     assert invoke(["symmetrize", str(path), "-o", str(tmp_path / "b.ply")]) == 0

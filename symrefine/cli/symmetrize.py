@@ -56,6 +56,8 @@ def run(args: argparse.Namespace) -> int:
         model = {args.out: made.writer(out.suffix.lower())}
         write_all(writers := model | shown_writers(args, made) | json_writer(args.json, record))
     tell(args.json, record, summary(record), writers)
+    if made.outliers:
+        note(f"{made.outliers:,} points were taken as outliers: they are left out")
     if not keeps_labels(out.suffix.lower(), shape):
         note("labels are not written")
     if not detection.group.is_finite and args.group is None:

@@ -21,6 +21,7 @@ def symmetrized_record(
     found: "Detection",
     source: Shape,
     *,
+    outliers: int,
     options: Mapping[str, Any],
     timings: Mapping[str, float],
     load_s: float | None = None,
@@ -31,6 +32,7 @@ def symmetrized_record(
         made: the symmetric shape.
         found: the symmetry that it rests on.
         source: the shape as it was.
+        outliers: points of it that were left out.
         options: what the caller chose, for the record.
         timings: seconds by stage.
         load_s: seconds that reading took.
@@ -45,6 +47,7 @@ def symmetrized_record(
         "method": made.method,
         "paired": number(made.paired),
         "points": len(made.shape.points),
+        "outliers": outliers,
         "largest": number(made.largest, 1.0),
         "rms": number(made.rms, 1.0),
         "residual": number(made.residual),

@@ -1,7 +1,7 @@
 """What was made of an object with its symmetry: the nearest exactly symmetric shape, a scan with what nobody saw."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -22,14 +22,14 @@ class Derived(Pictured):
     def _read(self) -> tuple[str, ...]:
         return (self.source.source,)
 
-    def _drawn(self) -> Shape:
-        """What the picture shows, with what was found."""
-        return self.source
+    def _drawn(self) -> tuple[Detection, Shape]:
+        """What the picture shows: what was found, and the object."""
+        return self.detection, self.source
 
     def _picture(self, width: int, height: int) -> bytes:
         from symrefine.picture.draw import picture_png
 
-        return picture_png(self.detection, self._drawn(), width=width, height=height)
+        return picture_png(*self._drawn(), width=width, height=height)
 
     def kinds(self) -> dict[str, Callable[[], Writer]]:
         objects = {suffix: partial(self._object, suffix) for suffix in self._suffixes()}
@@ -58,12 +58,14 @@ class Symmetrized(Derived, BareSymmetrized):
     Attributes:
         source: the shape as it was.
         detection: the symmetry that was found in it.
+        outliers: points of it that are no part of the object, and not in the result.
         options: what it was asked with.
         timings: seconds by stage, those of the detection among them.
     """
 
     source: Shape
     detection: Detection
+    outliers: int
     options: Options
     timings: Mapping[str, float]
 
@@ -71,11 +73,17 @@ class Symmetrized(Derived, BareSymmetrized):
         from symrefine.export.made import symmetrized_record
 
         return symmetrized_record(
-            self, self.detection, self.source, options=options, timings=self.timings, load_s=load_s
+            self,
+            self.detection,
+            self.source,
+            outliers=self.outliers,
+            options=options,
+            timings=self.timings,
+            load_s=load_s,
         )
 
-    def _drawn(self) -> Shape:
-        return self.shape
+    def _drawn(self) -> tuple[Detection, Shape]:
+        return replace(self.detection, outliers=self.detection.outliers[:0]), self.shape
 
     def _suffixes(self) -> Iterable[str]:
         from symrefine.export.models import MODELS

@@ -46,9 +46,10 @@ def _detected(record: Record) -> dict[str, str]:
 
 def _made(record: Record) -> dict[str, str]:
     """What was made exact, how, how far points moved, and how exact it is."""
+    out = f"; {record['outliers']:,} outliers left out" if record["outliers"] else ""
     return {
         "found": f"{symbol(record['found'])}, confidence {record['confidence']:.3f}",
-        "points": f"{record['points']:,}, {percent(record['paired'])} of them paired; {METHODS[record['method']]}",
+        "points": f"{record['points']:,}, {percent(record['paired'])} of them paired; {METHODS[record['method']]}{out}",
         "moved": f"by {percent(record['largest'])} of the diagonal at most, {percent(record['rms'])} RMS",
         "result": f"misses itself by {record['residual']:.1e} of the diagonal",
     }

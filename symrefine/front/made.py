@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
@@ -34,7 +35,7 @@ def symmetrize(
     units: str | None = None,
     seed: int = 0,
 ) -> "Symmetrized":
-    """The nearest exactly symmetric mesh or cloud.
+    """The nearest exactly symmetric mesh or cloud; outliers of a cloud are left out.
 
     Args:
         shape: whatever `detect` takes, in 3-space.
@@ -63,12 +64,16 @@ def symmetrize(
     wanted = found.exact.point_group if group is None and found.exact is not None else group
     chosen = found.group if wanted is None else placed_subgroup(found.group, wanted)
     used, clock, seed = relative_tolerance(tolerance, shape, units=units), Clock(), seed_of(seed)
+    # Of what a sample alone was looked at, no others are known.
+    out = found.outliers if shape.faces is None and len(found.shape.points) == len(shape.points) else found.outliers[:0]
+    own = shape.chosen(np.delete(np.arange(len(shape.points)), out)) if len(out) else shape
     with clock("symmetrize"):
-        made = symmetrize(shape, chosen, found.center, tolerance=used, seed=seed)
+        made = symmetrize(own, chosen, found.center, tolerance=used, seed=seed)
     return Symmetrized.of(
         made,
         source=shape,
         detection=found,
+        outliers=len(out),
         options=told(tolerance, units) | {"seed": seed, "group": group},
         timings={**found.timings, **clock.seconds},
     )
