@@ -146,3 +146,12 @@ def test_pictures_that_are_no_depths_or_masks(folder, tmp_path):
         symrefine.load_depth(folder / "depth.png", INTRINSICS, depth_scale=0.0)
     with pytest.raises(InputError, match="intrinsics are"):
         symrefine.load_depth(folder / "depth.png", (1.0, 2.0))
+
+
+def test_a_picture_of_16_bits_may_be_a_depth_image(folder, capsys):
+    assert invoke(["detect", str(folder / "depth.png")]) == 0
+    told = "depth.png: 16 bits: if this is a depth image, give --intrinsics"
+    assert told in capsys.readouterr().err
+    assert invoke(["detect", str(folder / "depth.png"), "--intrinsics", OPTION]) == 0
+    assert invoke(["detect", str(folder / "mask.png")]) == 0
+    assert "16 bits" not in capsys.readouterr().err

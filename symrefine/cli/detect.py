@@ -209,6 +209,11 @@ def _notes(
     is_grey = shape.dim == 2 and "threshold" in record["options"] and args.threshold is None
     if is_grey and (record["undetermined"] or record["point_group"] == "C1"):
         yield f"{shape.source}: if object and background are of different grey, try --threshold otsu"
+    if shape.dim == 2 and not is_quiet():
+        from symrefine.load.image import is_deep
+
+        if is_deep(Path(shape.source)):
+            yield f"{shape.source}: 16 bits: if this is a depth image, give --intrinsics"
     if shape.dim == 3 and record["options"].get("outliers", "auto") == "auto" and not is_quiet():
         yield from _floor(shape, detection)
 

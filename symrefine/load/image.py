@@ -9,12 +9,14 @@ smoothed away, unless the picture is binary.
 import io
 import warnings
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.errors import InputError
+from symrefine.files import file_bytes
 from symrefine.geometry import Array
 from symrefine.load.content import Content, Threshold, Wanted
 from symrefine.load.text import shorten
@@ -187,6 +189,12 @@ def check_size(image: "Image") -> None:
     frames = getattr(image, "n_frames", 1)
     if frames > 1:
         raise InputError(f"holds {frames} pictures, an animation or a series; save one of them by itself")
+
+
+def is_deep(path: Path) -> bool:
+    """Whether a file is a picture of one channel of 16 bits, as depth images are."""
+    suffix = path.suffix.lower()
+    return suffix in FORMATS and path.is_file() and open_image(file_bytes(path), suffix).mode in _DEEP
 
 
 def _grey(image: "Image") -> Array:
