@@ -468,7 +468,13 @@ def test_processes_and_shards_give_the_same_table(run: Run, lab: Path) -> None:
     assert "10 done before" in run("batch", "objects", "--out", "all.jsonl")[1]
     refused(run("merge", "p1.jsonl", "p2.jsonl", "--out", "some.jsonl"), "shard 3/3 is not complete: 3 of its 3")
     run("batch", "objects", "--shard", "3/3", "--out", "other.jsonl", "--seed", "1")
-    refused(run("merge", "p1.jsonl", "p2.jsonl", "other.jsonl", "--out", "some.jsonl"), "is part of another fleet")
+    refused(
+        run("merge", "p1.jsonl", "p2.jsonl", "other.jsonl", "--out", "some.jsonl"),
+        "is part of another fleet: of --seed 1,",
+    )
+    run("batch", "objects", "--shard", "3/3", "--out", "shape.jsonl", "--measure", "solid")
+    differs = "shape.jsonl: is part of another fleet: of --measure solid, and p1.jsonl of --measure none"
+    refused(run("merge", "p1.jsonl", "p2.jsonl", "shape.jsonl", "--out", "some.jsonl"), differs)
     refused(run("merge", "whole.jsonl", "--out", "some.jsonl"), "holds rows of no shard")
     refused(run("merge", *parts, "p1.jsonl", "--out", "some.jsonl"), "p1.jsonl: is named 2 times; merge takes each")
     before = (lab / "p1.jsonl").read_bytes()

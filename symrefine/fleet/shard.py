@@ -101,7 +101,7 @@ def merged(parts: Mapping[str, Sequence[Row]]) -> Rows:
     for name, rows in parts.items():
         for index, task in _latest(name, rows).items():
             first = first or task
-            _check_same(first, task)
+            _check_same(first, task, parts)
             other = tasks.setdefault(index, task).part
             if other != name:
                 raise InputError(
@@ -139,11 +139,39 @@ def _latest(name: str, rows: Sequence[Row]) -> dict[int, _Task]:
     return found
 
 
-def _check_same(first: _Task, other: _Task) -> None:
+def _check_same(first: _Task, other: _Task, parts: Mapping[str, Sequence[Row]]) -> None:
+    """Refuse parts of two fleets, with the option that tells them apart if one does."""
     own, its = first.place, other.place
-    if (own.fleet, own.tasks, own.of) != (its.fleet, its.tasks, its.of):
-        said = [f"{place.fleet} of {place.tasks} tasks in {place.of} shards" for place in (its, own)]
-        raise InputError(f"{other.part}: is part of another fleet, {said[0]}; {first.part} is part of {said[1]}")
+    if (own.fleet, own.tasks, own.of) == (its.fleet, its.tasks, its.of):
+        return
+    if own.fleet != its.fleet and (differs := _difference(parts[other.part], parts[first.part])):
+        name, value, expected = differs
+        raise InputError(
+            f"{other.part}: is part of another fleet: of {name} {value}, and {first.part} of {name} {expected}"
+        )
+    said = [f"{place.fleet} of {place.tasks} tasks in {place.of} shards" for place in (its, own)]
+    raise InputError(f"{other.part}: is part of another fleet, {said[0]}; {first.part} is part of {said[1]}")
+
+
+def _difference(rows: Sequence[Row], others: Sequence[Row]) -> tuple[str, str, str] | None:
+    """What was asked for otherwise in all rows of two parts, and both values; None if it is nothing that rows tell.
+
+    A manifest may ask for more than one value in a part.
+    """
+    said, expected = ([_asked(row) for row in part] for part in (rows, others))
+    for name in dict.fromkeys(name for row in (*said, *expected) for name in row):
+        values, wanted = ({row.get(name, "none") for row in part} for part in (said, expected))
+        if not values & wanted:
+            return name, " or ".join(sorted(values)), " or ".join(sorted(wanted))
+    return None
+
+
+def _asked(row: Row) -> dict[str, str]:
+    """What decides a row beside its file: options, with the name that the command line has for them, and versions."""
+    options = row.get("options")
+    told = options.items() if isinstance(options, dict) else ()
+    named = {f"--{name.replace('_', '-')}": str(value) for name, value in told if value is not None}
+    return named | {name: str(row[name]) for name in ("version", "code", "config") if name in row}
 
 
 def _check_complete(place: _Place, done: Set[int]) -> None:
