@@ -72,6 +72,15 @@ def names(*paths: str, recursive: bool = False) -> list[str]:
     return [source.name for source in sources(paths, recursive=recursive)]
 
 
+def test_files_of_other_kinds_are_told(run: Run, lab: Path) -> None:
+    for name in ("a.json", "b.PNG", "readme.md", "LICENSE", ".hidden.txt.bak"):
+        (lab / "objects" / name).write_text("{}")
+    told = "symrefine: note: 4 files of other kinds not looked at (.json .md .png without suffix)\n"
+    for _ in range(2):
+        assert run("batch", "objects", "--out", "objects/rows.jsonl")[2] == told
+    assert run("batch", "objects", "-q")[2] == run("batch", "objects/box000.xyz")[2] == ""
+
+
 def test_directories_files_and_patterns_give_each_object_once(lab: Path) -> None:
     (lab / "more" / "deep").mkdir(parents=True)
     (lab / "more" / "deep" / "a.xyz").write_text("0 0 0\n")

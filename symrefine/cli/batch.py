@@ -20,6 +20,7 @@ from symrefine.cli.outputs import (
     write_all,
 )
 from symrefine.cli.signs import counting
+from symrefine.cli.sources import passed_over
 from symrefine.cli.values import (
     add_class_options,
     add_detection_options,
@@ -80,6 +81,8 @@ def run(args: argparse.Namespace) -> int:
 
     one_thread_each()  # before anything heavy is imported
     jobs, numbers = _jobs(args)
+    if args.path and (others := passed_over(args.path, recursive=args.recursive, besides=_written(args))):
+        note(others)
     does = executor(args)
     from symrefine.cli.objects import detected, holds, known_apart
     from symrefine.cli.rows import ROW_HEAD, row_line
@@ -133,7 +136,7 @@ def _jobs(args: argparse.Namespace) -> tuple[list["Job"], dict[str, int]]:
     from symrefine.fleet.tasks import our_version
 
     found = _sources(args)
-    outputs = {"--out": args.out, "--bop": args.bop, "--table": args.table}
+    outputs = dict(zip(("--out", "--bop", "--table"), _written(args), strict=True))
     manifests = () if args.manifest is None else (args.manifest,)
     check_outputs(outputs, (Path(name) for name in chain(manifests, (source.path for source in found))))
     check_bop(args.bop, {"--bop-scale": args.bop_scale})
@@ -156,6 +159,11 @@ def _jobs(args: argparse.Namespace) -> tuple[list["Job"], dict[str, int]]:
     fleet = Whole.of(len(jobs), chain([our_version()], about))
     own = [index for index in range(len(jobs)) if args.shard.takes(index)]
     return [replace(jobs[index], mark=fleet.mark(args.shard, index)) for index in own], numbers
+
+
+def _written(args: argparse.Namespace) -> tuple[str | None, ...]:
+    """The files that are written."""
+    return args.out, args.bop, args.table
 
 
 def _sources(args: argparse.Namespace) -> list["Source"]:

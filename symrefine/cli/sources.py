@@ -59,10 +59,33 @@ def _local(path: str, recursive: bool) -> dict[str, str]:
         if missing := [name for name in files if not Path(name).exists()]:
             raise InputError(f"{missing[0]}: no such directory, file or pattern")
         return {name: name for name in files}
-    found = folder.rglob("*") if recursive else folder.glob("*")
-    names = (p.relative_to(folder) for p in found if _is_ours(p) and p.is_file())
-    shown = sorted(name.as_posix() for name in names if not any(part.startswith(".") for part in name.parts))
+    shown = sorted(name.as_posix() for name in _files_in(folder, recursive) if _is_ours(name))
     return {name: str(folder / name) for name in shown}
+
+
+def _files_in(folder: Path, recursive: bool) -> Iterator[Path]:
+    """The files in a directory that are not hidden, relative to it."""
+    found = folder.rglob("*") if recursive else folder.glob("*")
+    names = (p.relative_to(folder) for p in found if p.is_file())
+    return (name for name in names if not any(part.startswith(".") for part in name.parts))
+
+
+def passed_over(paths: Sequence[str], *, recursive: bool, besides: Sequence[str | None]) -> str:
+    """How many files of directories are of kinds that are not looked at, and which; empty if there are none.
+
+    Args:
+        paths: of which the directories count.
+        recursive: whether those in them count, too.
+        besides: files that are no matter: what is to be written.
+    """
+    known = {Path(name).resolve() for name in besides if name is not None}
+    folders = [Path(path) for path in paths if not is_remote(path) and Path(path).is_dir()]
+    others = {folder / name for folder in folders for name in _files_in(folder, recursive) if not _is_ours(name)}
+    others = {path for path in others if path.resolve() not in known}
+    if not others:
+        return ""
+    kinds = " ".join(sorted({path.suffix.lower() or "without suffix" for path in others}))
+    return f"{len(others):,} {'file' if len(others) == 1 else 'files'} of other kinds not looked at ({kinds})"
 
 
 def _is_ours(path: Path) -> bool:
