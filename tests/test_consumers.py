@@ -582,6 +582,10 @@ def test_the_transform_takes_the_file_to_the_canonical_model(tmp_path: Path) -> 
         ("--to megapose --out f --improper", "--improper: does not apply"),
         ("--to npz --out f.npz --scale 2", "--scale: does not apply"),
         ("--to npz --out f.json", "ends in .npz"),
+        (
+            "--to dope --out model.obj",
+            "is the name of a model, and dope takes a folder; expected a name without suffix",
+        ),
         ("--to canonical --out f.gltf", "cannot write .gltf"),
         ("--to canonical --out f.ply --transform t.txt", "ends in .json or .npz"),
         ("--to canonical --out part.ply", "same file as the input"),

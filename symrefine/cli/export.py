@@ -18,7 +18,7 @@ from symrefine.cli.values import (
     millimetres,
     natural,
 )
-from symrefine.errors import InputError
+from symrefine.errors import InputError, about
 from symrefine.export.formats import TAKES, takers
 from symrefine.files import check_folder
 
@@ -110,6 +110,8 @@ def detected(args: argparse.Namespace) -> tuple["Shape", "Detection"]:
 
 def _check(args: argparse.Namespace) -> None:
     """Refuse, before any work, options of other formats and outputs that cannot be written."""
+    from symrefine.export.packages import check_folder_name
+
     for option, name in _OPTIONS.items():
         if getattr(args, option) is not None and name not in TAKES[args.to]:
             raise InputError(f"--{option}: does not apply to --to {args.to}; it is for {', '.join(takers(name))}")
@@ -117,6 +119,8 @@ def _check(args: argparse.Namespace) -> None:
         out = Path(args.out)
         if out.exists() and not out.is_dir():
             raise InputError(f"--out {out}: is a file; expected a folder")
+        with about("--out"):
+            check_folder_name(args.to, out)
         if not out.parent.is_dir():
             raise InputError(f"--out {out}: cannot be made: there is no directory {out.parent}")
         check_folder(out if out.exists() else out.parent, f"--out {out}")

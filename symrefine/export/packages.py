@@ -17,6 +17,7 @@ from symrefine.export.formats import TAKES, Format, takers
 from symrefine.export.models import check_suffix, model_bytes, moved, npz_bytes
 from symrefine.export.operations import STEPS, motions_bytes, motions_limits, reflections_left_out
 from symrefine.files import bytes_writer, check_other, check_target, json_text, write_all
+from symrefine.load import SUFFIXES
 from symrefine.shape import Shape
 from symrefine.units import check_scale
 
@@ -82,9 +83,20 @@ def package_of(
     elif to == "canonical":
         made = canonical_package(out, detection, shape, transform=transform or place_of_transform(out))
     else:
+        check_folder_name(to, out)
         made = consumer_package(to, out, detection, shape, number=number, scale=scale)
     _check_places(list(made.files), shape.source, in_folder=to in CONSUMERS)
     return made
+
+
+def check_folder_name(to: str, folder: Path) -> None:
+    """Refuse the name of a model where a folder is made.
+
+    Raises:
+        InputError: the folder has the suffix of a model, and is not there.
+    """
+    if folder.suffix.lower() in SUFFIXES and not folder.is_dir():
+        raise InputError(f"{folder}: is the name of a model, and {to} takes a folder; expected a name without suffix")
 
 
 def _check_places(files: Sequence[Path], source: str, *, in_folder: bool) -> None:
