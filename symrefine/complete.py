@@ -92,7 +92,12 @@ def check_scan(shape: Shape) -> None:
         InputError: a mesh, atoms, or points that are not of space.
     """
     if shape.faces is not None or shape.dim != 3 or is_few(shape):
-        raise InputError(f"{shape.source}: completion is for clouds of the surface of an object in space")
+        told = "completion is for clouds of the surface of an object in space"
+        if shape.faces is not None:
+            told += (
+                "; this is a mesh, whose surface is all there: sample points on it, as a camera would, and give these"
+            )
+        raise InputError(f"{shape.source}: {told}")
 
 
 def verdicts(found: Detection, points: Array) -> Verdicts:

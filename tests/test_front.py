@@ -531,7 +531,7 @@ def test_what_has_nothing_to_make_symmetric_tells_by_how_much_the_nearest_misses
 def test_completion_takes_a_cloud_and_what_was_found_in_it():
     made = symrefine.detect(scan())
     assert len(symrefine.complete(scan(), made).points) == len(symrefine.complete(scan()).points)
-    with pytest.raises(InputError, match="completion is for clouds"):
+    with pytest.raises(InputError, match=r"completion is for clouds .*; this is a mesh, .*: sample points on it"):
         symrefine.complete((CORNERS, TRIANGLES))
 
 

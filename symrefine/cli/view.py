@@ -3,8 +3,11 @@
 import argparse
 from pathlib import Path
 
-HELP = "open a recording of `detect --recording` in the viewer"
-DESCRIPTION = "Open a recording that `symrefine detect --recording FILE.rrd` wrote: the shape and every iteration."
+HELP = "open a recording of `detect` or `align` in the viewer"
+DESCRIPTION = (
+    "Open a recording that --recording FILE.rrd of `symrefine detect` or `symrefine align` wrote: the shape and every "
+    "iteration, or both objects before and after."
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

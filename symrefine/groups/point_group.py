@@ -208,7 +208,9 @@ def point_group(name: str, frame: ArrayLike | None = None) -> PointGroup:
 
     Args:
         name: `C4v`, `d24h`, `S8`, `Ih`, `Cinfv`, `C∞v`, ...; an alias (`C1h`) is read as the canonical group (`Cs`).
-        frame: rotation [3, 3]; rows are the x, y and z axes of the group: `frame_with_z(axis)` puts it on an axis.
+        frame: rotation [3, 3]; rows are the x, y and z axes of the group. Of one whose last row is a direction the main
+            axis points there; `symrefine.geometry.frame_with_z(direction)` makes one.
+
     Raises:
         InputError: no such group, or the frame is no rotation.
     """
