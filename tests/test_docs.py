@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
+from dataclasses import fields
 from html.parser import HTMLParser
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,13 +17,16 @@ import pytest
 
 import symrefine
 from experiments.studies import pages
-from symrefine.cli import BAD_INPUT, BROKEN_PIPE, BUG, INTERRUPTED
+from symrefine.cli import BAD_INPUT, BROKEN_PIPE, BUG, INTERRUPTED, invoke
 from symrefine.cli.parser import parse
 from symrefine.cli.several import UNDETERMINED
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.export.records import detection_record
 from symrefine.shape import Shape
+from symrefine.study.figures import KINDS
+from symrefine.study.schema import Claim, Figure, Study, Table
+from symrefine.study.summary import _NUMBERS
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -98,6 +102,25 @@ def test_every_public_name_is_explained() -> None:
         r"^::: symrefine\.(?:\w+\.)*(\w+)$", (DOCS / "api.md").read_text(encoding="utf-8"), re.MULTILINE
     )
     assert set(symrefine.__all__) - set(explained) == {"__version__"}
+
+
+def test_the_page_of_experiments_tells_every_key_and_its_example_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = (DOCS / "experiments.md").read_text(encoding="utf-8")
+    keys = {field.name for kind in (Study, Table, Figure, Claim) for field in fields(kind)} - {"node"}
+    told = set(re.findall(r"`(\w+)`", page))
+    assert {*keys, *KINDS, *_NUMBERS} <= told
+    for language, name in (("python", "turned_boxes.py"), ("yaml", "boxes.yaml")):
+        text = page.partition(f"```{language}\n")[2].partition("```")[0]
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        monkeypatch.setenv(name, "1")
+    assert invoke(["run", "boxes.yaml", "--quick"]) == 0
+    assert (tmp_path / "out/boxes/tables.md").read_text().count("1 of 1") == 2
+    assert (tmp_path / "out/boxes/confidence-over-noise.png").is_file()
 
 
 def used_modules(path: Path) -> Iterator[str]:

@@ -208,6 +208,7 @@ def test_hash_is_that_of_the_cases_alone(make: Make) -> None:
         ("lab.toy", "lab.tooy", "toy.yaml:1: experiment: there is no lab/tooy.py"),
         ("lab.toy", "../lab", "toy.yaml:1: experiment: expected the name of a Python module"),
         ("experiment: lab.toy\n", "", "config: missing experiment"),
+        ("experiment:", "experimnt:", r"toy.yaml:1: experimnt: unknown key; did you mean experiment\?"),
         ("fixed: {wait: 0}", "out: twice", "toy.yaml:3: not YAML"),
         ("{range: 3}", "{range: [1", "not YAML"),
     ],

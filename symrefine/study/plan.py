@@ -9,7 +9,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from symrefine.errors import InputError
+from symrefine.errors import InputError, meant
 from symrefine.study.document import Node, override, put, read_document
 from symrefine.study.experiment import Experiment, Row, find_root, load_experiment
 from symrefine.study.schema import NOTHING, Study
@@ -63,6 +63,9 @@ def make_plan(path: Path, settings: Sequence[str] = (), *, quick: bool = False) 
             root = put(root, key.split("."), node, f"{node.place}: {node.path}")
     root = override(root, settings)
     if isinstance(root.value, dict) and "experiment" not in root.value:
+        for key in root.value:
+            if close := meant(key, ["experiment"]):
+                raise root.at(key).error(f"unknown key{close}")
         raise root.error(f"missing experiment, so `symrefine run` can do nothing with it; {_elsewhere(path)}")
     study: Study = typed(root, Study)
     name = root.at("experiment")
