@@ -81,8 +81,6 @@ def run(args: argparse.Namespace) -> int:
 
     one_thread_each()  # before anything heavy is imported
     jobs, numbers = _jobs(args)
-    if args.path and (others := passed_over(args.path, recursive=args.recursive, besides=_written(args))):
-        note(others)
     does = executor(args)
     from symrefine.cli.objects import detected, holds, known_apart
     from symrefine.cli.rows import ROW_HEAD, row_line
@@ -92,6 +90,8 @@ def run(args: argparse.Namespace) -> int:
     with opened(Path(args.out)) if args.out else passing("file") as out:
         if out.torn:
             note(f"{args.out}: the last row is incomplete; it is removed and done again")
+        if args.path and (others := passed_over(args.path, recursive=args.recursive, besides=_written(args))):
+            note(others)
         rows_by_name = out.latest
         known = known_apart(jobs, rows_by_name, does.limits)
         done = [job for job in known if holds(rows_by_name.get(job.name), job, does.limits)]
