@@ -101,6 +101,27 @@ def test_a_surface_has_no_strays_however_uneven(make, ratio):
     assert np.isin(seen.even, seen.kept).all()
 
 
+def half_dense(name, noise_rel):
+    """A body of which one half is sampled ten times as densely as the other, as built."""
+    body = sample(specimen("shape", name)[0], 120000, noise_rel, np.random.default_rng(8))
+    dense = body[:, 0] > np.median(body[:, 0])
+    return body[np.random.default_rng(9).random(len(body)) < np.where(dense, 0.3, 0.03)]
+
+
+@pytest.mark.parametrize("name", ["gear12", "clutter"])
+def test_the_sparse_half_of_a_body_is_in_planes_and_holds_no_strays(name):
+    points = half_dense(name, 0.0)
+    assert len(sampling(points, np.random.default_rng(0), outliers=True).strays) < 0.003 * len(points)
+
+
+@pytest.mark.parametrize("name", ["gear24", "wheel7"])
+def test_what_strays_does_so_however_it_is_turned(name):
+    points = half_dense(name, 0.003)
+    every = [points, *(posed(points, seed)[0] for seed in (3, 4))]
+    counts = [len(sampling(p, np.random.default_rng(0), outliers=True).strays) for p in every]
+    assert np.ptp(counts) <= 0.001 * len(points)
+
+
 def test_a_volume_has_no_strays():
     cloud = np.random.default_rng(4).normal(size=(8000, 3))
     assert len(sampling(cloud, np.random.default_rng(0), outliers=True).strays) == 0
@@ -753,12 +774,13 @@ def test_a_group_asks_for_no_more_belief_than_what_generates_it():
     assert found.need < TOLERANCE
 
 
-def test_a_continuous_group_asks_for_the_belief_that_its_turns_need(monkeypatch):
-    """A disc with patches missing: if half turns that carry it to its other side were sure, no azimuth would be."""
+@pytest.mark.parametrize("turns", [True, False])
+def test_a_continuous_group_asks_for_the_belief_that_its_turns_need_and_what_turns_its_axis_around(turns, monkeypatch):
+    """A disc with patches missing: half turns to its other side say nothing of azimuths, and turns nothing of sides."""
     as_seen = Surface.coverage
 
     def believed(surface, misses, motions, **options):
-        asked = 0.25 if len(motions) == len(FREE_TURNS) else 0.0
+        asked = 0.25 if (len(motions) == len(FREE_TURNS)) == turns else 0.0
         return replace(as_seen(surface, misses, motions, **options), supported=1.0, told=1.0, unseen=asked)
 
     monkeypatch.setattr(Surface, "coverage", believed)
@@ -768,6 +790,18 @@ def test_a_continuous_group_asks_for_the_belief_that_its_turns_need(monkeypatch)
     disc = disc[np.min([np.linalg.norm(disc[:, :2] - p, axis=1) for p in patches], axis=0) > 0.11]
     found = at_truth(disc, Truth(group=PointGroup(name="Dinfh"), center=np.zeros(3)))
     assert found.need > 0.4 * TOLERANCE
+
+
+def test_what_nobody_saw_is_told_by_all_local_planes():
+    """What hangs together as one patch, and where it begins, depends on which are asked: it is all of them."""
+    made, truth = damaged.damaged(damaged.Case(family="shape", name="bossed_prism", kind="hole", strength=0.15, seed=5))
+    surface = gather(measure(Shape(points=made.points)), np.random.default_rng(0))[1]
+    found = at_truth(made.points, truth)
+    motions = [m for e in found.elements for m in e.motions]
+    unseen = np.isnan(surface.seen(surface.misses(motions), motions, together=True)).mean(axis=1)
+    ends = np.cumsum([len(e.motions) for e in found.elements])
+    assert unseen.max() > 0.1
+    assert [e.coverage.unseen for e in found.elements] == [part.max() for part in np.split(unseen, ends[:-1])]
 
 
 def test_the_corner_of_a_cube_says_at_least():

@@ -11,6 +11,7 @@ from dataclasses import replace
 from functools import partial
 from operator import attrgetter
 
+from symrefine.decide.broken import unbroken
 from symrefine.decide.ends import (
     ends_there,
     ends_too,
@@ -31,7 +32,6 @@ from symrefine.decide.hypotheses import (
     has_all,
     roughly_judged,
     single,
-    unbroken,
 )
 from symrefine.decide.looks import COARSE, by_chance, exact_need, glances, hopeless, looked_at, start_error
 from symrefine.decide.place import SUPPORTED, least_elsewhere

@@ -14,7 +14,7 @@ import numpy as np
 from symrefine.decide.looks import COARSE, Look, exact_need, mended, seems, slid
 from symrefine.decide.place import is_told, least_elsewhere
 from symrefine.decide.posterior import EVEN, EVEN_MIRROR, certain
-from symrefine.fit.placed import FITTED, Operations, Placed, elements, joined
+from symrefine.fit.placed import FITTED, Operations, Placed, elements
 from symrefine.fit.refine import SHORT, Iterate, refine
 from symrefine.geometry import Array, Axis, Isometry, frame_with_z, rotation
 from symrefine.groups import PointGroup, is_subgroup
@@ -225,6 +225,10 @@ def _placed(
     # What holds without it asks for no belief in anything unseen.
     if surface.openings is not None and not surface.viewed and need > exact_need(surface.floor):
         partly, seen, belief = _seen_judged(surface, parts, misses, drifts)
+        if least == MOVED_EACH and math.hypot(seen, belief) < need:
+            # A patch is unseen by where it begins, and what hangs together as one depends on which planes are asked.
+            parts = replace(parts, sources=len(surface.cloud.points))
+            partly, seen, belief = _seen_judged(surface, parts, *_met(surface, parts))
         if math.hypot(seen, belief) < need:
             found, need, believed = partly, math.hypot(seen, belief), belief
     if least == MOVED_EACH:
@@ -325,14 +329,23 @@ def _seen_judged(
         return found, need, 0.0
     whole = belief_in_as_much(surface, parts.placed)
     beliefs = [whole * e.coverage.belief for e in found]
-    # More than half of the operations of a group generate it (Lagrange), so that the others follow; of a continuous one
-    # that takes turns about its axes, as nearly all are.
-    turns = [b for e, b in zip(found, beliefs, strict=True) if math.isinf(e.operations.order)]
-    return (
-        tuple(replace(e, need=math.hypot(e.need, b)) for e, b in zip(found, beliefs, strict=True)),
-        need,
-        max(turns, default=sorted(beliefs)[len(beliefs) // 2]),
-    )
+    believed = tuple(replace(e, need=math.hypot(e.need, b)) for e, b in zip(found, beliefs, strict=True))
+    return believed, need, _believed(parts, beliefs)
+
+
+def _believed(parts: _Parts, beliefs: Sequence[float]) -> float:
+    """What a group asks to be believed in whose elements ask for so much.
+
+    More than half of its operations generate it (Lagrange), so that the others follow. Of a continuous one turns about
+    its axes do, which what is round has with all mirrors through them, and one operation that turns an axis around.
+    """
+    each = [*zip(parts.operations, beliefs, strict=True)]
+    turns = [b for part, b in each if math.isinf(part.order)]
+    if not turns:
+        return sorted(beliefs)[len(beliefs) // 2]
+    axis = parts.placed.group.frame[2]
+    around = (b for part, b in each if any(axis @ m @ axis < 0.0 for m in part.matrices))
+    return max(*turns, min(around, default=0.0))
 
 
 def belief_in_as_much(surface: Surface, placed: Placed) -> float:
@@ -369,25 +382,3 @@ def _judged(surface: Surface, parts: _Parts, misses: Array, drifts: Array) -> tu
 def single(element: Element) -> Hypothesis:
     """An element of a group as a group of its own."""
     return Hypothesis(placed=element.operations.alone(element.center), elements=(element,), need=element.need)
-
-
-def unbroken(surface: Surface, found: Hypothesis) -> Hypothesis | None:
-    """What stays of a group where something that no camera saw breaks a mirror that is no image of others.
-
-    Of a mirror across an axis of order 3 or more that leaves what keeps the direction of the axis; of several mirrors
-    that are all such, the one of which cameras saw most. Otherwise None, as of Cs and C2h, and where too little was
-    seen to tell what is left.
-    """
-    group, lone = found.group, found.group.lone_mirrors() if surface.viewed else ()
-    mirrors = [e for e in found.elements if e.operations.kind == "plane"]
-    if len(lone) == 1 and group.symbol.fold > 2:
-        axis = group.frame[2]
-        kept = tuple(e for e in found.elements if all(axis @ m @ axis > 0.0 for m in e.operations.matrices))
-        placed = joined([e.operations.alone(e.center) for e in kept]) if kept else None
-        if placed is None or not is_told(placed, [(e.operations, e.coverage.supported) for e in kept]):
-            return None
-        return Hypothesis(placed=placed, elements=kept, need=max(e.need for e in kept))
-    if 1 < len(mirrors) == len(lone):
-        first, *others = sorted((single(e) for e in mirrors), key=lambda h: -h.supported)
-        return replace(first, rivals=tuple(h.placed for h in others))
-    return None

@@ -145,8 +145,9 @@ def _alone(around: Surroundings) -> Mask:
         mean, normals, variances = around.planes_at(sparse)
         across = np.abs(np.einsum("ni,ni->n", normals, points[sparse] - mean))
         loose = (thickness_of(variances) > FLAT) | (across > FLAT * around.away[sparse, -1])
-        # As random points are among themselves, or far from what is dense around: thin parts, sampled sparsely, are not
-        if not _scattered(points[sparse[loose]], np.ptp(points, axis=0)):
+        # As random points are among themselves, or far from what is dense around: parts that are sampled sparsely are
+        # in planes, most of them, or thin.
+        if 2 * loose.sum() <= len(loose) or not _scattered(points[sparse[loose]], points):
             loose &= reach[sparse] > FAR * reach[around.near[sparse]].min(axis=1)
         found[sparse] = loose
     return found
@@ -171,14 +172,15 @@ def strays_beside(points: Array, around: Surroundings) -> Mask:
     return found
 
 
-def _scattered(points: Array, box: Array) -> bool:
-    """Whether most of points [N, 3] lie no closer together than random ones in a box of these sides [3] would."""
+def _scattered(points: Array, body: Array) -> bool:
+    """Whether most of points [N, 3] lie no closer together than random ones within a body [M, 3] would."""
     neighbours = AROUND // 2
     if len(points) <= neighbours:
         return False
     away = Tree(points).query(points, 1, skip=neighbours)[0]
     # The ball to the eighth neighbour should then hold eight; of thin parts that are sampled sparsely a tenth of one.
-    return bool(4.0 / 3.0 * np.pi * np.median(away) ** 3 * len(points) > np.prod(box))
+    # The body, however it is turned, is as large as the ellipsoid whose shell spreads as it does.
+    return bool(np.median(away) ** 3 * len(points) > np.sqrt(np.linalg.det(3.0 * np.cov(body.T))))
 
 
 def _is_uneven(around: Surroundings, points: Array) -> bool:
