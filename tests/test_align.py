@@ -352,8 +352,9 @@ def test_either_hand_of_what_is_its_own_mirror_image_is_sure_and_nothing_is_dete
     source, target = (damage.outliers(mug(), share, rng).points for _ in range(2))
     monkeypatch.setattr(story, "detect", None)
     found = align(source, target @ random_orthogonal(rng, det=-1).T)
-    assert found.determinant_confidence < 0.9
     assert (found.status, found.confidence > 0.95) == ("ok", True)
+    monkeypatch.undo()
+    assert found.determinant_confidence <= 0.5, "all maps that do as well are asked for"
 
 
 def test_a_symmetric_mesh_gets_a_rotation() -> None:

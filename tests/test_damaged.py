@@ -792,18 +792,6 @@ def test_a_continuous_group_asks_for_the_belief_that_its_turns_need_and_what_tur
     assert found.need > 0.4 * TOLERANCE
 
 
-def test_what_nobody_saw_is_told_by_all_local_planes():
-    """What hangs together as one patch, and where it begins, depends on which are asked: it is all of them."""
-    made, truth = damaged.damaged(damaged.Case(family="shape", name="bossed_prism", kind="hole", strength=0.15, seed=5))
-    surface = gather(measure(Shape(points=made.points)), np.random.default_rng(0))[1]
-    found = at_truth(made.points, truth)
-    motions = [m for e in found.elements for m in e.motions]
-    unseen = np.isnan(surface.seen(surface.misses(motions), motions, together=True)).mean(axis=1)
-    ends = np.cumsum([len(e.motions) for e in found.elements])
-    assert unseen.max() > 0.1
-    assert [e.coverage.unseen for e in found.elements] == [part.max() for part in np.split(unseen, ends[:-1])]
-
-
 def test_the_corner_of_a_cube_says_at_least():
     squares = [np.random.default_rng(k).random((5000, 3)) for k in range(3)]
     for k, square in enumerate(squares):

@@ -225,10 +225,6 @@ def _placed(
     # What holds without it asks for no belief in anything unseen.
     if surface.openings is not None and not surface.viewed and need > exact_need(surface.floor):
         partly, seen, belief = _seen_judged(surface, parts, misses, drifts)
-        if least == MOVED_EACH and math.hypot(seen, belief) < need:
-            # A patch is unseen by where it begins, and what hangs together as one depends on which planes are asked.
-            parts = replace(parts, sources=len(surface.cloud.points))
-            partly, seen, belief = _seen_judged(surface, parts, *_met(surface, parts))
         if math.hypot(seen, belief) < need:
             found, need, believed = partly, math.hypot(seen, belief), belief
     if least == MOVED_EACH:
