@@ -309,6 +309,16 @@ def tight_diagonal(points: Array) -> float:
     return best
 
 
+def hull_volume(points: Array) -> float:
+    """Volume of the convex hull of points [N, 3]; 0 where they are flat."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return float(ConvexHull(points).volume)
+    except QhullError:
+        return 0.0
+
+
 def corners(points: Array) -> Array:
     """Corners [k, n] of the convex hull of points [N, n], in the space that they span: flat sets have no volume."""
     from scipy.spatial import ConvexHull

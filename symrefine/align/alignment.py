@@ -127,8 +127,9 @@ class Alignment(ReadOnly):
 
     @property
     def observable(self) -> str:
-        """What the pair determines: "full", up to what, or "nothing" where the status is not "ok"."""
-        return self.coset.observable if self.status == OK else "nothing"
+        """What the pair determines: "full", or up to what; "nothing" where there is one map, and it does not hold."""
+        told = self.coset.observable
+        return told if told != "full" or self.status == OK else "nothing"
 
     @property
     def free_axis(self) -> Array:
@@ -186,7 +187,9 @@ class Alignment(ReadOnly):
     @property
     def determinant_confidence(self) -> float:
         """Probability that the determinant is right, 0.5 where a reflection does as well; 1 where none is admitted."""
-        return min(self._said.determinant_confidence, 0.5 if self.coset.has_both_hands else 1.0)
+        told, of_part = self._said.determinant_confidence, self._said.confidence is not None
+        # Maps of parts are told that do about as well, which was weighed.
+        return told if of_part or not self.coset.has_both_hands else min(told, 0.5)
 
     @property
     def is_misfit(self) -> bool:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.geometry import Array, Mask
+from symrefine.geometry import Array, Mask, hull_volume
 from symrefine.shape import Index
 from symrefine.surface.clumps import clumps, filled
 from symrefine.surface.misses import SHARES
@@ -173,14 +173,13 @@ def strays_beside(points: Array, around: Surroundings) -> Mask:
 
 
 def _scattered(points: Array, body: Array) -> bool:
-    """Whether most of points [N, 3] lie no closer together than random ones within a body [M, 3] would."""
+    """Whether most of points [N, 3] lie no closer together than random ones in the hull of a body [M, 3] would."""
     neighbours = AROUND // 2
     if len(points) <= neighbours:
         return False
     away = Tree(points).query(points, 1, skip=neighbours)[0]
     # The ball to the eighth neighbour should then hold eight; of thin parts that are sampled sparsely a tenth of one.
-    # The body, however it is turned, is as large as the ellipsoid whose shell spreads as it does.
-    return bool(np.median(away) ** 3 * len(points) > np.sqrt(np.linalg.det(3.0 * np.cov(body.T))))
+    return bool(4.0 / 3.0 * np.pi * np.median(away) ** 3 * len(points) > hull_volume(body))
 
 
 def _is_uneven(around: Surroundings, points: Array) -> bool:
