@@ -118,6 +118,10 @@ class Shape:
         points = self.points[rows]
         return replace(self, points=points, weights=weights, normals=normals, labels=labels, viewpoint=viewpoint)
 
+    def without(self, rows: Index) -> "Shape":
+        """The cloud without some of its points, with what is known of each of the others."""
+        return self.chosen(np.delete(np.arange(len(self.points)), rows))
+
     @property
     def dim(self) -> int:
         """Dimension of the ambient space."""

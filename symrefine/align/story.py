@@ -147,23 +147,28 @@ def _align_solid(
     if partly and not tried and likely < SURE:
         part = _in_part(evidence, reflections, clock)
         if part is not None and part.confidence >= likely:
-            return _unless_of_other_size(part, evidence, reflections, clock)
+            return _unless_of_other_size(part, evidence, reflections, clock, choice)
     if scale and surfaces and likely < SURE:
         part = _in_part(evidence, reflections, clock, scale=True)
         if part is not None and part.confidence >= max(likely, SURE):
             return part
     known = excess if surfaces and agree else None
     found = _as_whole(choice, motion, done, clock, scale=scale, reflections=reflections, excess=known)
-    return found if likely >= SURE or not partly else _unless_of_other_size(found, evidence, reflections, clock)
+    return found if likely >= SURE or not partly else _unless_of_other_size(found, evidence, reflections, clock, choice)
 
 
-def _unless_of_other_size(found: Alignment, evidence: Evidence, reflections: bool, clock: Clock) -> Alignment:
-    """What was found of surfaces as they are, unless it is not sure and they surely agree at one size."""
+def _unless_of_other_size(
+    found: Alignment, evidence: Evidence, reflections: bool, clock: Clock, choice: Choice | None = None
+) -> Alignment:
+    """What was found of surfaces as they are, unless it is not sure and they surely agree at one size.
+
+    By the choice that was made, if they were compared at one size.
+    """
     if found.confidence >= SURE:
         return found
-    sized = replace(evidence, scale=True)
-    with clock("choose"):
-        choice = choose(sized, reflections=reflections, brief=True)
+    if choice is None or not evidence.scale:
+        with clock("choose"):
+            choice = choose(replace(evidence, scale=True), reflections=reflections, brief=True)
     whole = choice.evidence
     blurred = math.hypot(size_sigma(whole.source, whole.target), _blurred(whole))
     apart = abs(_factor(whole, choice.motion) - 1.0) > RIM * blurred

@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
     with opened(Path(args.out)) if args.out else passing("file") as out:
         if out.torn:
             note(f"{args.out}: the last row is incomplete; it is removed and done again")
-        if args.path and (others := passed_over(args.path, recursive=args.recursive, besides=_written(args))):
+        if args.path and (others := passed_over(args.path, recursive=args.recursive, besides=_written(args).values())):
             note(others)
         rows_by_name = out.latest
         known = known_apart(jobs, rows_by_name, does.limits)
@@ -136,7 +136,7 @@ def _jobs(args: argparse.Namespace) -> tuple[list["Job"], dict[str, int]]:
     from symrefine.fleet.tasks import our_version
 
     found = _sources(args)
-    outputs = dict(zip(("--out", "--bop", "--table"), _written(args), strict=True))
+    outputs = _written(args)
     manifests = () if args.manifest is None else (args.manifest,)
     check_outputs(outputs, (Path(name) for name in chain(manifests, (source.path for source in found))))
     check_bop(args.bop, {"--bop-scale": args.bop_scale})
@@ -161,9 +161,9 @@ def _jobs(args: argparse.Namespace) -> tuple[list["Job"], dict[str, int]]:
     return [replace(jobs[index], mark=fleet.mark(args.shard, index)) for index in own], numbers
 
 
-def _written(args: argparse.Namespace) -> tuple[str | None, ...]:
-    """The files that are written."""
-    return args.out, args.bop, args.table
+def _written(args: argparse.Namespace) -> dict[str, str | None]:
+    """The files that are written, by option."""
+    return {"--out": args.out, "--bop": args.bop, "--table": args.table}
 
 
 def _sources(args: argparse.Namespace) -> list["Source"]:

@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -70,7 +70,7 @@ def _files_in(folder: Path, recursive: bool) -> Iterator[Path]:
     return (name for name in names if not any(part.startswith(".") for part in name.parts))
 
 
-def passed_over(paths: Sequence[str], *, recursive: bool, besides: Sequence[str | None]) -> str:
+def passed_over(paths: Sequence[str], *, recursive: bool, besides: Iterable[str | None]) -> str:
     """How many files of directories are of kinds that are not looked at, and which; empty if there are none.
 
     Args:

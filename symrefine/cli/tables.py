@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import groupby
+from itertools import compress, groupby
 from typing import Any
 
 from rich.table import Table
@@ -294,8 +294,7 @@ def _spatial(record: Record) -> Iterator[Table]:
     marks = _kept(record)
     planes = [(_mirror(p, record), p) for p in record["planes"]]
     yield _elements(("mirror planes: normal", "offset"), "confidence", planes, marks[: len(planes)])
-    turns = [_turn("improper" if a["improper"] else "axis", a["order"]) for a in record["axes"]]
-    axes = [((_direction(a["direction"]), turn), a) for a, turn in zip(record["axes"], turns, strict=True)]
+    axes = [(_axis(a), a) for a in record["axes"]]
     yield _elements(("axes: direction", "kind"), "confidence", axes, marks[len(planes) :])
     inversion = [(("about the centre",), found) for found in inversions(record)]
     yield _elements(("inversion",), "confidence", inversion, marks and [_inverted(record["textured"])])
@@ -314,7 +313,10 @@ def _said(record: Record) -> list[Said]:
 def _kept(record: Record) -> list[str]:
     """What the texture keeps of each plane and axis; nothing where no texture was read or nothing is decided."""
     told = record.get("textured")
-    return [] if not told or told["undetermined"] else [kept(one, _said(told)) for one in _said(record)]
+    if not told or told["undetermined"]:
+        return []
+    textured = _said(told)
+    return [kept(one, textured) for one in _said(record)]
 
 
 def _inverted(told: Record) -> str:
@@ -324,11 +326,16 @@ def _inverted(told: Record) -> str:
 def _only_textured(record: Record) -> Iterator[Table]:
     """What the texture keeps of endless planes and axes, which are no rows of their own."""
     told, own = record["textured"], _said(record)
-    planes = [p for p in told["planes"] if not kept(("plane", p["normal"], 1.0), own)]
-    yield _elements(("with its texture: normal", "offset"), "confidence", [(_mirror(p, record), p) for p in planes])
-    axes = [a for a in told["axes"] if not any(kept(s, own) for s in _said({"planes": [], "axes": [a]}))]
-    rows = [((_direction(a["direction"]), _turn("improper" if a["improper"] else "axis", a["order"])), a) for a in axes]
-    yield _elements(("with its texture: axis", "kind"), "confidence", rows)
+    alone = [not kept(one, own) for one in _said(told)]
+    planes = [(_mirror(p, record), p) for p in compress(told["planes"], alone)]
+    yield _elements(("with its texture: normal", "offset"), "confidence", planes)
+    axes = [(_axis(a), a) for a in compress(told["axes"], alone[len(told["planes"]) :])]
+    yield _elements(("with its texture: axis", "kind"), "confidence", axes)
+
+
+def _axis(axis: Record) -> tuple[str, str]:
+    """Where an axis points, and what it turns by."""
+    return _direction(axis["direction"]), _turn("improper" if axis["improper"] else "axis", axis["order"])
 
 
 def _near(miss: Record, record: Record) -> tuple[str, ...]:

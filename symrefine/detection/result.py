@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from symrefine.decide.posterior import Alternative
 from symrefine.detection.examination import Examined
 from symrefine.detection.sketch import Sample
@@ -211,7 +209,7 @@ class Detection(ReadOnly):
 
     def own(self, shape: Shape) -> Shape:
         """The shape it was found in without the outliers, if a floor is among them: what stands on it."""
-        return shape if self.floor is None else shape.chosen(np.delete(np.arange(len(shape.points)), self.outliers))
+        return shape if self.floor is None else shape.without(self.outliers)
 
     def choices(self, tolerance: float | None = None) -> tuple[Alternative, ...]:
         """Every group that a person may choose instead, C1 first, each inside the next, as likely as at a tolerance.

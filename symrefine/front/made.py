@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
@@ -66,7 +65,7 @@ def symmetrize(
     used, clock, seed = relative_tolerance(tolerance, shape, units=units), Clock(), seed_of(seed)
     # Of what a sample alone was looked at, no others are known.
     out = found.outliers if shape.faces is None and len(found.shape.points) == len(shape.points) else found.outliers[:0]
-    own = shape.chosen(np.delete(np.arange(len(shape.points)), out)) if len(out) else shape
+    own = shape.without(out) if len(out) else shape
     with clock("symmetrize"):
         made = symmetrize(own, chosen, found.center, tolerance=used, seed=seed)
     return Symmetrized.of(

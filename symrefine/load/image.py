@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.errors import InputError
-from symrefine.files import file_bytes
 from symrefine.geometry import Array
 from symrefine.load.content import Content, Threshold, Wanted
 from symrefine.load.text import shorten
@@ -193,8 +192,13 @@ def check_size(image: "Image") -> None:
 
 def is_deep(path: Path) -> bool:
     """Whether a file is a picture of one channel of 16 bits, as depth images are."""
+    from PIL import Image
+
     suffix = path.suffix.lower()
-    return suffix in FORMATS and path.is_file() and open_image(file_bytes(path), suffix).mode in _DEEP
+    if suffix not in FORMATS or not path.is_file():
+        return False
+    with Image.open(path, formats=[FORMATS[suffix]]) as image:  # its header alone
+        return image.mode in _DEEP
 
 
 def _grey(image: "Image") -> Array:

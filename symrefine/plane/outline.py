@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
-from symrefine.geometry import Array, Isometry
+from symrefine.geometry import Array, Isometry, corners
 from symrefine.plane.raster import Raster, between, coarser, outlines, raster_of
 from symrefine.samples import COUNT
 from symrefine.shape import Index, kinds_of_mass
@@ -208,15 +207,7 @@ def _levels(points: Array, weights: Array) -> list[Array]:
 
 
 def smallest_diagonal(points: Array) -> float:
-    """Diagonal of the smallest box around points [N, 2] over all orientations, to a ten-thousandth."""
+    """Diagonal of the smallest box around points [N, 2] over all orientations, to half a percent."""
     angles = np.radians(np.arange(0.0, 180.0, 0.5))
-    width = np.ptp(_corners(points) @ np.stack([np.cos(angles), np.sin(angles)]), axis=0)
+    width = np.ptp(corners(points) @ np.stack([np.cos(angles), np.sin(angles)]), axis=0)
     return float(np.hypot(width, np.roll(width, 180)).min())
-
-
-def _corners(points: Array) -> Array:
-    """The corners of the convex hull, a few of the many pixels of a picture; all points if they lie on a line."""
-    try:
-        return np.asarray(points[ConvexHull(points).vertices])
-    except QhullError:
-        return points
