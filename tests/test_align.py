@@ -17,6 +17,7 @@ from experiments.objects.household import camera
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
 from experiments.studies import partial_alignment
 from symrefine.align import story
+from symrefine.align.alignment import Verdict
 from symrefine.align.contact import met_by
 from symrefine.align.judge import Judge, Met
 from symrefine.align.landscape import grid_rotations, harmonic_pair, hills, landscape, least_misfit
@@ -30,13 +31,14 @@ from symrefine.align.shown import Shown
 from symrefine.align.sides import side_of
 from symrefine.align.span import monomial_pair, span_fit
 from symrefine.align.story import Alignment, _percent, align
+from symrefine.clock import Clock
 from symrefine.decide.maps import Merit, said_by_both, score
 from symrefine.decide.maps import as_good as as_well
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.fit.refine import SHORT
 from symrefine.geometry import Array, householder, line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.groups.orthogonal import chord_angles
-from symrefine.moments.moments import central_moments
+from symrefine.moments.moments import PARTS, central_moments
 from symrefine.ntuples.contract import ntuples
 from symrefine.propose.consensus import Matches, consensus, pair_invariants
 from symrefine.propose.signatures import signatures
@@ -776,6 +778,21 @@ def test_objects_that_agree_at_one_size_only_are_told_so(name: str, factor: floa
     told = re.fullmatch(r"the target is (\S+) times as large as the source: ask for the scale", found.status)
     assert told is not None, found.status
     assert float(told[1]) == pytest.approx(factor, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("factor", "excess", "told"), [(0.9, 0.0, True), (0.9, 0.9, False), (1.0, 0.0, False)], ids=["", "unsure", "alike"]
+)
+def test_what_is_not_sure_is_kept_unless_one_size_is_sure_and_another(factor: float, excess: float, told: bool) -> None:
+    rng = rng_of(97)
+    clouds = (Shape(points=f * sample(asymmetric(), 6000, 0.002, rng)) for f in (1.0, factor))
+    source, target = (side_of(cloud, PARTS) for cloud in clouds)
+    evidence = Evidence(source=source, target=target, scale=True, tolerance=0.02, seed=0)
+    choice = replace(choose(evidence, brief=True), excess=excess)
+    kept = replace(align(source.shape, source.shape), _verdict=lambda: Verdict(status="ok", excess=1.0, confidence=0.5))
+    answer = story._unless_of_other_size(kept, evidence, True, Clock(), choice)
+    assert (answer is not kept) == told
+    assert ("ask for the scale" in answer.status) == told
 
 
 @pytest.mark.parametrize("seed", range(3))
