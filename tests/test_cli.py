@@ -373,6 +373,24 @@ def test_help_names_the_commands() -> None:
     assert command("--version").stdout == f"symrefine {symrefine.__version__}\n"
 
 
+def test_a_table_is_told_without_what_draws_or_measures_hulls(tmp_path: Path) -> None:
+    # What the command on a small mesh imports is half of the time that it takes.
+    path = tmp_path / "box.obj"
+    corners = [f"v {x} {y} {z}" for x in (0, 1) for y in (0, 2) for z in (0, 3)]
+    quads = ["f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f 2 6 8 4"]
+    path.write_text("\n".join([*corners, *quads]) + "\n", encoding="utf-8")
+    source = f"""
+import sys
+from symrefine.cli import invoke
+assert invoke(["detect", {str(path)!r}]) == 0
+heavy = {{"scipy.spatial", "matplotlib", "symrefine.picture.scene", "open3d", "rerun"}} & set(sys.modules)
+assert not heavy, heavy
+"""
+    done = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "D2h" in done.stdout
+
+
 def test_the_package_is_imported_without_its_parts() -> None:
     source = """
 import sys, symrefine

@@ -1,5 +1,6 @@
 """What was found and what was turned down, as rows of a table."""
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -7,9 +8,11 @@ import numpy as np
 
 from symrefine.detection.result import Detection
 from symrefine.picture.palette import AXIS, MISS, Colour, plane_colour
-from symrefine.picture.scene import SAME_LINE_RAD
 from symrefine.picture.words import direction, kind_name, order_name
 from symrefine.surface.misses import Deviation
+
+# Axes this close together are one line with two names.
+SAME_LINE_RAD = math.radians(1.0)
 
 
 @dataclass(frozen=True, slots=True)

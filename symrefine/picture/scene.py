@@ -13,6 +13,7 @@ from symrefine.detection.result import Detection, FoundAxis
 from symrefine.geometry import Array, Mask, Plane, ReadOnly, unit
 from symrefine.picture.atoms import Balls, balls
 from symrefine.picture.palette import AXIS, CONTRADICTED, INFERRED, MISS, Colour, class_colours, plane_colour
+from symrefine.picture.rows import SAME_LINE_RAD
 from symrefine.picture.upright import sign, upright
 from symrefine.picture.words import order_name
 from symrefine.shape import Index, Shape
@@ -21,8 +22,6 @@ from symrefine.shape import Index, Shape
 RAYS = 200
 # How far planes and axes stick out of the object, in diagonals.
 MARGIN, AXIS_MARGIN = 0.06, 0.16
-# Axes this close together are one line with two names.
-SAME_LINE_RAD = math.radians(1.0)
 # Radius of the mark that tells the order of an axis, in diagonals.
 MARK = 0.05
 MAX_MARKS = 3

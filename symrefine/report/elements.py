@@ -11,8 +11,8 @@ from symrefine.detection.result import Detection, FoundAxis
 from symrefine.fit.placed import FREE_TURNS, wide_angle_rad
 from symrefine.geometry import Array, Isometry, Plane, ReadOnly, householder, rotation, rotoreflection, toward_positive
 from symrefine.picture.palette import AXIS, MISS
-from symrefine.picture.rows import Row, found_rows, near_miss_rows
-from symrefine.picture.scene import SAME_LINE_RAD, Line, Quad, Scene
+from symrefine.picture.rows import SAME_LINE_RAD, Row, found_rows, near_miss_rows
+from symrefine.picture.scene import Line, Quad, Scene
 from symrefine.picture.words import body_name, length, order_name, percent, turned_down
 from symrefine.report.markup import homogeneous_rows, rounded
 
