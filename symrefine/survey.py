@@ -213,7 +213,8 @@ def doubts(found: Survey) -> Iterator[str]:
     if found.cloud is not None:
         yield from _doubts_of_cloud(found.cloud, found.points)
     if found.repeated and found.kind != "mesh":
-        yield f"{found.repeated:,} points stand where others do: these places weigh more"
+        said = "they count once" if found.kind == "cloud" and not found.weighted else "these places weigh more"
+        yield f"{found.repeated:,} points stand where others do: {said}"
     if found.kind == "points" and len(found.spread) == 3:
         yield "so few points stand for themselves, as atoms do; of a surface give more than 250"
     flat = int((found.spread**2 < SINGLE**2 * found.spread[0] ** 2).sum())

@@ -19,6 +19,7 @@ from symrefine.propose.candidates import START_ERROR
 from symrefine.surface.misses import TOLERANCE, Deviation, noise_distances
 from symrefine.surface.skin import isolated_points, local_planes
 from symrefine.surface.surface import Coverage, Surface
+from tests.surfaces import half_of
 
 ORIGIN = np.zeros(3)
 ALL = Coverage(supported=1.0, contradicted=0.0, unseen=0.0, told=1.0)
@@ -44,7 +45,7 @@ def scene(name, noise=0.002):
     points = ((sample(shape, 3000, noise, rng) - moments.center) / moments.scale) @ turn.T + off
     cloud = local_planes(points, 2000, rng)
     diagonal = tight_diagonal(cloud.points)
-    own = noise_distances(len(points), lambda some: local_planes(points[some], 750, rng), rng)
+    own = noise_distances(len(points), half_of(points, 750, rng), rng)
     surface = Surface(cloud=cloud, diagonal=diagonal, noise=own / diagonal)
     # The mirror of the mug is normal to y.
     standard = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]) if group == "Cs" else np.eye(3)

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from experiments.objects.boundary import instance
 from experiments.objects.shapes import bottle, mug, sample, table
 from symrefine import Shape, detect
 from symrefine.detection.measure import doubt, gather, is_few, measure
@@ -33,6 +34,30 @@ def reason(shape, tolerance=TOLERANCE, outliers=True):
 
 def line(count, spread=np.linspace):
     return np.outer(spread(-1, 1, count), [1.0, 2, 3]) + 5
+
+
+@pytest.mark.parametrize("times", [2, 5])
+def test_points_that_are_told_more_than_once_count_once(times):
+    strays = 3.0 * np.random.default_rng(5).standard_normal((20, 3))
+    once = np.concatenate([TABLE, strays])
+    order = np.random.default_rng(6).permutation(times * len(once))
+    every = np.tile(np.arange(len(once)), times)[order]
+    expected, found = measure(Shape.of(once)), measure(Shape.of(once[every]))
+    assert 15 < len(expected.strays) < 40
+    assert found.count == expected.count
+    np.testing.assert_array_equal(np.unique(every[found.strays]), expected.strays)
+    assert len(found.strays) == times * len(expected.strays)  # with all copies
+    np.testing.assert_allclose(found.moments.center, expected.moments.center, atol=1e-12)
+
+
+def test_a_place_that_is_told_a_thousand_times_takes_no_group_away():
+    points = np.concatenate([TABLE, np.repeat(TABLE[:1], 1000, axis=0)])
+    assert detect(points).point_group == "C4v"
+
+
+def test_of_two_labels_at_one_place_both_are_kept():
+    points, labels = np.repeat(TABLE, 2, axis=0), np.tile([0, 1], len(TABLE))
+    assert measure(Shape(points=points, labels=labels)).count == len(points)
 
 
 # Doubts
@@ -242,3 +267,11 @@ def test_a_scan_of_which_few_points_are_an_even_sample_is_judged_by_all(monkeypa
     measured = measure(Shape(points=points, viewpoint=[0.0, -5.0, 1.0]))
     assert len(measured.shape.points) == 2000
     assert len(measured.views) == 1
+
+
+@pytest.mark.parametrize("name", ["propeller9", "fan16"])
+def test_what_halves_blur_more_than_the_whole_hides_no_group(name):
+    """Blades as thin as neighbourhoods, at the tolerance of 0.4 %, which noise between halves exceeds."""
+    made = instance("rotors", name, 24)
+    points = sample(made.shape, 20_000, 0.0, np.random.default_rng(3))
+    assert detect(points, tolerance=0.004).point_group == made.truth.group.name

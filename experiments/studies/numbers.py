@@ -164,7 +164,6 @@ KIND_OF = {
         "ntuples.contract": "PAPER_ORDERS",
         "ntuples.nullspace": "_LARGEST_PRIME",
         "plane.doublets": "PLANAR_ORDERS",
-        "surface.misses": "HALVES_OF_VOLUME",
         "surface.openings": "TELLING",
         "surface.skin": "APART",
         "surface.surface": "NEAREST_SPREAD",

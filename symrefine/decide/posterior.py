@@ -19,7 +19,7 @@ from symrefine.groups import PointGroup
 T = TypeVar("T", bound=Any)
 # Of the logistic curve: the need over the tolerance at which half of the groups are meant, and how fast they become
 # fewer. Calibrated on intact, broken and noisy objects by `python -m experiments.studies.reliability --fit`.
-EVEN, STEEPNESS = 0.8, 8.0
+EVEN, STEEPNESS = 0.75, 8.0
 # The same of a lone mirror: bodies and devices that are meant to have just one are made less exactly than others.
 EVEN_MIRROR = 1.2
 # Needs within this factor are the same, as the elements of a true group miss alike; so groups that need no more than

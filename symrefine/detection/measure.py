@@ -26,8 +26,8 @@ from symrefine.surface.floor import Floor, floor_of
 from symrefine.surface.misses import TOLERANCE, noise_distances, sampling_distances
 from symrefine.surface.neighbourhoods import fills_volume
 from symrefine.surface.openings import NEIGHBOURS, openings
-from symrefine.surface.sampling import sampling
-from symrefine.surface.skin import FEW, LocalPlanes, Skin, drawn, isolated_points, make_skin
+from symrefine.surface.sampling import distinct, sampling
+from symrefine.surface.skin import FEW, LocalPlanes, drawn, isolated_points, make_skin
 from symrefine.surface.surface import Surface
 from symrefine.surface.tree import Tree, morton_order
 
@@ -131,19 +131,25 @@ def measure(
         massive = np.flatnonzero(shape.weights > 0)
         shape = shape.chosen(massive)  # points of no mass are no part of the object
     count, every = len(shape.points), shape
+    own: Index = np.arange(count)
+    if shape.faces is None and shape.weights is None and not is_few(shape):
+        some, own = distinct(shape.points, shape.labels)
+        shape = shape.chosen(some) if len(some) < count else shape
     if shape.faces is None and not is_few(shape):
         # What stands in front parts what a camera sees, and hides its counterparts.
         groups, rng = shape.viewpoint is None, np.random.default_rng(0)
-        known = [np.flatnonzero(np.isin(massive, group)) for group in foreign]
+        known = [np.unique(own[np.isin(massive, group)]) for group in foreign]
         seen = sampling(shape.points, rng, outliers=outliers, groups=groups, apart=apart, foreign=known)
-        strays = massive[seen.strays]
-        clumps, blobs = (tuple((massive[g], shape.points[g]) for g in parts) for parts in (seen.clumps, seen.blobs))
+        strays = massive[np.isin(own, seen.strays)]
+        clumps, blobs = (
+            tuple((massive[np.isin(own, g)], shape.points[g]) for g in parts) for parts in (seen.clumps, seen.blobs)
+        )
         count, solid = len(seen.kept), seen.solid
         scan = shape.chosen(seen.kept) if shape.viewpoint is not None else None
         # So few points as would stand for themselves are no even sample of a surface.
         if shape.weights is None and seen.shares is not None and len(seen.even) > FEW:
             shape = replace(shape.chosen(seen.even), weights=seen.shares)
-        elif len(seen.kept) < len(massive):
+        elif len(seen.kept) < len(shape.points):
             shape = shape.chosen(seen.kept)
     classes = _classes(shape)
     if whole is not None and shape is every:
@@ -330,10 +336,8 @@ def _surface(
     whole = make_skin(local, rng, normals=normals, labels=labels, exact=exact, tree=tree)
 
     def half(some: Index) -> LocalPlanes:
-        # As many neighbours as in the whole, so that noise is the same.
-        skin = Skin(points=local[some], normals=None, neighbours=whole.neighbours, given=None)
         pick = drawn(len(some), PLANES // 2, rng, None if uneven is None else uneven[some])
-        return skin.local_planes(pick, None if labels is None else labels[some])
+        return whole.half(some).local_planes(pick)
 
     pick = drawn(len(local), SAMPLES if exact else PLANES, rng, uneven)
     # Neighbours stand together in memory, and any stride takes an even part of the surface.

@@ -13,7 +13,7 @@ from symrefine.samples import COUNT
 from symrefine.shape import Index, kinds_of_mass
 from symrefine.surface.misses import LIMITS, SHARES, Deviation, disc_distances, miss_distances, noise_distances
 from symrefine.surface.neighbourhoods import NEIGHBOURS
-from symrefine.surface.skin import FEW, LocalPlanes, isolated_points, local_planes
+from symrefine.surface.skin import FEW, LocalPlanes, drawn, isolated_points, local_planes, make_skin
 from symrefine.surface.surface import Surface
 
 # Levels, as fractions of the weight that only one cell in twenty exceeds. Halfway to the next a level may move, by so
@@ -192,11 +192,14 @@ def _of_points(points: Array, weights: Array | None, rng: np.random.Generator) -
 
 
 def _sampled(points: Array, diagonal: float, rng: np.random.Generator) -> Surface:
-    def lines(some: Index | slice = slice(None)) -> LocalPlanes:
-        return local_planes(points[some], COUNT, rng)
+    whole = make_skin(points, rng)
 
-    noise = noise_distances(len(points), lines, rng)
-    return Surface(cloud=lines(), diagonal=diagonal, noise=noise / diagonal)
+    def half(some: Index) -> LocalPlanes:
+        return whole.half(some).local_planes(drawn(len(some), COUNT, rng))
+
+    noise = noise_distances(len(points), half, rng)
+    cloud = whole.local_planes(drawn(len(points), COUNT, rng))
+    return Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal)
 
 
 def _levels(points: Array, weights: Array) -> list[Array]:

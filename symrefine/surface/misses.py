@@ -5,6 +5,7 @@ distance is taken between denoised surfaces: each local plane, moved, against th
 What noise alone shows is the same of two halves of a cloud, each with local planes of its own, against one another.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import reduce
@@ -16,7 +17,7 @@ from symrefine.moments.moments import BLOCK
 from symrefine.rounding import TOLERANCE as TOLERANCE
 from symrefine.samples import COUNT
 from symrefine.shape import Index
-from symrefine.surface.skin import LocalPlanes
+from symrefine.surface.skin import Body, LocalPlanes
 
 # An operation holds at tolerance t (2 % by default) if the mean miss stays below the first of these multiples of t, and
 # if no larger shares of the surface miss by more than the others: a detail of 3 % by 1.15 t, one of 0.6 % by 1.85 t.
@@ -37,8 +38,6 @@ SURE = 2.0
 RIM = 4.0
 # Discs around a point that are looked at: at edges the nearest centre need not be that of the nearest disc.
 DISCS = 4
-# Spacing in the halves of a volume over that of the whole.
-HALVES_OF_VOLUME = 2.0 ** (1.0 / 3.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,10 +98,10 @@ def needs(misses: Array, noise: Array, tests: int = 1, redundancy: float = 1.0) 
         beyond = beyond - chance - sampled * np.sqrt(chance * (1.0 - chance))
         mean = np.sqrt(np.maximum(mean**2 - (noise.mean() + sampled[..., 0] * noise.std()) ** 2, 0.0))
     found = [mean / LIMITS[0]]
-    clear = noise[-1] if noise.size else 0.0
-    details = [(share, limit, 0.0) for share, limit in zip(SHARES, LIMITS[1:], strict=True)]
-    for share, limit, least in (*details, (SPECK, SPECK_LIMIT, clear)):
-        told = beyond > np.maximum(_exceeded(share, count, tests), (redundancy - 1.0) / count)
+    clear, few = (noise[-1], _beyond_all(count, noise.size, tests)) if noise.size else (0.0, 0.0)
+    details = [(share, limit, 0.0, 0.0) for share, limit in zip(SHARES, LIMITS[1:], strict=True)]
+    for share, limit, least, by_chance in (*details, (SPECK, SPECK_LIMIT, clear, few)):
+        told = beyond > np.maximum(_exceeded(share, count, tests), np.maximum(redundancy - 1.0, by_chance) / count)
         told &= beyond * count > _exceeded(min(share, SHARES[-1]), total, tests) * total
         found.append((farthest * (told & (farthest > least))).max(axis=-1) / limit)
     return np.asarray(reduce(np.maximum, found))
@@ -111,6 +110,11 @@ def needs(misses: Array, noise: Array, tests: int = 1, redundancy: float = 1.0) 
 def _exceeded(share: float, count: Index | int, tests: int) -> Array:
     """The share of so many points that the worst of some tests shows by chance of what is such a share."""
     return np.asarray(share + np.sqrt(2.0 * np.log(tests) * share * (1.0 - share) / count))
+
+
+def _beyond_all(count: Index | int, noise: int, tests: int) -> Array:
+    """Of so many points how many lie beyond all of so much noise by chance, as rarely as `SURE` says in all tests."""
+    return np.asarray(math.log(math.erfc(SURE / math.sqrt(2.0)) / tests) / np.log(count / (count + noise)))
 
 
 def needs_of_atoms(misses: Array) -> Array:
@@ -203,21 +207,31 @@ def noise_distances(
     planes: Callable[[Index], LocalPlanes],
     rng: np.random.Generator,
 ) -> Array:
-    """Distances [M] between the surfaces that two halves of a cloud make.
+    """Distances [M] by which noise alone puts the surface of a cloud off its image, as its halves tell.
 
-    An object with an exact symmetry differs from its image by no more: both are made of points of their own, closer to
-    one another than those of halves. In a volume all is spacing, which is put right.
+    An object with an exact symmetry differs from its image by no more: both are made of points of their own. Those of a
+    half have neighbourhoods as wide, so that edges and bends are blurred alike, and half as many points in each, whose
+    means are off by as much more. In a volume all is spacing. A small cloud is halved until there are enough.
 
     Args:
         count: points of the cloud.
-        planes: the surface that some of them make, given their indices.
+        planes: the surface that half of them make, given their indices; see `Skin.half`.
     """
-    one, other = (planes(half) for half in halves(count, rng))
     across = []
-    for here, there in ((one, other), (other, one)):
-        some = slice(None, None, max(1, len(there.points) // COUNT))
-        across.append(disc_distances(here, there.points[some], there.classes(some)))
-    return np.concatenate(across) / (HALVES_OF_VOLUME if one.body == "volume" else 1.0)
+    for _ in range(-(-COUNT // count)):
+        one, other = (planes(half) for half in halves(count, rng))
+        for here, there in ((one, other), (other, one)):
+            some = slice(None, None, max(1, len(there.points) // COUNT))
+            across.append(disc_distances(here, there.points[some], there.classes(some)))
+    return of_the_whole(np.concatenate(across), one.body)
+
+
+def of_the_whole(noise: Array, body: Body) -> Array:
+    """Of noise between halves of a cloud what there is of it in the whole.
+
+    Means of twice as many points are off by 1 / sqrt(2) as much, in a volume points stand 1 / cbrt(2) as far apart.
+    """
+    return noise / 2.0 ** (1.0 / 3.0 if body == "volume" else 0.5)
 
 
 def halves(count: int, rng: np.random.Generator) -> tuple[Index, Index]:

@@ -52,6 +52,21 @@ class Sampling:
     solid: bool = False
 
 
+def distinct(points: Array, labels: Index | None) -> tuple[Index, Index]:
+    """Indices [M], ascending, of points [N, 3] without those of a label [N] that repeat another, and whose each is [N].
+
+    A place that is told more than once is no more surface, and no neighbours but its own copies would be around it.
+    """
+    along = np.sort(points[:, 0])
+    if not (along[1:] == along[:-1]).any():
+        return np.arange(len(points)), np.arange(len(points))
+    rows = points if labels is None else np.column_stack([points, labels])
+    _, first, own = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    place = np.empty(len(first), dtype=np.int64)
+    place[np.argsort(first)] = np.arange(len(first))
+    return np.sort(first), place[own.reshape(-1)]
+
+
 def sampling(
     points: Array,
     rng: np.random.Generator,

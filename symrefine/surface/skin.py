@@ -225,6 +225,20 @@ class Skin:
         """What planes are fitted to."""
         return Neighbourhoods.of(self.points, self.tree, self.neighbours)
 
+    def half(self, some: Index) -> "Skin":
+        """The skin that half of the points make, with neighbourhoods as wide, which hold half as many.
+
+        They blur edges and bends as those of the whole do; see `noise_distances`.
+        """
+        return replace(
+            self,
+            points=self.points[some],
+            normals=None if self.normals is None else self.normals[some],
+            neighbours=max(self.neighbours // 2, 1),
+            given=None,
+            labels=None if self.labels is None else self.labels[some],
+        )
+
     def shared_by(self, count: int) -> float:
         """How many of the planes at `count` of the points each point takes part in; at least 1."""
         return max(1.0, self.neighbours * count / len(self.points)) if self.neighbours > 1 else 1.0

@@ -13,7 +13,7 @@ import numpy as np
 from symrefine.geometry import Array, Axis, Isometry, frame_with_z, orthogonal_factor
 from symrefine.samples import COUNT
 from symrefine.shape import Index
-from symrefine.surface.misses import disc_distances, halves, needs
+from symrefine.surface.misses import disc_distances, halves, needs, of_the_whole
 from symrefine.surface.skin import LocalPlanes, Skin, drawn
 
 # Neighbourhoods side by side that a wedge has to be wide for what leans in it to be seen as it is: two for each half of
@@ -61,7 +61,7 @@ class Wedge:
             neighbours=skin.neighbours,
             labels=None if skin.labels is None else skin.labels[pick],
         )
-        one, other = (_planes(whole, half, pitch, rng) for half in halves(len(pick), rng))
+        one, other = (_planes(whole.half(half), pitch, rng) for half in halves(len(pick), rng))
         noise = [disc_distances(a, _own(b), _own_classes(b)) for a, b in ((one, other), (other, one))]
         return [
             cls(
@@ -69,8 +69,8 @@ class Wedge:
                 center=axis.point,
                 fold=fold,
                 width=skin.width,
-                cloud=_planes(whole, slice(None), pitch, rng),
-                noise=np.sort(np.concatenate(noise)),
+                cloud=_planes(whole, pitch, rng),
+                noise=np.sort(of_the_whole(np.concatenate(noise), "surface")),
             )
         ]
 
@@ -150,10 +150,9 @@ def _turned(vectors: Array, angles: Array) -> Array:
     return np.stack([c * x - s * y, s * x + c * y, vectors[:, 2]], axis=1)
 
 
-def _planes(skin: Skin, some: Index | slice, pitch: float, rng: np.random.Generator) -> LocalPlanes:
-    """Local planes of the wedge that some points of a skin fill, then the same turned into the halves beside it."""
-    points, labels = skin.points[some], None if skin.labels is None else skin.labels[some]
-    normals = None if skin.normals is None else skin.normals[some]
+def _planes(skin: Skin, pitch: float, rng: np.random.Generator) -> LocalPlanes:
+    """Local planes of the wedge that the points of a skin fill, then the same turned into the halves beside it."""
+    points, normals, labels = skin.points, skin.normals, skin.labels
     aside = _aside(points, pitch)
     wider = Skin(
         points=np.concatenate([points, _turned(points, aside)]),
