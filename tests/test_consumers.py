@@ -12,6 +12,7 @@ import pytest
 from ruamel.yaml import YAML
 from scipy.spatial import cKDTree
 
+import symrefine
 from symrefine.cli import invoke
 from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
@@ -24,6 +25,7 @@ from symrefine.geometry import Array, random_orthogonal, rotation
 from symrefine.groups import PointGroup, is_subgroup, point_group
 from symrefine.groups.standard import standard_operations
 from symrefine.load import load
+from symrefine.moments.quadrature import sample_surface
 from symrefine.shape import Shape
 
 FINITE = ["C1", "Cs", "Ci", "C2", "C3", "C5", "C6v", "C3h", "S4", "S6", "D2", "D3", "D6h", "D24h", "D3d", "D2d"]
@@ -556,6 +558,35 @@ def test_the_command_writes_what_the_reader_can_use(
         assert misses(points, motions) < 1e-12
     else:
         assert ring_misses(points, motions) < 2e-3  # it has 96 sides
+
+
+def test_a_shape_that_has_the_name_of_a_file_is_written_as_it_is(tmp_path: Path) -> None:
+    """What is made of the shape in a file is called after it, and is no longer what stands in there."""
+    given, out = load(placed(tmp_path, prism(5, 0.6), 3)), tmp_path / "c.ply"
+    assert given.faces is not None
+    for shape in (replace(given, points=2.0 * given.points), replace(given, faces=given.faces[::-1])):
+        package = symrefine.export(shape, "canonical", out)
+        matrix = np.array(json.loads(package.files[tmp_path / "c_transform.json"])["transform"])
+        expected = shape.points @ matrix[:3, :3].T + matrix[:3, 3]
+        np.testing.assert_allclose(load(out).points, expected, atol=1e-12 * np.abs(expected).max())
+        np.testing.assert_array_equal(load(out).faces, shape.faces)
+
+
+def test_a_model_without_its_floor_is_written_without_it(tmp_path: Path) -> None:
+    rng, part = np.random.default_rng(0), sample_surface(prism(5, 0.6), 8000, np.random.default_rng(1))[0]
+    floor = np.column_stack([rng.uniform(-3.0, 3.0, (8000, 2)), np.zeros(8000)])
+    path = tmp_path / "scan.ply"
+    path.write_bytes(model_bytes(".ply", Shape(points=np.concatenate([part[part[:, 2] > 0.02], floor]))))
+    line = ["export", str(path), "--to", "megapose", "--out", str(tmp_path / "out"), "--outliers", "floor"]
+    assert invoke(line) == 0
+    assert np.linalg.norm(load(tmp_path / "out" / "obj_000001.ply").points, axis=1).max() < 2.0
+
+
+@pytest.mark.parametrize(("suffix", "count"), [(".ply", 1), (".stl", 0)])
+def test_what_a_file_may_have_had_is_told_where_it_may(tmp_path: Path, suffix: str, count: int) -> None:
+    path = placed(tmp_path, prism(3, 0.5), 4, f"part{suffix}")
+    for given, told in ((path, count), (replace(load(path), source="mesh"), 0)):
+        assert len(symrefine.export(given, "canonical", tmp_path / "c.obj").notes) == told
 
 
 def test_the_transform_takes_the_file_to_the_canonical_model(tmp_path: Path) -> None:

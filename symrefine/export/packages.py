@@ -9,19 +9,21 @@ from typing import Any, get_args
 import numpy as np
 
 from symrefine.detection.result import Detection
-from symrefine.errors import InputError
+from symrefine.errors import InputError, SymrefineError
 from symrefine.export.bop import bop_entry, bop_limits, bop_text, decided, number_for, replaced
 from symrefine.export.canonical import Canonical, canonical_pose
 from symrefine.export.consumers import CONSUMERS, Consumer, reading
 from symrefine.export.formats import TAKES, Format, takers
-from symrefine.export.models import check_suffix, model_bytes, moved, npz_bytes
+from symrefine.export.models import check_suffix, keeps_labels, model_bytes, moved, npz_bytes
 from symrefine.export.operations import STEPS, motions_bytes, motions_limits, reflections_left_out
 from symrefine.files import bytes_writer, check_other, check_target, json_text, write_all
-from symrefine.load import SUFFIXES
-from symrefine.shape import Shape
+from symrefine.load import SUFFIXES, load
+from symrefine.shape import Index, Shape
 from symrefine.units import check_scale
 
 SCHEMA = "symrefine.canonical/1"
+# Formats of meshes that show nothing but triangles.
+_BARE = (".npz", ".stl")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,12 +213,26 @@ def transform_bytes(path: Path, pose: Canonical, source: str, scale: float = 1.0
 def _model(path: Path, shape: Shape, pose: Canonical, scale: float) -> tuple[bytes, list[str]]:
     """The file of the shape with its coordinates moved, or else the shape written anew."""
     source, suffix = Path(shape.source), path.suffix.lower()
-    if source.suffix.lower() == suffix and source.is_file():
+    if source.suffix.lower() == suffix and _is_in(source, shape):
         kept = moved(source.read_bytes(), suffix, pose.matrix(scale))
         if kept is not None:
             has_materials = suffix == ".obj" and b"\nmtllib" in b"\n" + kept
             return kept, ["materials and textures stay where they are: copy them beside the model"] * has_materials
     check_suffix(path, shape)
-    lost = shape.faces is not None or shape.labels is not None
-    notes = ["colours, textures, labels and normals of meshes are not carried over"] if lost else []
-    return model_bytes(path.suffix.lower(), pose.shape(shape, scale)), notes
+    more = shape.faces is not None and source.is_file() and source.suffix.lower() not in _BARE
+    notes = ["colours, textures and normals that the file may have are not carried over"] * more
+    notes += ["labels are not carried over"] * (not keeps_labels(suffix, shape))
+    return model_bytes(suffix, pose.shape(shape, scale)), notes
+
+
+def _is_in(source: Path, shape: Shape) -> bool:
+    """Whether a file has what a shape has: a shape that was made of that, or is left of it, has its name, too."""
+    try:
+        there = load(source)
+    except SymrefineError:  # no file, or one that has changed
+        return False
+    return np.array_equal(there.points, shape.points) and np.array_equal(_faces(there), _faces(shape))
+
+
+def _faces(shape: Shape) -> Index:
+    return np.empty((0, 3), dtype=np.int64) if shape.faces is None else shape.faces
