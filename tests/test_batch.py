@@ -69,7 +69,7 @@ def refused(answer: tuple[int, str, str], *words: str) -> None:
 
 
 def names(*paths: str, recursive: bool = False) -> list[str]:
-    return [source.name for source in sources(paths, recursive=recursive)]
+    return [source.name for source in sources(paths, recursive=recursive).ours]
 
 
 def test_files_of_other_kinds_are_told(run: Run, lab: Path) -> None:
@@ -79,6 +79,19 @@ def test_files_of_other_kinds_are_told(run: Run, lab: Path) -> None:
     for _ in range(2):
         assert run("batch", "objects", "--out", "objects/rows.jsonl")[2] == told
     assert run("batch", "objects", "-q")[2] == run("batch", "objects/box000.xyz")[2] == ""
+
+
+@pytest.mark.usefixtures("lab")
+def test_a_directory_is_walked_once(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    walked, glob = [], Path.glob
+
+    def counted(folder: Path, pattern: str) -> Iterator[Path]:
+        walked.append(folder)
+        return iter([*glob(folder, pattern)])
+
+    monkeypatch.setattr(Path, "glob", counted)
+    assert run("batch", "objects")[0] == 0
+    assert walked == [Path("objects")]
 
 
 def test_directories_files_and_patterns_give_each_object_once(lab: Path) -> None:

@@ -20,7 +20,6 @@ from symrefine.cli.outputs import (
     write_all,
 )
 from symrefine.cli.signs import counting
-from symrefine.cli.sources import passed_over
 from symrefine.cli.values import (
     add_class_options,
     add_detection_options,
@@ -34,7 +33,7 @@ from symrefine.files import text_writer
 
 if TYPE_CHECKING:
     from symrefine.cli.objects import Job
-    from symrefine.cli.sources import Source
+    from symrefine.cli.sources import Source, Sources
     from symrefine.fleet.journal import Journal
     from symrefine.fleet.rows import Row
 
@@ -80,7 +79,8 @@ def run(args: argparse.Namespace) -> int:
     from symrefine.fleet.limits import one_thread_each
 
     one_thread_each()  # before anything heavy is imported
-    jobs, numbers = _jobs(args)
+    found = _sources(args)
+    jobs, numbers = _jobs(args, found.ours)
     does = executor(args)
     from symrefine.cli.objects import detected, holds, known_apart
     from symrefine.cli.rows import ROW_HEAD, row_line
@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
     with opened(Path(args.out)) if args.out else passing("file") as out:
         if out.torn:
             note(f"{args.out}: the last row is incomplete; it is removed and done again")
-        if args.path and (others := passed_over(args.path, recursive=args.recursive, besides=_written(args).values())):
+        if others := found.passed_over(_written(args).values()):
             note(others)
         rows_by_name = out.latest
         known = known_apart(jobs, rows_by_name, does.limits)
@@ -125,7 +125,7 @@ def _show(row: "Row") -> None:
     print_lines([row_line(row["file"], row)])
 
 
-def _jobs(args: argparse.Namespace) -> tuple[list["Job"], dict[str, int]]:
+def _jobs(args: argparse.Namespace, found: Sequence["Source"]) -> tuple[list["Job"], dict[str, int]]:
     """The jobs of this shard, and the numbers of all objects of BOP by their names.
 
     Raises:
@@ -135,7 +135,6 @@ def _jobs(args: argparse.Namespace) -> tuple[list["Job"], dict[str, int]]:
     from symrefine.fleet.shard import Whole
     from symrefine.fleet.tasks import our_version
 
-    found = _sources(args)
     outputs = _written(args)
     manifests = () if args.manifest is None else (args.manifest,)
     check_outputs(outputs, (Path(name) for name in chain(manifests, (source.path for source in found))))
@@ -166,8 +165,8 @@ def _written(args: argparse.Namespace) -> dict[str, str | None]:
     return {"--out": args.out, "--bop": args.bop, "--table": args.table}
 
 
-def _sources(args: argparse.Namespace) -> list["Source"]:
-    from symrefine.cli.sources import manifest, sources
+def _sources(args: argparse.Namespace) -> "Sources":
+    from symrefine.cli.sources import Sources, manifest, sources
 
     if (args.manifest is None) != bool(args.path):
         args.parser.error("expected PATH, or --manifest FILE.csv, and not both")
@@ -175,7 +174,7 @@ def _sources(args: argparse.Namespace) -> list["Source"]:
         return sources(args.path, recursive=args.recursive)
     if args.recursive:
         args.parser.error("--recursive: is for directories, and a manifest names files; leave it out")
-    return manifest(Path(args.manifest))
+    return Sources(ours=manifest(Path(args.manifest)))
 
 
 def _numbered(args: argparse.Namespace, found: Sequence["Source"]) -> dict[str, int]:

@@ -33,34 +33,59 @@ class Source:
     options: Mapping[str, Any] = field(default_factory=dict)
 
 
-def sources(paths: Sequence[str], *, recursive: bool) -> list[Source]:
-    """The objects that paths stand for, each once, in order; in a lone directory they are called as they are there.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sources:
+    """The objects that paths stand for, each once, in order, and the files of directories that are of other kinds."""
+
+    ours: Sequence[Source]
+    others: Sequence[Path] = ()
+
+    def passed_over(self, besides: Iterable[str | None]) -> str:
+        """How many files are not looked at, and of which kinds; empty if there are none.
+
+        Args:
+            besides: files that are no matter: what is to be written.
+        """
+        known = {Path(name).resolve() for name in besides if name is not None}
+        left = {path for path in self.others if path.resolve() not in known}
+        kinds = " ".join(sorted({path.suffix.lower() or "without suffix" for path in left}))
+        return f"{len(left):,} file{'s' * (len(left) != 1)} of other kinds not looked at ({kinds})" if left else ""
+
+
+def sources(paths: Sequence[str], *, recursive: bool) -> Sources:
+    """The objects that paths stand for; in a lone directory they are called as they are there.
 
     Raises:
         InputError: one that stands for nothing.
     """
     found: dict[str, Source] = {}
+    others: list[Path] = []
     for path in paths:
-        files = listed(path, _is_ours, recursive=recursive) if is_remote(path) else _local(path, recursive)
+        if is_remote(path):
+            files = listed(path, _is_ours, recursive=recursive)
+        else:
+            files, left = _local(path, recursive)
+            others += left
         if not files:
             from symrefine.load import READERS
 
             raise InputError(f"{path}: no mesh and no cloud in it; known are {' '.join(READERS)}, and .gz of each")
         for inside, file in files.items():
             found.setdefault(file, Source(name=inside if len(paths) == 1 else file, path=file, place=file))
-    return list(found.values())
+    return Sources(ours=list(found.values()), others=others)
 
 
-def _local(path: str, recursive: bool) -> dict[str, str]:
-    """The files that a path stands for, in order, by the names that they have in it if it is a directory."""
+def _local(path: str, recursive: bool) -> tuple[dict[str, str], list[Path]]:
+    """The files that a path stands for, in order, by the names that they have in a directory, and others in that."""
     folder = Path(path)
     if not folder.is_dir():
         files = expanded([path])
         if missing := [name for name in files if not Path(name).exists()]:
             raise InputError(f"{missing[0]}: no such directory, file or pattern")
-        return {name: name for name in files}
-    shown = sorted(name.as_posix() for name in _files_in(folder, recursive) if _is_ours(name))
-    return {name: str(folder / name) for name in shown}
+        return {name: name for name in files}, []
+    inside = sorted(_files_in(folder, recursive), key=Path.as_posix)
+    ours = {name.as_posix(): str(folder / name) for name in inside if _is_ours(name)}
+    return ours, [folder / name for name in inside if not _is_ours(name)]
 
 
 def _files_in(folder: Path, recursive: bool) -> Iterator[Path]:
@@ -68,24 +93,6 @@ def _files_in(folder: Path, recursive: bool) -> Iterator[Path]:
     found = folder.rglob("*") if recursive else folder.glob("*")
     names = (p.relative_to(folder) for p in found if p.is_file())
     return (name for name in names if not any(part.startswith(".") for part in name.parts))
-
-
-def passed_over(paths: Sequence[str], *, recursive: bool, besides: Iterable[str | None]) -> str:
-    """How many files of directories are of kinds that are not looked at, and which; empty if there are none.
-
-    Args:
-        paths: of which the directories count.
-        recursive: whether those in them count, too.
-        besides: files that are no matter: what is to be written.
-    """
-    known = {Path(name).resolve() for name in besides if name is not None}
-    folders = [Path(path) for path in paths if not is_remote(path) and Path(path).is_dir()]
-    others = {folder / name for folder in folders for name in _files_in(folder, recursive) if not _is_ours(name)}
-    others = {path for path in others if path.resolve() not in known}
-    if not others:
-        return ""
-    kinds = " ".join(sorted({path.suffix.lower() or "without suffix" for path in others}))
-    return f"{len(others):,} {'file' if len(others) == 1 else 'files'} of other kinds not looked at ({kinds})"
 
 
 def _is_ours(path: Path) -> bool:
