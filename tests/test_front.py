@@ -113,6 +113,17 @@ def test_a_path_is_read_like_the_object_in_it(tmp_path):
     assert {**by_path.to_dict(), "source": 0, "timings": 0} == {**by_array.to_dict(), "source": 0, "timings": 0}
 
 
+def test_one_of_several_frames_is_chosen_by_its_number(tmp_path):
+    path = tmp_path / "two.xyz"
+    path.write_text("3\nwater\nO 0 0 0\nH 0.76 0.59 0\nH -0.76 0.59 0\n2\n\nH 0 0 0\nH 0 0 0.74\n")
+    assert [symrefine.detect(path, frame=k).point_group for k in (0, 1)] == ["C2v", "Dinfh"]
+    assert symrefine.detect(path, frame=1).to_dict()["options"]["frame"] == 1
+    with pytest.raises(InputError, match="frame is 2; the file has 2 "):
+        symrefine.detect(path, frame=2)
+    with pytest.raises(InputError, match="it chooses one of the objects in a file; give its path"):
+        symrefine.detect(POINTS, frame=0)
+
+
 WRONG = {
     "an object": (object(), "array: is of type object; expected a path"),
     "several paths": (["a.ply", "b.ply"], "array: holds several objects; give one of them at a time"),

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 def detect(
     shape: Any,
     *,
+    frame: int | None = None,
     weights: ArrayLike | None = None,
     normals: ArrayLike | None = None,
     labels: ArrayLike | None = None,
@@ -52,7 +53,8 @@ def detect(
     Args:
         shape: a path, points [N, n], `(vertices, faces)`, a `Shape`, a `Stream`, or a mesh, a cloud or a molecule of
             trimesh, Open3D, pyvista, ASE, pymatgen or torch (see `symrefine.load.objects.shape_of`). What else a file
-            has, labels, one of several frames, a texture, is asked of `symrefine.load`, and the shape given.
+            has, labels, a texture, is asked of `symrefine.load`, and the shape given.
+        frame: which of several molecules, models or volumes in a file, from 0; None where there is one.
         weights: [N] masses of the points. Of up to 250 points those of different mass are different things, which no
             symmetry exchanges; of more, masses are a sampling density.
         normals: [N, n] normals, any sign; estimated where absent.
@@ -80,10 +82,10 @@ def detect(
     if verify not in ("sample", "all"):
         raise InputError(f"verify is {verify!r}; expected 'sample' or 'all'")
     beside: dict[str, Any] = {"weights": weights, "normals": normals, "labels": labels, "viewpoint": viewpoint}
-    large = stream_of(shape) if all(given is None for given in beside.values()) else None
-    shape = shape_of(shape, **beside) if large is None else large
+    large = stream_of(shape) if frame is None and all(given is None for given in beside.values()) else None
+    shape = shape_of(shape, frame=frame, **beside) if large is None else large
     used = relative_tolerance(tolerance, shape, units=units, outliers=outliers)
-    options = told(tolerance, units) | {"seed": (seed := seed_of(seed))}
+    options = told(tolerance, units) | {"seed": (seed := seed_of(seed))} | ({} if frame is None else {"frame": frame})
     if not isinstance(shape, Shape) or shape.dim == 3:
         from symrefine.detection import story
 

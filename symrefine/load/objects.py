@@ -30,6 +30,7 @@ def shape_of(
     given: Any,
     *,
     name: str = "array",
+    frame: int | None = None,
     weights: ArrayLike | None = None,
     normals: ArrayLike | None = None,
     labels: ArrayLike | None = None,
@@ -42,6 +43,7 @@ def shape_of(
             corners; trimesh `Trimesh`, `PointCloud`, `Scene`; Open3D clouds and meshes, legacy and tensor; pyvista
             `PolyData`; ASE `Atoms`, pymatgen `Molecule`, whose elements become labels; or a `Shape`.
         name: what messages call it, where nothing names it better.
+        frame: which of several objects in a file, as of `load`.
         weights: as of `Shape`; like the others only where the object does not bring its own.
         normals: as of `Shape`.
         labels: as of `Shape`.
@@ -54,12 +56,14 @@ def shape_of(
     extra = {"weights": weights, "normals": normals, "labels": labels, "viewpoint": viewpoint}
     told: dict[str, Any] = {key: value for key, value in extra.items() if value is not None}
     _check_values(given, told)
+    if isinstance(given, str | PathLike):
+        return _completed(load(given, frame=frame), told)
+    if frame is not None:
+        raise InputError(f"frame is {frame!r}: it chooses one of the objects in a file; give its path, or leave it out")
     if isinstance(given, Shape):
         if told:
             raise InputError(f"{', '.join(told)}: belong to the Shape; give them there, or give an array of points")
         return given
-    if isinstance(given, str | PathLike):
-        return _completed(load(given), told)
     source = name if isinstance(given, tuple) else f"{type(given).__module__.partition('.')[0]} {type(given).__name__}"
     with about(source):
         content = next((made for read in _READERS if (made := read(given)) is not None), None)
