@@ -582,6 +582,26 @@ def test_a_model_without_its_floor_is_written_without_it(tmp_path: Path) -> None
     assert np.linalg.norm(load(tmp_path / "out" / "obj_000001.ply").points, axis=1).max() < 2.0
 
 
+@pytest.mark.parametrize(("option", "group"), [("labels", "C2v"), ("weights", "C2v"), ("", "D2h")])
+def test_what_tells_points_apart_counts_in_an_export(tmp_path: Path, option: str, group: str) -> None:
+    path, out = tmp_path / "box.csv", tmp_path / "box.npz"
+    box = [(x, y, z) for x in (-1, 1) for y in (-2, 2) for z in (-3, 3)]
+    rows = [f"{x},{y},{z},{2 + x}" if option else f"{x},{y},{z}" for x, y, z in box]
+    path.write_text("\n".join(["x,y,z,which" if option else "x,y,z", *rows]))
+    words = [f"--{option}", "which"] if option else []
+    assert invoke(["export", str(path), "--to", "npz", "--out", str(out), *words]) == 0
+    with np.load(out) as archive:
+        assert str(archive["point_group"]) == group
+
+
+def test_where_the_camera_stood_counts_in_an_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, points = tmp_path / "ball.npy", np.random.default_rng(0).standard_normal((4000, 3))
+    np.save(path, points / np.linalg.norm(points, axis=1, keepdims=True))
+    line = ["export", str(path), "--to", "npz", "--out", str(tmp_path / "ball.npz"), "--viewpoint"]
+    assert invoke([*line, "0,0,9"]) == 2
+    assert "cannot have been seen from the viewpoint given" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(("suffix", "count"), [(".ply", 1), (".stl", 0)])
 def test_what_a_file_may_have_had_is_told_where_it_may(tmp_path: Path, suffix: str, count: int) -> None:
     path = placed(tmp_path, prism(3, 0.5), 4, f"part{suffix}")

@@ -1,20 +1,21 @@
 """`symrefine export`: the symmetries of a file as other programs read them."""
 
 import argparse
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from symrefine.cli.inputs import loaded
+from symrefine.cli.inputs import loaded, read_scan
 from symrefine.cli.outputs import check_outputs, note, tell
 from symrefine.cli.signs import waiting
 from symrefine.cli.values import (
     NUMBERED,
+    add_class_options,
     add_detection_options,
     add_frame_option,
-    add_outliers,
     add_path,
+    add_scan_options,
     count,
+    detection_options,
     millimetres,
     natural,
 )
@@ -55,14 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="canonical: where the 4 x 4 transform goes, .json or .npz (default: OUT_transform.json)",
     )
-    parser.add_argument(
-        "--texture",
-        action="store_true",
-        default=None,
-        help="the symmetries of the shape with its texture, of which the images are read as `detect --texture` does",
-    )
+    add_class_options(parser, textured="write the symmetries of the shape with its texture")
     add_frame_option(parser)
-    add_outliers(parser)
+    add_scan_options(parser)
     add_detection_options(parser)
 
 
@@ -96,13 +92,11 @@ def detected(args: argparse.Namespace) -> tuple["Shape", "Detection"]:
     """
     from symrefine.front.space import Detection
     from symrefine.front.verbs import detect_in_space
-    from symrefine.load import load
 
-    texture = bool(getattr(args, "texture", None))
-    shape = loaded(args.path, args.format, partial(load, measure=args.measure, frame=args.frame, texture=texture))
+    shape = loaded(args.path, args.format, lambda file: read_scan(file, detection_options(args)))
     outliers: Outliers = getattr(args, "outliers", "auto")
     found = detect_in_space(shape, outliers=outliers, tolerance=args.tolerance, units=args.units, seed=args.seed)
-    if texture:
+    if shape.texture is not None:
         assert isinstance(found.textured, Detection)
         found = found.textured
     return shape, found

@@ -117,8 +117,11 @@ def reading_options(args: argparse.Namespace) -> dict[str, Any]:
     return {name: given for name in how if (given := getattr(args, name, None)) is not None}
 
 
-def add_class_options(parser: argparse.ArgumentParser) -> None:
-    """The options that name what tells the points of a file apart."""
+_BESIDE = "tell the group of the shape with its texture beside that of the shape"
+
+
+def add_class_options(parser: argparse.ArgumentParser, *, textured: str = _BESIDE) -> None:
+    """The options that name what tells the points of a file apart, and what is done where a texture is read."""
     parser.add_argument(
         "--labels",
         metavar="NAME",
@@ -132,8 +135,8 @@ def add_class_options(parser: argparse.ArgumentParser) -> None:
         "--texture",
         action="store_true",
         default=None,
-        help="read the images of an .obj (map_Kd of its .mtl), .ply (TextureFile) or glTF, and tell the group of the "
-        "shape with its texture beside that of the shape: colours within a quarter of the scale are the same",
+        help="read the images of an .obj (map_Kd of its .mtl), .ply (TextureFile) or glTF, and "
+        f"{textured}: colours within a quarter of the scale are the same",
     )
     parser.add_argument(
         "--weights",
