@@ -31,11 +31,14 @@ def path_of(name: str | os.PathLike[str]) -> Path:
     """The path that is given.
 
     Raises:
-        InputError: an empty name, which pathlib takes for this directory.
+        InputError: an empty name, which pathlib takes for this directory, or one that no system takes.
     """
     if not os.fspath(name):
         raise InputError("the name of the file is empty; expected a path")
-    return Path(name)
+    path = Path(name)
+    if "\0" in str(path):
+        raise InputError(f"{str(path)[:60]!a}: is no name of a file: embedded null byte")
+    return path
 
 
 def check_target(path: Path) -> None:

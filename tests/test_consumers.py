@@ -582,6 +582,12 @@ def test_a_model_without_its_floor_is_written_without_it(tmp_path: Path) -> None
     assert np.linalg.norm(load(tmp_path / "out" / "obj_000001.ply").points, axis=1).max() < 2.0
 
 
+@pytest.mark.parametrize("to", ["bop", "npz", "canonical", "dope"])
+def test_a_name_of_nothing_is_refused(tmp_path: Path, to: Any) -> None:
+    with pytest.raises(InputError, match="is no name of a file"):
+        symrefine.export(prism(5), to, tmp_path / "a\0b")
+
+
 @pytest.mark.parametrize(("option", "group"), [("labels", "C2v"), ("weights", "C2v"), ("", "D2h")])
 def test_what_tells_points_apart_counts_in_an_export(tmp_path: Path, option: str, group: str) -> None:
     path, out = tmp_path / "box.csv", tmp_path / "box.npz"
@@ -641,6 +647,8 @@ def test_the_transform_takes_the_file_to_the_canonical_model(tmp_path: Path) -> 
         ("--to canonical --out f.ply --transform t.txt", "ends in .json or .npz"),
         ("--to canonical --out part.ply", "same file as the input"),
         ("--to isaac --out part.ply", "is a file; expected a folder"),
+        ("--to isaac --out a\0b", "is no name of a file"),
+        ("--to bop --out info.ply", "--out: info.ply: has the suffix of an object; expected a name such as models_in"),
         ("--to isaac --out no/f", "there is no directory"),
         ("--to bop --out other", "is no models_info.json"),
         ("--to halcon --out f", "--to"),

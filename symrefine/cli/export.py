@@ -21,7 +21,7 @@ from symrefine.cli.values import (
 )
 from symrefine.errors import InputError, about
 from symrefine.export.formats import TAKES, takers
-from symrefine.files import check_folder
+from symrefine.files import check_folder, path_of
 
 if TYPE_CHECKING:
     from symrefine.detection.measure import Outliers
@@ -110,7 +110,7 @@ def _check(args: argparse.Namespace) -> None:
         if getattr(args, option) is not None and name not in TAKES[args.to]:
             raise InputError(f"--{option}: does not apply to --to {args.to}; it is for {', '.join(takers(name))}")
     if args.to in _FOLDERS:
-        out = Path(args.out)
+        out = path_of(args.out)
         if out.exists() and not out.is_dir():
             raise InputError(f"--out {out}: is a file; expected a folder")
         with about("--out"):
@@ -128,9 +128,12 @@ def _check_names(args: argparse.Namespace) -> None:
     """Refuse files whose names do not fit what will be in them."""
     from symrefine.export.bop import read_models_info
     from symrefine.export.models import check_suffix
+    from symrefine.export.packages import check_table_name
 
     out = Path(args.out)
     if args.to == "bop":
+        with about("--out"):
+            check_table_name(out)
         read_models_info(out)
     elif args.to == "npz" and out.suffix.lower() != ".npz":
         raise InputError(f"--out {out}: expected a name that ends in .npz")

@@ -77,6 +77,7 @@ def package_of(
         raise InputError(f"{name} does not apply to {to!r}; it is for {', '.join(map(repr, takers(name)))}")
     number = number_for(shape.source, number)
     if to == "bop":
+        check_table_name(out)
         made = bop_package(out, detection, shape, number=number, scale=scale)
     elif to == "npz":
         if out.suffix.lower() != ".npz":
@@ -89,6 +90,16 @@ def package_of(
         made = consumer_package(to, out, detection, shape, number=number, scale=scale)
     _check_places(list(made.files), shape.source, in_folder=to in CONSUMERS)
     return made
+
+
+def check_table_name(out: Path) -> None:
+    """Refuse the name of a model where a `models_info.json` is written.
+
+    Raises:
+        InputError: it has the suffix of a model.
+    """
+    if out.suffix.lower() in SUFFIXES:
+        raise InputError(f"{out}: has the suffix of an object; expected a name such as models_info.json")
 
 
 def check_folder_name(to: str, folder: Path) -> None:
