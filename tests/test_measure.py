@@ -55,6 +55,11 @@ def test_a_place_that_is_told_a_thousand_times_takes_no_group_away():
     assert detect(points).point_group == "C4v"
 
 
+def test_so_few_places_told_more_than_once_are_no_sample_of_more():
+    found = measure(Shape.of(np.repeat(TABLE[:100], 5, axis=0)))
+    assert (found.count, found.is_thinned) == (100, False)
+
+
 def test_of_two_labels_at_one_place_both_are_kept():
     points, labels = np.repeat(TABLE, 2, axis=0), np.tile([0, 1], len(TABLE))
     assert measure(Shape(points=points, labels=labels)).count == len(points)

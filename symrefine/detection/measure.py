@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
 
@@ -130,11 +130,11 @@ def measure(
     if shape.faces is None and shape.weights is not None and not shape.weights.all():
         massive = np.flatnonzero(shape.weights > 0)
         shape = shape.chosen(massive)  # points of no mass are no part of the object
-    count, every = len(shape.points), shape
-    own: Index = np.arange(count)
+    every, own = shape, cast(Index, np.arange(len(shape.points)))
     if shape.faces is None and shape.weights is None and not is_few(shape):
         some, own = distinct(shape.points, shape.labels)
-        shape = shape.chosen(some) if len(some) < count else shape
+        shape = shape.chosen(some) if len(some) < len(own) else shape
+    count = len(shape.points)
     if shape.faces is None and not is_few(shape):
         # What stands in front parts what a camera sees, and hides its counterparts.
         groups, rng = shape.viewpoint is None, np.random.default_rng(0)
