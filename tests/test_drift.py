@@ -109,5 +109,5 @@ def test_a_tooth_out_of_place_is_told_though_noise_makes_teeth_look_open(seed: i
     made, _ = groups.posed(groups.Case(shape="gear24", sibling=True, noise_rel=0.01, seed=seed))
     found = detect(made)
     assert found.surface.openings is not None
-    assert found.point_group == "Cs" or found.undetermined
+    assert found.point_group == "Cs" or (seed == 64 and found.undetermined)  # Cs or C2v, by the noise of that cloud
     assert found.examined.choices(found.tolerance)[-1].probability < 0.5
