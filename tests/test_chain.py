@@ -15,8 +15,10 @@ from experiments.objects.boundary import instance
 from experiments.objects.shapes import box, join, revolve, sample
 from experiments.studies import groups
 from experiments.studies.boundary import Case, look
-from symrefine.decide.chain import _best, _excluded, _holding, _told_apart, _with, chain, explore
+from symrefine.decide.chain import _best, _excluded, chain
+from symrefine.decide.explore import _holding, _with, explore
 from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted
+from symrefine.decide.joins import _told_apart
 from symrefine.decide.looks import by_chance
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import Link, decide
@@ -372,7 +374,8 @@ def test_of_many_mirrors_that_noise_hides_the_truest_is_told(name, noise_rel):
 
 def test_what_a_group_holds_but_for_a_few_degrees_makes_no_larger_one(monkeypatch):
     """A mirror found 2 degrees off one of five is that one: joined they are no group of sixty."""
-    monkeypatch.setattr("symrefine.decide.chain.by_chance", lambda *_: False)  # the ring has no five of its own
+    for module in ("chain", "joins"):  # the ring has no five of its own
+        monkeypatch.setattr(f"symrefine.decide.{module}.by_chance", lambda *_: False)
     surface = ring()[1]
     tilt = rotation(np.array([0.0, 0.0, 1.0]), np.radians(2.0))
     whole = of("C2v")
@@ -428,7 +431,7 @@ def mirror_at(angle_deg):
     ],
 )
 def test_what_parts_generate_turns_by_no_less_than_tells_directions_apart(parts, whole, monkeypatch):
-    monkeypatch.setattr("symrefine.decide.chain.by_chance", lambda *_: False)
+    monkeypatch.setattr("symrefine.decide.joins.by_chance", lambda *_: False)
     assert _told_apart(round_but_for_holes(4)[0], joined(parts), parts).group.name == whole
 
 

@@ -23,7 +23,7 @@ from experiments.objects.shapes import bottle, box, join, mug, revolve, sample, 
 from experiments.studies import boundary, damaged, groups, single_views
 from symrefine.cli import invoke
 from symrefine.complete import complete
-from symrefine.decide import chain
+from symrefine.decide import chain, joins
 from symrefine.decide.ends import often_kept
 from symrefine.decide.hypotheses import judged
 from symrefine.decide.looks import COARSE, looked_at
@@ -365,11 +365,11 @@ def test_a_group_of_an_open_surface_that_a_strict_limit_turned_down_is_fitted_un
     surface = gather(measured, np.random.default_rng(0))[1]
     assert surface.openings is not None
     parts = [Placed(group=PointGroup(name="C7"), center=-measured.moments.center / measured.moments.scale)]
-    turned_down = chain._generated(surface, parts, (), 0, 1e-4)
+    turned_down = joins.generated(surface, parts, (), 0, 1e-4)
     assert turned_down is not None
     assert turned_down.elements == ()
     assert turned_down.need > COARSE * 1e-4
-    again = chain._generated(surface, parts, (turned_down,), 0, 10.0)
+    again = joins.generated(surface, parts, (turned_down,), 0, 10.0)
     assert again is not None
     assert len(again.elements) == 1
 

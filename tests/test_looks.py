@@ -9,7 +9,7 @@ import pytest
 
 from experiments.objects import damage
 from experiments.objects.shapes import box, join, mug, sample, table
-from symrefine.decide import chain, looks
+from symrefine.decide import explore, looks
 from symrefine.decide.looks import ASIDE, glances, looked_at, start_error
 from symrefine.detection.measure import gather, measure
 from symrefine.fit.placed import Placed
@@ -128,9 +128,9 @@ def test_a_border_of_hardly_a_hole_hides_nothing_of_a_group_that_no_hole_leaves(
     line = np.linalg.norm(surface.cloud.points - surface.cloud.points[0], axis=1) < 0.2
     surface = replace(surface, openings=Openings(line=line, border=line, evident=evident))
     asked = []
-    of_part = chain._of_part
-    monkeypatch.setattr(chain, "_of_part", lambda *args: asked.append(1) or of_part(*args))
-    pool = chain.explore(surface, evidence, surface.tolerance)
+    of_part = explore._of_part
+    monkeypatch.setattr(explore, "_of_part", lambda *args: asked.append(1) or of_part(*args))
+    pool = explore.explore(surface, evidence, surface.tolerance)
     assert (pool.largest.group.name, pool.at_least, bool(asked)) == ("D2h", evident, evident)
 
 

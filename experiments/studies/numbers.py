@@ -77,7 +77,7 @@ KIND_OF = {
         "align.scaled": "WIDEST STEP",
         "align.shown": "COARSER MOST_PLANES MOVED",
         "align.sides": "ORDERS",
-        "decide.chain": "LOOKED",
+        "decide.explore": "LOOKED",
         "decide.hypotheses": "MOVED MOVED_EACH",
         "decide.looks": "COARSE GLANCED ASIDE",
         "decide.place": "HALVED",

@@ -167,7 +167,7 @@ def answered(case: Case) -> Answer:
     found = told(evidence, clock=Clock())
     truths = [t.posed(pose) for t in made.accepted(TOLERANCE)]
     chain = []
-    for link, seen in zip(evidence.links[1:], evidence.known, strict=True):
+    for link, seen in zip(evidence.links[1:], evidence.known(evidence.surface.tolerance), strict=True):
         true = any(within(link.group, t.group, NEAR_RAD) for t in truths)
         place = (case.half, case.family, case.name, case.view)
         chain.append(Known(*place, link.group.name, link.need, evidence.surface.floor, seen.lone_mirror, true))

@@ -57,7 +57,7 @@ class Hypothesis:
     what it needs by what was seen alone, without belief in the rest, which denies nothing either; `believed` is the
     part, in squares, of what it needs that is belief. `rivals` are those that may be meant as well as it, and
     instead of it. Where cameras are known, `told` says whether what they saw of its elements makes up the group, and
-    `elsewhere` what it needs at least where it does not stand.
+    `elsewhere` what it needs at least where it does not stand. What is `proven` holds by what was not measured.
     """
 
     placed: Placed
@@ -70,6 +70,7 @@ class Hypothesis:
     rivals: tuple[Placed, ...] = ()
     told: bool = True
     elsewhere: float = math.inf
+    proven: bool = False
 
     @property
     def supported(self) -> float:
@@ -172,6 +173,11 @@ def fitted(
 def doubtless(surface: Surface) -> float:
     """The need that leaves no doubt worth telling at the tolerance asked for, in the noise that there is."""
     return certain(surface.tolerance, surface.floor / surface.tolerance)
+
+
+def hidden_need(surface: Surface) -> float:
+    """The need up to which noise tells no two groups apart, and none is doubted for it."""
+    return min(exact_need(surface.floor), doubtless(surface))
 
 
 def _moved(

@@ -67,6 +67,7 @@ class Link:
 
     `believed` is what of that, in squares, it takes to believe in what nobody saw; `placed` is the probability that it
     does not hold elsewhere as well, `broken` that what no camera saw breaks it, where as much as was seen is missing.
+    What is `proven` was not measured, so that no noise says anything of it.
     """
 
     need: float
@@ -74,9 +75,12 @@ class Link:
     believed: float = 0.0
     placed: float = 1.0
     broken: float = 0.0
+    proven: bool = False
 
     @classmethod
-    def of(cls, group: PointGroup, need: float, beyond: float, *, believed: float, placed: float) -> "Link":
+    def of(
+        cls, group: PointGroup, need: float, beyond: float, *, believed: float, placed: float, proven: bool = False
+    ) -> "Link":
         """That of a group in space, where the next one of the chain needs so much."""
         return cls(
             need=need,
@@ -84,6 +88,7 @@ class Link:
             believed=believed,
             placed=placed,
             broken=_broken(group),
+            proven=proven,
         )
 
 
@@ -137,6 +142,8 @@ def meant(link: Link, tolerance: float, noise: float = 0.0, curve: Curve = SPACE
     one size show less and less of what they miss by, and the curve gets less steep. What is believed of what nobody saw
     was not measured.
     """
+    if link.proven:
+        return link.placed
     even = curve.even_mirror if link.lone_mirror else curve.even
     seen = math.sqrt(max(link.need**2 - link.believed**2, 0.0))
     strained = strain(seen / tolerance, noise / tolerance, even) + (link.believed / tolerance / even) ** 2
@@ -149,6 +156,11 @@ def certain(tolerance: float, noise: float = 0.0, curve: Curve = SPACE) -> float
     In noise, which needs so many tolerances, the one that strains a group as much.
     """
     return float(curve.even * tolerance * LEAST ** (1.0 / curve.steepness) / math.hypot(1.0, BLURRED * noise))
+
+
+def least_told(noise: float) -> float:
+    """The smallest tolerance at which noise makes no exact symmetry more likely broken than not."""
+    return UNKNOWN * noise
 
 
 def strain(need: T, noise: T, even: T, unknown: float = UNKNOWN, blurred: float = BLURRED) -> T:

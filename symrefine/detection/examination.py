@@ -8,11 +8,12 @@ from functools import partial
 import numpy as np
 
 from symrefine.clock import Clock
-from symrefine.decide.chain import chain, explore
+from symrefine.decide.chain import chain
+from symrefine.decide.explore import explore
 from symrefine.decide.hypotheses import SAME_RAD, Hypothesis
 from symrefine.decide.looks import few_motions
 from symrefine.decide.pool import Pool
-from symrefine.decide.posterior import ALIKE, Alternative, Decision, Link, decide, meant, odd
+from symrefine.decide.posterior import ALIKE, Alternative, Decision, Link, decide, least_told, meant, odd
 from symrefine.detection.measure import Measured, Outliers, doubt, floor_under, gather, measure
 from symrefine.detection.sketch import Sample, Sketch, is_large, sampled, set_apart, sketched
 from symrefine.fit.placed import SAMPLED, Placed, common_center
@@ -41,7 +42,8 @@ class Examined:
         outliers: indices of the points that are no part of the object, ascending.
         outlier_share: of all points.
         sample: how many points stand for how many, if they stand for more than themselves.
-        exact: the group that maps the vertices of a mesh onto one another, where they put it, if that can be told.
+        exact: the group that maps the vertices of a mesh onto one another, where they put it, if that can be told;
+            that of the points of a cloud, where noise leaves nothing else to be told.
         no_floor: whether it was told that it stands on one, and none was found.
         denied: if points were taken for a clump because they alone speak against it, the group that they leave.
         hides: whether points that were not, as they seem to be a part of it, alone speak against a larger group.
@@ -75,16 +77,20 @@ class Examined:
         return min(found, float(self.surface.cloud.lonely.mean())) > SHARES[-1]
 
     def vertices_of(self, found: Hypothesis) -> OnVertices | None:
-        """Where the vertices of a mesh put a group of the chain, if it maps them onto one another."""
+        """Where the vertices of a mesh put a group of the chain, if it maps them onto one another.
+
+        Those of a cloud, if they were asked.
+        """
         known, group = self.exact, found.group
-        if group.name == "C1":
+        if group.name == "C1" or (known is None and self.measured.shape.faces is None):
             return None
-        if known is not None and group.name == known.group.name:
-            return known
-        if known is not None and not group.is_finite:
-            return _round(known, group)
-        if known is not None and not is_subgroup(group, known.group, SAME_RAD):
-            return None
+        if known is not None:
+            if group.name == known.group.name:
+                return known
+            if not group.is_finite:
+                return known.rounded(group) if is_subgroup(known.group, group, SAME_RAD) else None
+            if not is_subgroup(group, known.group, SAME_RAD):
+                return None
         origin, scale = self.measured.moments.center, self.measured.moments.scale
         center = origin + scale * found.placed.center
         return on_vertices(self.measured.shape, group, center, diagonal=scale * self.surface.diagonal)
@@ -92,19 +98,34 @@ class Examined:
     def decided(self, tolerance: float, *, shown: bool = False) -> Decision:
         """The likeliest group of the chain at a tolerance; with `shown` as if what no camera saw kept to the rest."""
         missing = 0.0 if shown else self.surface.unclosed
-        return decide(self.known, tolerance, self.surface.floor, unclosed=missing)
+        # What holds at no tolerance that can be told holds at no smaller one.
+        return decide(self.known(tolerance), max(tolerance, self.least), self.surface.floor, unclosed=missing)
 
     @property
-    def known(self) -> list[Link]:
-        """The groups beyond C1 as the decision sees them."""
-        surface, needs = self.surface, [*(h.need for h in self.links), math.inf]
-        # At the tolerance that was asked for, so that a larger one takes no group away that a smaller one tells.
-        placed = (
-            (1.0 - meant(Link(need=h.elsewhere), surface.tolerance, surface.floor)) * self._foreign(h) * h.named
-            for h in self.links
-        )
-        every = zip(self.links, needs[1:], placed, strict=True)
-        return [Link.of(h.group, h.need, beyond, believed=h.believed, placed=sure) for h, beyond, sure in every][1:]
+    def proven(self) -> Hypothesis | None:
+        """The largest group of the chain that holds by what was not measured, if there is one."""
+        return next((h for h in self.links if h.proven), None)
+
+    @property
+    def least(self) -> float:
+        """The smallest tolerance at which that is read which was measured, if some is proven anyway; else 0."""
+        return 0.0 if self.proven is None else least_told(self.surface.floor)
+
+    def known(self, tolerance: float) -> list[Link]:
+        """The groups beyond C1 as the decision sees them at a tolerance."""
+        needs = [*(h.need for h in self.links), math.inf]
+        return [self._link(h, beyond, tolerance) for h, beyond in zip(self.links, needs[1:], strict=True)][1:]
+
+    def _link(self, found: Hypothesis, beyond: float, tolerance: float) -> Link:
+        """A group of the chain, where the next one needs so much."""
+        exact = self.exact if self.proven is not None and self.proven.holds(found.placed) else None
+        if exact is not None:
+            sure = meant(Link(need=exact.miss), tolerance)
+        else:
+            # At the tolerance that was asked for, so that a larger one takes no group away that a smaller one tells.
+            elsewhere = meant(Link(need=found.elsewhere), self.surface.tolerance, self.surface.floor)
+            sure = (1.0 - elsewhere) * self._foreign(found) * found.named
+        return Link.of(found.group, found.need, beyond, believed=found.believed, placed=sure, proven=exact is not None)
 
     def _foreign(self, found: Hypothesis) -> float:
         """How likely it is that no part of the object was taken for a clump, if that alone speaks against a group."""
@@ -133,7 +154,12 @@ class Examined:
 
     def doubt(self, tolerance: float) -> str:
         """Why the data support no decision at a tolerance, or nothing if they do."""
-        return doubt(self.measured, self.surface, tolerance) or self._nothing_carries(tolerance)
+        reason = doubt(self.measured, self.surface, tolerance)
+        if self.least > tolerance and not self.measured.flaw:
+            index = self.decided(tolerance).index
+            if index and self.known(tolerance)[index - 1].proven:  # which asks for nothing that was measured
+                return ""
+        return reason or self._nothing_carries(tolerance)
 
     def _nothing_carries(self, tolerance: float) -> str:
         """The groups between which it stands, where even the likeliest is more likely wrong than right."""
@@ -143,14 +169,6 @@ class Examined:
         by = sorted(zip(probabilities, self.links, strict=True), key=lambda k: -k[0])
         told = ", ".join(f"{h.group.name} ({100 * p:.0f} %)" for p, h in by[:3])
         return f"no group is more likely than not: {told}"
-
-
-def _round(known: OnVertices, group: PointGroup) -> OnVertices | None:
-    """A continuous group where the vertices put the fold that they have of it; none if that leaves its centre free."""
-    fold = known.group.symbol.fold if known.group.is_polar == group.is_polar else 0
-    if fold <= 2 or not is_subgroup(known.group, group, SAME_RAD):
-        return None
-    return replace(known, group=PointGroup(name=group.name, frame=known.group.frame))
 
 
 def _size(group: PointGroup) -> tuple[float, float]:
@@ -293,14 +311,18 @@ def _examined(
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed), tolerance)
     exact = None
-    if measured.shape.faces is not None:
+    if measured.shape.faces is not None or (least_told(surface.floor) > tolerance and measured.shape.weights is None):
         with clock("vertices"):
             exact, evidence = _by_vertices(measured, surface.diagonal, evidence)
+    # What is proven holds at any tolerance; what else there may be is read from the first that can be.
+    least = max(tolerance, least_told(surface.floor)) if exact is not None and exact.proves else tolerance
+    surface = replace(surface, tolerance=least)
     with clock("search"):
         # Where the tolerance asked for is too small to decide anything, the ladder is told from the first that is not.
-        steps = [t for t in sorted({tolerance, *ladder}) if t >= tolerance and not doubt(measured, surface, t)]
+        every = sorted({max(t, least) for t in (tolerance, *ladder) if t >= tolerance})
+        steps = [t for t in every if not doubt(measured, surface, t)]
         pool = explore(surface, evidence, steps[0], min(tolerance, *ladder, 1.0)) if steps else Pool()
-        links = chain(surface, pool, ALIKE * max((tolerance, *ladder)))
+        links = chain(surface, pool, ALIKE * max((least, *ladder)))
     return Examined(
         measured=measured,
         surface=surface,
@@ -345,7 +367,7 @@ def _replaces(found: Examined, clump: Array, tolerance: float) -> bool:
 
 
 def _by_vertices(measured: Measured, diagonal: float, evidence: Evidence) -> tuple[OnVertices | None, Evidence]:
-    """The group that the vertices of a mesh have, and the evidence with it.
+    """The group that the vertices of a mesh, or the points of a cloud, have, and the evidence with it.
 
     It is put about the point nearest the centroid that it leaves in place.
     """

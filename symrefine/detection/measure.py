@@ -9,7 +9,7 @@ from typing import Literal, cast, get_args
 import numpy as np
 
 from symrefine.decide.doubts import on_a_line, set_by_strays
-from symrefine.decide.posterior import UNKNOWN
+from symrefine.decide.posterior import least_told
 from symrefine.errors import InputError
 from symrefine.geometry import Array, tight_diagonal
 from symrefine.moments.moments import PARTS, Moments, shape_moments
@@ -244,7 +244,7 @@ def _not_seen_from(views: tuple[Camera, ...]) -> str:
 
 def _hidden(surface: Surface, tolerance: float, *, is_mesh: bool) -> str:
     """Noise that makes an exact symmetry more likely broken than not."""
-    least = UNKNOWN * surface.floor
+    least = least_told(surface.floor)
     if least <= tolerance:
         return ""
     hidden, asked = (f"{100.0 * part:.2g} %" for part in (float(np.quantile(surface.noise, 0.95)), tolerance))

@@ -89,14 +89,17 @@ class Candidate:
 class Exact:
     """That the group maps the vertices of a mesh onto one another: planes, axes and centre are those of the vertices.
 
+    Likewise the points of a cloud, which are only asked where noise leaves nothing to be told at the tolerance.
+
     Attributes:
         miss: largest distance of an image to its counterpart, a fraction of the diagonal; rounding alone leaves 1e-15.
-        faces: whether triangles are mapped onto triangles as well; if not, a triangulation chose its diagonals.
+        faces: whether faces are mapped onto faces as well, triangles in one plane as one; if not, a triangulation
+            chose its diagonals where four corners lie in no plane. None of a cloud.
         point_group: what does so: the group, or the fold that a continuous one has in the vertices.
     """
 
     miss: float
-    faces: bool
+    faces: bool | None
     point_group: str
 
 
@@ -153,7 +156,7 @@ class Detection(ReadOnly):
         no_floor: whether that was told and none found.
         clumps: how many groups of them stand apart from the body, the others being single strays.
         outlier_share: of all points.
-        exact: that and how exactly the group maps vertices of a mesh onto vertices, if it does; None of anything else.
+        exact: that and how exactly the group maps vertices of a mesh onto vertices, or points of a cloud, if it does.
         sample: what stands for the surface where there are too many points to look at all of them; None where all do.
         verified: what all points say, where they were asked.
         even_sample: how many points, more evenly spread, it was decided by where the density falls off; None where by

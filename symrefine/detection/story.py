@@ -158,7 +158,7 @@ def _report(
     told = alternatives(names, needs, decision, -1 if reason else index)
     history = chosen.history
     loose = slack(surface, chosen.placed) if surface.viewed and chosen.elements else np.zeros((6, 6))
-    on = None if measured.shape.faces is None else found.vertices_of(chosen)
+    on = found.vertices_of(chosen)
     chosen = chosen if on is None else _polished(chosen, on, measured)
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
     planes = [e for e in chosen.elements if e.operations.kind == "plane"]
@@ -229,7 +229,7 @@ def _report(
         floor=measured.floor,
         no_floor=found.no_floor,
         clumps=len(measured.clumps),
-        exact=None if on is None else Exact(miss=on.miss, faces=on.faces, point_group=on.finite.name),
+        exact=None if on is None else _exact(on, measured.shape),
         sample=found.sample,
         even_sample=len(measured.shape.points) if measured.is_thinned else None,
         origin=origin,
@@ -237,6 +237,10 @@ def _report(
         timings=clock.seconds,
         examined=found,
     )
+
+
+def _exact(on: OnVertices, shape: Shape) -> Exact:
+    return Exact(miss=on.miss, faces=None if shape.faces is None else on.faces, point_group=on.finite.name)
 
 
 def _polished(chosen: Hypothesis, on: OnVertices, measured: Measured) -> Hypothesis:

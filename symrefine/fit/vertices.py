@@ -1,15 +1,16 @@
 """Vertices that a group maps onto vertices: they know its place to rounding, where samples know it to 1e-4.
 
-Exact or not is a matter of vertices, not of samples: all of them are asked, and, of a mesh, whether its triangles are
-mapped onto triangles as well. The same fit places the group for reports, exports and the nearest symmetric shape.
+Exact or not is a matter of vertices, not of samples: all of them are asked, and, of a mesh, whether its faces are
+mapped onto faces as well. The same fit places the group for reports, exports and the nearest symmetric shape.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from symrefine.fit.action import generators, mean_back, permutations
 from symrefine.fit.anchors import LARGEST, permuting_group
+from symrefine.fit.facets import facets, prints
 from symrefine.fit.finite import finite_group
 from symrefine.fit.placed import Placed
 from symrefine.fit.refine import MAX_OUTER
@@ -67,7 +68,8 @@ class OnVertices:
         center: [3] the point that its operations leave in place, input units.
         finite: the operations that map the points: all of the group, or the fold that a continuous one has in them.
         miss: the largest distance of an image to its counterpart, as a fraction of the diagonal.
-        faces: whether triangles are mapped onto triangles, with their labels; true where there are none.
+        faces: whether faces are mapped onto faces, with their labels, triangles in one plane as one; true where there
+            are none.
     """
 
     group: PointGroup
@@ -75,6 +77,17 @@ class OnVertices:
     finite: PointGroup
     miss: float
     faces: bool
+
+    @property
+    def proves(self) -> bool:
+        """Whether the shape itself has a symmetry, and not only what is sampled of it."""
+        return self.faces and self.group.name != "C1"
+
+    def rounded(self, group: PointGroup) -> "OnVertices | None":
+        """A continuous group where the fold of it stands that was found; None if that leaves its centre free."""
+        if self.group.symbol.fold <= 2 or self.group.is_polar != group.is_polar:
+            return None
+        return replace(self, group=PointGroup(name=group.name, frame=self.group.frame))
 
 
 def exact_symmetry(shape: Shape, diagonal: float) -> OnVertices | None:
@@ -141,7 +154,7 @@ def _on(
         center=center + diagonal * place.center,
         finite=place.group,
         miss=miss,
-        faces=_maps_faces(shape, own.back, place.group.operations(), images),
+        faces=_maps_faces(shape, own, place.group.operations(), images),
     )
 
 
@@ -193,17 +206,18 @@ def _largest_miss(points: Array, operations: Array, images: Index) -> float:
     return max(float(np.linalg.norm(points @ g.T - points[image], axis=1).max()) for g, image in pairs)
 
 
-def _maps_faces(shape: Shape, back: Index, operations: Array, images: Index) -> bool:
-    """Whether triangles, each as often as it is there, are mapped onto triangles of the same label."""
+def _maps_faces(shape: Shape, own: Distinct, operations: Array, images: Index) -> bool:
+    """Whether triangles, those that lie in one plane as one, are mapped onto triangles of the same label.
+
+    Each as often as it is there.
+    """
     if shape.faces is None:
         return True
     labels = np.zeros(len(shape.faces), dtype=np.int64) if shape.labels is None else shape.labels
-    own = _in_order(back[shape.faces], labels)
-    moved = (images[h][back[shape.faces]] for h, _ in generators(operations))
-    return all(bool((_in_order(faces, labels) == own).all()) for faces in moved)
-
-
-def _in_order(faces: Index, labels: Index) -> Index:
-    """Triangles with their labels [F, 4], as sets of corners, in one order."""
-    rows = np.column_stack([np.sort(faces, axis=1), labels])
-    return rows[np.lexsort(rows.T)]
+    every = np.column_stack([np.sort(own.back[shape.faces], axis=1), labels])
+    told, often = np.unique(every, axis=0, return_counts=True)
+    faces, kinds, count = told[:, :3], told[:, 3] * (often.max() + 1) + often, len(own.points)
+    facet = facets(own.points, faces, kinds, ROUNDED)
+    here = prints(faces, kinds, facet, count)
+    moved = (prints(images[h][faces], kinds, facet, count) for h, _ in generators(operations))
+    return all(np.array_equal(there, here) for there in moved)

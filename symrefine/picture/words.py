@@ -186,13 +186,14 @@ def taken_out(outliers: int, share: float, clumps: int, *, floor: bool) -> str:
     return f"{outliers:,} points ({percent(share)}) taken as outliers{among}" if outliers else ""
 
 
-def exactly(miss: float, faces: bool, group: str) -> str:
-    """How exactly vertices are mapped onto vertices, and whether triangles are onto triangles."""
+def exactly(miss: float, faces: bool | None, group: str) -> str:
+    """How exactly vertices are mapped onto vertices, and whether faces onto faces; of a cloud points onto points."""
+    exact = f"exact to {miss:.1g} of the diagonal"
+    if faces is None:
+        return f"{exact}: {group} maps points onto points"
     if faces:
-        return f"exact to {miss:.1g} of the diagonal: {group} maps vertices onto vertices, triangles onto triangles"
-    return (
-        f"exact to {miss:.1g} of the diagonal in its vertices, which {group} maps onto one another; not its triangles"
-    )
+        return f"{exact}: {group} maps vertices onto vertices, faces onto faces"
+    return f"{exact} in its vertices, which {group} maps onto one another; not its faces"
 
 
 def sampled(sample: tuple[int, int] | None) -> str:

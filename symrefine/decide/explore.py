@@ -1,0 +1,228 @@
+"""What the moments propose, fitted and judged until the largest group that holds has no neighbour that holds, too."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+from symrefine.decide.ends import (
+    ends_there,
+    ends_too,
+    hidden_by,
+    hides_surely,
+    hides_there,
+    often_kept,
+    often_left,
+    thin_ends,
+)
+from symrefine.decide.hypotheses import (
+    Hypothesis,
+    belief_in_as_much,
+    fitted,
+    has_all,
+    hidden_need,
+    judged,
+)
+from symrefine.decide.joins import better_parts, endless, generated, is_loose, join, size_of
+from symrefine.decide.looks import COARSE, exact_need, glances, hopeless, looked_at, start_error
+from symrefine.decide.place import SUPPORTED
+from symrefine.decide.pool import Pool
+from symrefine.decide.posterior import ALIKE, LEAST, Link, certain, meant
+from symrefine.fit.placed import Placed, elements
+from symrefine.propose.candidates import (
+    Evidence,
+    about,
+    beside,
+    prime_axes,
+    proposals,
+    repeated,
+    turned_over,
+    voted_mirrors,
+)
+from symrefine.samples import FOLLOWED
+from symrefine.surface.surface import Surface
+
+# Candidates of an open surface that are looked at: where little was seen many seem possible at a glance.
+LOOKED = 24
+
+
+def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 0.0) -> Pool:
+    """Fit and judge what the moments propose, and what may stand beside the largest group that holds.
+
+    Of a surface with open borders all that is judged once as if it were whole, and then with what votes propose where
+    nobody looked beyond them.
+
+    Args:
+        limit: what the largest group may need, as a fraction of the diagonal.
+        finest: the smallest tolerance that is asked for.
+    """
+    nothing = max(ALIKE * hidden_need(surface), certain(finest))
+    whole = replace(_of_whole(surface.closed, evidence, limit, nothing), whole=True)
+    if surface.openings is None or (not surface.is_open and surface.openings.floor is None):
+        return replace(whole, at_least=surface.openings is not None and surface.openings.evident)
+    ends, evident = ends_there(surface, whole.largest), surface.openings.evident
+    opens = evident and not (ends and thin_ends(surface))
+    if not whole.largest.group.is_polar and (ends or not evident):
+        return replace(whole, at_least=opens)  # no single hole leaves such a group, and there is hardly one
+    evident = surface.openings.hide_much
+    part = _of_part(surface, whole)
+    more = size_of(part.largest.placed) > size_of(whole.largest.placed)
+    hidden = max((e.coverage.unseen for e in part.largest.elements), default=0.0)
+    # A group that a single hole leaves may keep its border because it keeps the border of almost any.
+    ends = ends and not (more and often_kept(surface, whole.largest, hidden))
+    # What may not be open at all is missing a part only where that explains more.
+    unseen = hidden_by(surface, part.largest) if more else []
+    missing = (evident or (more and hides_there(surface, unseen))) and not ends
+    missing = missing or often_left(whole.largest, part.largest)
+    missing = missing and not (more and ends_too(surface, part.largest, unseen, ALIKE * limit))
+    if missing and (not more or hides_surely(surface, part.largest, limit)):
+        return replace(part, at_least=True)
+    # What a border hides may be why a larger group is in doubt.
+    doubted = (h for h in (part.largest, *part.small) if size_of(h.placed) > size_of(whole.largest.placed))
+    hides = not ends and any(meant(Link(need=h.need), surface.tolerance) > LEAST for h in doubted)
+    if not more:
+        return replace(whole, at_least=hides or opens or surface.openings.floor is not None)
+    whole = replace(whole, at_least=evident or hides or missing)
+    # To believe that what ends so evenly is missing a part takes as much as to believe in as much as was seen.
+    asked, known = belief_in_as_much(surface, part.largest.placed), part.largest
+    rival = replace(known, need=math.hypot(known.need, asked), believed=math.hypot(known.believed, asked))
+    return replace(whole, small=(*whole.small, rival))
+
+
+def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float) -> Pool:
+    pool, starts = Pool(nothing=nothing, limit=limit), proposals(evidence)
+    if evidence.vertices is not None:
+        pool = _with_vertices(surface, pool, evidence.vertices, proven=evidence.proven)
+        starts = [*beside(pool.largest.placed), *starts]
+    pool = _with(surface, pool, starts)
+    for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
+        if glance < hopeless(start_error(surface)) and pool.wants(axis):
+            pool = _with(surface, pool, about(evidence, axis.group.frame[2]))
+    # Turns that hold better than the largest group may have half turns across them which that has not.
+    better = [h for h in pool.small if ALIKE * h.need < pool.largest.need]
+    for known in {h.group.name: h for h in (*better, pool.largest)}.values():
+        pool = _with(surface, pool, turned_over(evidence, known.placed))
+    nearest = sorted((*pool.looked, *pool.hopeless), key=lambda k: k[1])[:FOLLOWED] if not pool.small else []
+    return replace(pool, small=(*pool.small, *(fitted(surface, start) for start, _ in nearest)))
+
+
+def _with_vertices(surface: Surface, pool: Pool, known: Placed, *, proven: bool) -> Pool:
+    """The pool with what the vertices of a mesh have, and first with the round group that they may be those of."""
+    if known.group.symbol.fold > 2:
+        pool = _tried(surface, pool, [endless(known)])
+    if (is_round := pool.has(known)) and not proven:
+        return pool
+    found = judged(surface, known) if is_round else fitted(surface, known)
+    found = replace(found, need=0.0, proven=True) if proven else found
+    return replace(pool, small=(*pool.small, found)) if is_round else _grown(surface, pool, found)
+
+
+def _of_part(surface: Surface, whole: Pool) -> Pool:
+    pool = Pool(nothing=whole.nothing, limit=whole.limit)
+    known = [h for h in (whole.largest, *whole.small) if h.elements]
+    voted = [*voted_mirrors(surface.cloud), *repeated(surface.cloud, surface.diagonal)]
+    if surface.viewed:
+        parts = list[Placed]()
+        for h in known:
+            again = fitted(surface, h.placed)
+            pool = _grown(surface, pool, again)
+            # Of what was not seen enough to tell the whole group, enough may have been seen of its elements.
+            parts += _holding(surface, again.placed, ALIKE * pool.limit) if is_loose(surface, again) else []
+        return _with(surface, pool, [*parts, *voted])
+    # What holds without them asks nothing of openings.
+    for h in (h for h in known if h.need <= exact_need(surface.floor)):
+        pool = _grown(surface, pool, h)
+    # Votes find most of what was found of the whole, and better, as nothing that is missing biases them.
+    pool = _with(surface, pool, voted)
+    for h in known:
+        pool = pool if pool.has(h.placed, h.need) else _grown(surface, pool, fitted(surface, h.placed))
+    return pool
+
+
+def _with(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
+    """The pool with candidates tried, and then the neighbours of its largest group, as long as that grows."""
+    before, pool = pool.largest, _tried(surface, pool, starts)
+    while pool.largest is not before:
+        before = pool.largest
+        pool = _tried(surface, pool, beside(before.placed))
+    return pool
+
+
+def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tuple[Placed, float]]:
+    """The starts that are new with what they seem to need at a glance, large groups that look good first."""
+    new = [s for s in starts if pool.wants(s)]
+    # What they carry to where nobody looked tells little of their order, and takes long to be told.
+    blind = surface.is_open and not surface.viewed
+    at, most = (surface.closed, surface.ceiling) if blind else (surface, hopeless(start_error(surface)))
+    seen = zip(new, glances(at, new, most), strict=True)
+    best = sorted(seen, key=lambda k: max(k[1], pool.nothing) / math.log2(1.0 + size_of(k[0])))
+    return best[:LOOKED] if surface.is_open else best
+
+
+def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
+    """The pool with candidates fitted, but for those that the group so far has anyway."""
+    parts: list[Placed] = []
+    for start, glance in _glanced(surface, pool, starts):
+        if not pool.wants(start) or pool.shows(start, glance):
+            continue
+        if glance >= hopeless(start_error(surface)):
+            pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
+            continue
+        look = looked_at(surface, start, COARSE * pool.limit, pool.has_as_seen, useful=ALIKE * pool.limit)
+        moved, needs = look.placed, look.needs
+        pool = replace(pool, looks=(*pool.looks, (glance, moved)))
+        if needs > ALIKE * pool.limit:
+            pool = replace(pool, looked=(*pool.looked, (moved, needs)))
+            parts += _holding(surface, moved, ALIKE * pool.limit)
+        elif not pool.has(moved, needs) and not pool.met(moved):
+            pool = _joined_at_once(surface, pool, moved) if needs <= pool.limit and pool.largest.elements else pool
+            if not pool.has(moved, needs):
+                found = fitted(surface, moved, error_rad=look.error_rad, close=ALIKE * pool.limit)
+                if surface.openings is None or surface.viewed or found.supported >= SUPPORTED:
+                    pool = _grown(surface, pool, found)
+                    # What does not hold may have elements that do, which nothing else proposes.
+                    parts += [p.placed for p in better_parts(found)] if found.need > pool.limit else []
+    return _tried(surface, pool, parts) if parts else pool
+
+
+def _holding(surface: Surface, placed: Placed, most: float) -> list[Placed]:
+    """The elements that seem to hold alone of a group that does not, or of which too little was seen.
+
+    Of a gear's mirrors those that its holes share; of a slab from above all but its own plane.
+    """
+    every = [e.alone(placed.center) for e in elements(placed.group)]
+    alone = [p for p in every if p.group.name != placed.group.name]  # of S4 one generates all of it
+    return [p for p, needs in zip(alone, glances(surface, alone, most), strict=True) if needs < most]
+
+
+def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
+    """The pool where a candidate and the largest group hold together as far as noise tells: no need to part them.
+
+    Where the largest has it already and holds worse, that is the largest of those in it that need nothing; of what is
+    round any two mirrors through its axis make some fold, which says nothing.
+    """
+    if pool.largest.holds(start) and not pool.largest.group.is_finite:
+        return pool
+    exact = [h for h in pool.small if h.need <= pool.nothing and h.elements] if pool.largest.holds(start) else []
+    known = max(exact or [pool.largest], key=lambda h: size_of(h.placed))
+    if known.holds(start) or has_all(start, known.placed):
+        return pool
+    both = generated(surface, [known.placed, start], pool.failed, known.iterations, ALIKE * pool.nothing)
+    if both is None or is_loose(surface, both) or both.need > pool.nothing:
+        return pool.with_failed(both)
+    return replace(pool, small=(*pool.small, both)) if exact else replace(pool, largest=both)
+
+
+def _grown(surface: Surface, pool: Pool, found: Hypothesis) -> Pool:
+    """The pool with what was fitted, and its largest group joined to it, if both hold together, or else the larger."""
+    if pool.has(found.placed, found.need) or is_loose(surface, found):
+        return pool
+    if found.need > pool.limit:
+        return replace(pool, small=(*pool.small, found))
+    both = join(surface, [pool.largest, found], pool.failed, ALIKE * pool.limit)
+    if both is not None and not is_loose(surface, both) and both.need <= pool.limit:
+        largest = both
+    else:
+        largest, pool = max(pool.largest, found, key=lambda h: size_of(h.placed)), pool.with_failed(both)
+    # What is replaced may hold better than what takes its place.
+    kept = [pool.largest] if largest is not pool.largest and pool.largest.elements else []
+    return replace(pool, small=(*pool.small, *kept, found), largest=largest)
