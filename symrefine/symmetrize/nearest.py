@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.fit.action import generators, mean_back
 from symrefine.fit.finite import finite_group
-from symrefine.fit.placed import Placed
+from symrefine.fit.placed import Placed, fitted_matrices
 from symrefine.fit.vertices import NEAR, Distinct, on_vertices, settled, towards
 from symrefine.geometry import Array, ReadOnly, tight_diagonal, unit
 from symrefine.groups import PointGroup
@@ -217,8 +217,10 @@ class _Work:
         place = self.place
         some = self.points[:: max(1, len(self.points) // FITTED)]
         for _ in range(4):
-            place, _ = towards(place, some, _on_symmetric_surface(some, place, closest))
-        return place, _on_symmetric_surface(self.points, place, closest)
+            # Where a group stands some of its operations tell as well as all.
+            told = np.stack(fitted_matrices(place.group))
+            place, _ = towards(place, some, _on_symmetric_surface(some, place, told, closest))
+        return place, _on_symmetric_surface(self.points, place, place.group.operations(), closest)
 
     def _even_weights(self, action: Action) -> Array | None:
         """Weights that are equal over each orbit, their sum kept; copies of one point share its mean."""
@@ -277,9 +279,9 @@ def _turned(operations: Array, vectors: Array) -> Array:
     return np.asarray(np.einsum("kij,nj->kni", operations, vectors).reshape(-1, 3))
 
 
-def _on_symmetric_surface(points: Array, place: Placed, closest: Closest) -> Array:
-    """Means [N, 3] over the group of g^-1 (closest point to g p): a map of space that commutes with the group."""
-    local, operations = points - place.center, place.group.operations()
+def _on_symmetric_surface(points: Array, place: Placed, operations: Array, closest: Closest) -> Array:
+    """Means [N, 3] over operations of g^-1 (closest point to g p): over all a map of space that commutes with them."""
+    local = points - place.center
     found = (closest(place.center + local @ g.T) - place.center for g in operations)
     return np.asarray(place.center + mean_back(found, operations))
 

@@ -1,14 +1,15 @@
 """Closest points of a surface, given as triangles or as a cloud of local planes."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from symrefine.geometry import Array
 from symrefine.moments.quadrature import sample_surface
 from symrefine.shape import Index, Shape
 from symrefine.surface.skin import local_planes
+from symrefine.surface.tree import Tree
 
 # Samples that lead to the triangles near a point, and how many of them are asked.
 SAMPLES, ASKED = 20000, 8
@@ -30,14 +31,14 @@ def _closest_on_cloud(shape: Shape, rng: np.random.Generator) -> Closest:
     planes = local_planes((shape.points - center) / size, len(shape.points), rng)
     # The normal is that of the neighbours, the place that of the point itself: means of neighbours would merge the two
     # sides of a thin sheet, and smooth more than the symmetry asks for.
-    points, normals, tree = shape.points, planes.normals, cKDTree(shape.points)
+    points, normals, tree = shape.points, planes.normals, Tree(shape.points)
     # A plane fitted across an edge cuts it: there points stay where they are.
     usual = max(FLAT, USUAL * float(np.median(planes.flatness)))
     trust = np.clip(2.0 - planes.flatness / usual, 0.0, 1.0)
 
     def closest(queries: Array) -> Array:
-        near = tree.query(queries)[1]
-        across = np.sum((queries - points[near]) * normals[near], axis=1)
+        near = tree.nearest(queries)[1]
+        across = _dot(queries - points[near], normals[near])
         return np.asarray(queries - (trust[near] * across)[:, None] * normals[near])
 
     return closest
@@ -45,38 +46,66 @@ def _closest_on_cloud(shape: Shape, rng: np.random.Generator) -> Closest:
 
 def _closest_on_mesh(shape: Shape, rng: np.random.Generator) -> Closest:
     assert shape.faces is not None
-    corners = shape.points[shape.faces]
+    triangles = _Triangles.of(shape.points[shape.faces])
     samples, _, owners = sample_surface(shape, SAMPLES, rng)
     # Triangles too small for a sample have their centre.
-    owners = np.concatenate([owners, np.arange(len(corners))])
-    tree = cKDTree(np.concatenate([samples, corners.mean(axis=1)]))
+    owners = np.concatenate([owners, np.arange(len(shape.faces))])
+    tree = Tree(np.concatenate([samples, triangles.corners.mean(axis=1)]))
 
     def closest(queries: Array) -> Array:
-        near = owners[tree.query(queries, k=min(ASKED, len(owners)))[1]].reshape(len(queries), -1)
-        feet = _on_triangles(queries, corners, near)
-        best = np.argmin(np.linalg.norm(feet - queries[:, None], axis=2), axis=1)
-        return np.asarray(feet[np.arange(len(queries)), best])
+        near = owners[tree.query(queries, min(ASKED, len(owners)))[1]]
+        return queries - triangles.away(queries, near)
 
     return closest
 
 
-def _on_triangles(queries: Array, corners: Array, near: Index) -> Array:
-    """Closest points [M, k, 3] of triangles `near` [M, k] to queries [M, 3]: inside, or on the nearest edge."""
-    a, b, c = (corners[near, i] for i in range(3))
-    p = np.broadcast_to(queries[:, None], a.shape)
-    feet = np.stack([_on_segment(p, a, b), _on_segment(p, b, c), _on_segment(p, c, a)])
-    best = np.argmin(np.sum((feet - p) ** 2, axis=-1), axis=0)
-    edge = np.take_along_axis(feet, best[None, ..., None], axis=0)[0]
-    normal = np.cross(b - a, c - a)
-    square = np.maximum(np.sum(normal**2, axis=-1, keepdims=True), 1e-300)
-    foot = p - normal * (np.sum((p - a) * normal, axis=-1, keepdims=True) / square)
-    sides = [np.sum(np.cross(v - u, foot - u) * normal, axis=-1) for u, v in ((a, b), (b, c), (c, a))]
-    inside = np.min(sides, axis=0) >= 0.0
-    return np.where(inside[..., None], foot, edge)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Triangles:
+    """Triangles with what tells the closest point of each.
+
+    Attributes:
+        corners: [F, 3, 3].
+        edges: [F, 3, 3] from each corner to the next.
+        inverse: [F, 3] of their squared lengths, 0 of those without length.
+        normals: [F, 3] unit, NaN of triangles without area, which are their edges.
+        inward: [F, 3, 3] across each edge, in the plane, to the side where the triangle is.
+    """
+
+    corners: Array
+    edges: Array
+    inverse: Array
+    normals: Array
+    inward: Array
+
+    @classmethod
+    def of(cls, corners: Array) -> "_Triangles":
+        edges = np.roll(corners, -1, axis=1) - corners
+        square, normals = _dot(edges, edges), np.cross(edges[:, 0], edges[:, 1])
+        size = np.linalg.norm(normals, axis=1, keepdims=True)
+        normals = np.divide(normals, size, out=np.full_like(normals, np.nan), where=size > 0.0)
+        return cls(
+            corners=corners,
+            edges=edges,
+            inverse=np.divide(1.0, square, out=np.zeros_like(square), where=square > 0.0),
+            normals=normals,
+            inward=np.cross(normals[:, None], edges),
+        )
+
+    def away(self, queries: Array, near: Index) -> Array:
+        """From the closest point of any of triangles `near` [M, k] to each of queries [M, 3]."""
+        rows = np.arange(len(queries))
+        there = queries[:, None, None] - self.corners[near]
+        edges = self.edges[near]
+        share = np.clip(_dot(there, edges) * self.inverse[near], 0.0, 1.0)
+        beside = there - share[..., None] * edges
+        far = _dot(beside, beside)
+        nearest = far.argmin(axis=2)
+        height = _dot(there[:, :, 0], self.normals[near])
+        above = np.asarray((_dot(there, self.inward[near]) >= 0.0).all(axis=2))
+        best = np.where(above, height**2, far.min(axis=2)).argmin(axis=1)
+        straight = height[rows, best, None] * self.normals[near[rows, best]]
+        return np.where(above[rows, best, None], straight, beside[rows, best, nearest[rows, best]])
 
 
-def _on_segment(p: Array, u: Array, v: Array) -> Array:
-    along = v - u
-    square = np.maximum(np.sum(along**2, axis=-1, keepdims=True), 1e-300)
-    share = np.clip(np.sum((p - u) * along, axis=-1, keepdims=True) / square, 0.0, 1.0)
-    return np.asarray(u + share * along)
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray(np.einsum("...i,...i->...", a, b))
