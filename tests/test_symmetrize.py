@@ -532,3 +532,22 @@ def test_what_cannot_be_made_symmetric_is_one_line(
     assert words in err
     assert err.count("\n") == 1
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.ply", "odd.ply"]
+
+
+def test_the_command_keeps_labels_and_leaves_out_what_it_is_told(tmp_path: Path) -> None:
+    """A brick of which one half has another colour: the plane between the halves is none of its mirrors."""
+    rng = np.random.default_rng(8)
+    sides = rng.integers(0, 3, 3000)
+    points = rng.uniform(-1.0, 1.0, (3000, 3))
+    points[np.arange(3000), sides] = np.sign(points[np.arange(3000), sides])
+    points = points * [1.0, 0.7, 0.4]
+    table = np.column_stack([points, points[:, 0] > 0.0])
+    path, out, told = tmp_path / "brick.csv", tmp_path / "exact.csv", tmp_path / "told.json"
+    np.savetxt(path, table, delimiter=",", header="x,y,z,half", comments="", fmt=["%.9g"] * 3 + ["%d"])
+    asked = ["symmetrize", str(path), "-o", str(out), "--json", str(told), "--labels", "half"]
+    assert invoke(asked) == 0
+    record = json.loads(told.read_text())
+    assert (record["point_group"], record["options"]["labels"]) == ("C2v", "half")
+    assert invoke([*asked, "--outliers", "none"]) == 0
+    assert json.loads(told.read_text())["options"]["outliers"] == "none"
+    assert invoke([*asked[:-1], "third"]) == 2

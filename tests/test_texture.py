@@ -340,6 +340,14 @@ def test_what_a_line_is_about_stands_apart_from_what_it_says() -> None:
     assert {line[14:15] + str(line[15:16] != " ") for line in lines[1:]} == {" True"}, "in one column"
 
 
+def test_what_is_made_exact_is_what_the_texture_keeps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write_obj(tmp_path, (1.0, 1.0, 2.0), quarters)
+    found = symrefine.detect(load(path, texture=True))
+    for words, group in (([], found.point_group), (["--texture"], found.textured.point_group)):
+        assert invoke(["symmetrize", str(path), "-o", str(tmp_path / "exact.ply"), *words]) == 0
+        assert capsys.readouterr().out.startswith(f"{path}: {group}, made exact\n")
+
+
 def test_exports_are_of_the_shape_with_its_texture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_obj(tmp_path, (1.0, 1.0, 2.0), quarters)
     found = symrefine.detect(load(path, texture=True))
