@@ -95,12 +95,27 @@ def test_doubled_faces_are_exact_only_if_all_are_doubled(name):
     shape, near, center, _ = posed(name)
     twice = Shape(shape.points, np.concatenate([shape.faces, shape.faces]))
     assert on_vertices(twice, near, center).faces
-    one_twice = Shape(shape.points, np.concatenate([shape.faces, shape.faces[:1]]))
+    corners = shape.points[shape.faces]
+    sizes = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    one_twice = Shape(shape.points, np.concatenate([shape.faces, shape.faces[[sizes.argmax()]]]))
     assert not on_vertices(one_twice, near, center).faces
     split = Shape(
         np.concatenate([shape.points, shape.points]), np.concatenate([shape.faces, shape.faces + len(shape.points)])
     )
     assert on_vertices(split, near, center).faces
+
+
+def test_a_face_that_is_cut_where_it_bends_misses_by_that():
+    """A lid out of its plane by less than rounding of coordinates, and cut along one diagonal of two."""
+    box = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-0.7, 0.7) for z in (-0.4, 0.4)])
+    faces = ConvexHull(box).simplices
+    lid = np.flatnonzero(box[:, 2] > 0.0)
+    for bend in (0.0, 1e-6):
+        bent = box.copy()
+        bent[lid, 2] += bend * np.sign(bent[lid, 0] * bent[lid, 1])  # two corners up, two down
+        found = exact_symmetry(Shape(bent, faces), 2.6)
+        assert found.faces
+        assert bend <= found.miss <= 2.0 * bend + 1e-15
 
 
 def test_labels_of_faces_count():

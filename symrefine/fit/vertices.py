@@ -10,7 +10,7 @@ import numpy as np
 
 from symrefine.fit.action import generators, mean_back, permutations
 from symrefine.fit.anchors import LARGEST, permuting_group
-from symrefine.fit.facets import facets, prints
+from symrefine.fit.facets import Facets
 from symrefine.fit.finite import finite_group
 from symrefine.fit.placed import Placed
 from symrefine.fit.refine import MAX_OUTER
@@ -67,7 +67,8 @@ class OnVertices:
         group: where it stands.
         center: [3] the point that its operations leave in place, input units.
         finite: the operations that map the points: all of the group, or the fold that a continuous one has in them.
-        miss: the largest distance of an image to its counterpart, as a fraction of the diagonal.
+        miss: the largest distance of an image to its counterpart, or that a face is out of its plane by, as a fraction
+            of the diagonal.
         faces: whether faces are mapped onto faces, with their labels, triangles in one plane as one; true where there
             are none.
     """
@@ -149,12 +150,13 @@ def _on(
     miss = _largest_miss(own.points - place.center, place.group.operations(), images)
     if miss > within:
         return None
+    bend = _faces_miss(shape, own, place.group.operations(), images)
     return OnVertices(
         group=PointGroup(name=group.name, frame=place.group.frame),
         center=center + diagonal * place.center,
         finite=place.group,
-        miss=miss,
-        faces=_maps_faces(shape, own, place.group.operations(), images),
+        miss=miss if bend is None else max(miss, bend),
+        faces=bend is not None,
     )
 
 
@@ -206,18 +208,20 @@ def _largest_miss(points: Array, operations: Array, images: Index) -> float:
     return max(float(np.linalg.norm(points @ g.T - points[image], axis=1).max()) for g, image in pairs)
 
 
-def _maps_faces(shape: Shape, own: Distinct, operations: Array, images: Index) -> bool:
-    """Whether triangles, those that lie in one plane as one, are mapped onto triangles of the same label.
+def _faces_miss(shape: Shape, own: Distinct, operations: Array, images: Index) -> float | None:
+    """By how much faces miss one another besides their corners; None if some are mapped onto none of the same label.
 
-    Each as often as it is there.
+    Each as often as it is there. Triangles that lie in one plane are one face, where they are not mapped one by one.
     """
     if shape.faces is None:
-        return True
+        return 0.0
     labels = np.zeros(len(shape.faces), dtype=np.int64) if shape.labels is None else shape.labels
     every = np.column_stack([np.sort(own.back[shape.faces], axis=1), labels])
     told, often = np.unique(every, axis=0, return_counts=True)
-    faces, kinds, count = told[:, :3], told[:, 3] * (often.max() + 1) + often, len(own.points)
-    facet = facets(own.points, faces, kinds, ROUNDED)
-    here = prints(faces, kinds, facet, count)
-    moved = (prints(images[h][faces], kinds, facet, count) for h, _ in generators(operations))
-    return all(np.array_equal(there, here) for there in moved)
+    faces, kinds = told[:, :3], told[:, 3] * (often.max() + 1) + often
+    moved, still = [images[h] for h, _ in generators(operations)], np.arange(len(own.points))
+    for facets in (Facets.single(faces, kinds), Facets.flat(own.points, faces, kinds, ROUNDED)):
+        here = facets.prints(still)
+        if all(np.array_equal(facets.prints(image), here) for image in moved):
+            return facets.bend
+    return None
