@@ -66,9 +66,7 @@ def test_what_bends_little_by_little_is_no_facet():
     sphere = unit(np.random.default_rng(1).standard_normal((3000, 3)))
     faces = ConvexHull(sphere).simplices
     facet, _ = told(sphere, faces, within=3e-3)  # next to one another nearly all lie in one plane
-    corners = [np.unique(faces[facet == one]) for one in np.unique(facet)]
-    assert max(np.ptp(sphere[own], axis=0).max() for own in corners) < 0.3
-    assert max(map(len, corners)) > 3
+    assert len(np.unique(facet)) == len(faces)
 
 
 def test_a_facet_that_lies_on_itself_is_another_one_than_one_within_the_same_edges():

@@ -90,9 +90,9 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
 
 def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float) -> Pool:
     pool, starts = Pool(nothing=nothing, limit=limit), proposals(evidence)
-    if evidence.vertices is not None:
-        pool = _with_vertices(surface, pool, evidence.vertices, proven=evidence.proven)
-        starts = [*beside(pool.largest.placed), *starts]
+    for exact in (evidence.proven, evidence.vertices):
+        pool = pool if exact is None else _with_vertices(surface, pool, exact, proven=exact is evidence.proven)
+    starts = [*beside(pool.largest.placed), *starts] if evidence.vertices is not None else starts
     pool = _with(surface, pool, starts)
     for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
         if glance < hopeless(start_error(surface)) and pool.wants(axis):

@@ -71,8 +71,8 @@ def size_of(placed: Placed) -> float:
 
 
 def better_parts(found: Hypothesis) -> list[Hypothesis]:
-    """The elements of a group that need less than all of it does, each alone."""
-    return [single(e) for e in found.elements if ALIKE * e.need < found.need]
+    """The elements of a group, where it has several, that need less than all of it does, each alone."""
+    return [single(e) for e in found.elements if ALIKE * e.need < found.need] if len(found.elements) > 1 else []
 
 
 def _told_apart(surface: Surface, placed: Placed | None, parts: Sequence[Placed]) -> Placed | None:

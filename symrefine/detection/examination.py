@@ -11,16 +11,16 @@ from symrefine.clock import Clock
 from symrefine.decide.chain import chain
 from symrefine.decide.explore import explore
 from symrefine.decide.hypotheses import SAME_RAD, Hypothesis
-from symrefine.decide.looks import few_motions
+from symrefine.decide.looks import exact_need, few_motions
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import ALIKE, Alternative, Decision, Link, decide, least_told, meant, odd
 from symrefine.detection.measure import Measured, Outliers, doubt, floor_under, gather, measure
+from symrefine.detection.proof import by_vertices
 from symrefine.detection.sketch import Sample, Sketch, is_large, sampled, set_apart, sketched
-from symrefine.fit.placed import SAMPLED, Placed, common_center
-from symrefine.fit.vertices import OnVertices, exact_symmetry, on_vertices
+from symrefine.fit.placed import SAMPLED, Placed
+from symrefine.fit.vertices import OnVertices, on_vertices
 from symrefine.geometry import Array, Mask, check_tolerance
 from symrefine.groups import PointGroup, is_subgroup
-from symrefine.propose.candidates import Evidence
 from symrefine.samples import COUNT, FOLLOWED, LOOK
 from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import CLUMP, COUNTERPART, Clump, clump_among
@@ -42,8 +42,8 @@ class Examined:
         outliers: indices of the points that are no part of the object, ascending.
         outlier_share: of all points.
         sample: how many points stand for how many, if they stand for more than themselves.
-        exact: the group that maps the vertices of a mesh onto one another, where they put it, if that can be told;
-            that of the points of a cloud, where noise leaves nothing else to be told.
+        exact: the group that maps the vertices of a mesh onto one another, where they put it, if that can be told; of
+            points of a cloud, where noise leaves nothing else to be told. `proof` is what of it maps the faces, too.
         no_floor: whether it was told that it stands on one, and none was found.
         denied: if points were taken for a clump because they alone speak against it, the group that they leave.
         hides: whether points that were not, as they seem to be a part of it, alone speak against a larger group.
@@ -57,6 +57,7 @@ class Examined:
     outlier_share: float
     sample: Sample | None
     exact: OnVertices | None
+    proof: OnVertices | None
     no_floor: bool = False
     denied: Hypothesis | None = None
     hides: bool = False
@@ -82,15 +83,13 @@ class Examined:
         Those of a cloud, if they were asked.
         """
         known, group = self.exact, found.group
-        if group.name == "C1" or (known is None and self.measured.shape.faces is None):
+        same = next((k for k in (self.proof, known) if k is not None and k.group.name == group.name), None)
+        if same is not None or group.name == "C1" or (known is None and self.measured.shape.faces is None):
+            return same
+        if known is not None and not group.is_finite:
+            return known.rounded(group) if is_subgroup(known.group, group, SAME_RAD) else None
+        if known is not None and not is_subgroup(group, known.group, SAME_RAD):
             return None
-        if known is not None:
-            if group.name == known.group.name:
-                return known
-            if not group.is_finite:
-                return known.rounded(group) if is_subgroup(known.group, group, SAME_RAD) else None
-            if not is_subgroup(group, known.group, SAME_RAD):
-                return None
         origin, scale = self.measured.moments.center, self.measured.moments.scale
         center = origin + scale * found.placed.center
         return on_vertices(self.measured.shape, group, center, diagonal=scale * self.surface.diagonal)
@@ -118,14 +117,14 @@ class Examined:
 
     def _link(self, found: Hypothesis, beyond: float, tolerance: float) -> Link:
         """A group of the chain, where the next one needs so much."""
-        exact = self.exact if self.proven is not None and self.proven.holds(found.placed) else None
-        if exact is not None:
-            sure = meant(Link(need=exact.miss), tolerance)
+        proof = self.proof if self.proven is not None and self.proven.holds(found.placed) else None
+        if proof is not None:
+            sure = meant(Link(need=proof.miss), tolerance)
         else:
             # At the tolerance that was asked for, so that a larger one takes no group away that a smaller one tells.
             elsewhere = meant(Link(need=found.elsewhere), self.surface.tolerance, self.surface.floor)
             sure = (1.0 - elsewhere) * self._foreign(found) * found.named
-        return Link.of(found.group, found.need, beyond, believed=found.believed, placed=sure, proven=exact is not None)
+        return Link.of(found.group, found.need, beyond, believed=found.believed, placed=sure, proven=proof is not None)
 
     def _foreign(self, found: Hypothesis) -> float:
         """How likely it is that no part of the object was taken for a clump, if that alone speaks against a group."""
@@ -158,7 +157,10 @@ class Examined:
         if self.least > tolerance and not self.measured.flaw:
             index = self.decided(tolerance).index
             if index and self.known(tolerance)[index - 1].proven:  # which asks for nothing that was measured
-                return ""
+                larger = [h.group.name for h in self.links[index + 1 :] if h.need <= exact_need(self.surface.floor)]
+                points = "points" if self.measured.shape.faces is None else "vertices"
+                proven = f"its {points} prove {self.links[index].group.name}"
+                return f"{reason}; {proven}, and {' or '.join(larger)} may hold as well" if larger else ""
         return reason or self._nothing_carries(tolerance)
 
     def _nothing_carries(self, tolerance: float) -> str:
@@ -310,12 +312,12 @@ def _examined(
         out, share = set_apart(measured, sketch, outliers=outliers)
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed), tolerance)
-    exact = None
+    exact = proof = None
     if measured.shape.faces is not None or (least_told(surface.floor) > tolerance and measured.shape.weights is None):
         with clock("vertices"):
-            exact, evidence = _by_vertices(measured, surface.diagonal, evidence)
+            exact, proof, evidence = by_vertices(measured, surface.diagonal, evidence)
     # What is proven holds at any tolerance; what else there may be is read from the first that can be.
-    least = max(tolerance, least_told(surface.floor)) if exact is not None and exact.proves else tolerance
+    least = max(tolerance, least_told(surface.floor)) if proof is not None else tolerance
     surface = replace(surface, tolerance=least)
     with clock("search"):
         # Where the tolerance asked for is too small to decide anything, the ladder is told from the first that is not.
@@ -332,6 +334,7 @@ def _examined(
         outlier_share=share,
         sample=None if sketch is None else Sample(points=len(sketch.picked), of=sketch.count),
         exact=exact,
+        proof=proof,
     )
 
 
@@ -364,20 +367,6 @@ def _replaces(found: Examined, clump: Array, tolerance: float) -> bool:
             under = moved[there.covers(moved)]
             hidden.append(float((disc_distances(cloud, under) > margin).sum()) if len(under) else 0.0)
     return max(hidden) * found.measured.count >= COUNTERPART * len(clump) * len(own)
-
-
-def _by_vertices(measured: Measured, diagonal: float, evidence: Evidence) -> tuple[OnVertices | None, Evidence]:
-    """The group that the vertices of a mesh, or the points of a cloud, have, and the evidence with it.
-
-    It is put about the point nearest the centroid that it leaves in place.
-    """
-    origin, scale = measured.moments.center, measured.moments.scale
-    found = exact_symmetry(measured.shape, scale * diagonal)
-    if found is None or found.group.name == "C1":
-        return found, evidence
-    center = common_center([Placed(group=found.group, center=(found.center - origin) / scale)])
-    place = Placed(group=found.group, center=center)
-    return replace(found, center=origin + scale * center), replace(evidence, vertices=place, proven=found.faces)
 
 
 def _belongs(found: Examined, clump: Array, tolerance: float) -> bool:

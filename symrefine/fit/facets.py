@@ -41,17 +41,14 @@ class Facets:
         Only those of the same label [F].
         """
         corners = points[faces]
-        normals, size = _normals(corners)
-        of = _connected(len(faces), *_pairs(corners, normals, faces, labels, within))
-        order = np.lexsort([size, of])
-        largest = order[np.append(np.flatnonzero(np.diff(of[order])), len(order) - 1)][of]
-        off = np.einsum("kji,ki->kj", corners - corners[largest, :1], normals[largest])
-        off = np.abs(off).max(axis=1)
+        of = _connected(len(faces), *_pairs(corners, faces, labels, within))
+        normals, off = _planes(corners, of)
         # What bends little by little is no facet: each of its triangles is one.
-        bent = np.zeros(int(of.max()) + 1, dtype=bool)
+        bent = np.zeros(len(normals), dtype=bool)
         bent[of[off > within]] = True
         alone = bent[of]
-        against = ~alone & (np.einsum("ki,ki->k", normals, normals[largest]) < 0.0)
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        against = ~alone & (_dot(across, normals[of]) < 0.0)
         return cls(
             faces=np.where(against[:, None], faces[:, ::-1], faces),
             labels=labels,
@@ -78,21 +75,27 @@ class Facets:
         return cast(Index, np.sort(told))
 
 
-def _pairs(corners: Array, normals: Array, faces: Index, labels: Index, within: float) -> tuple[Index, Index]:
-    """Triangles that share an edge, lie in one plane on both sides of it, and have the same label."""
+def _pairs(corners: Array, faces: Index, labels: Index, within: float) -> tuple[Index, Index]:
+    """Triangles that share an edge, lie in one plane on both sides of it, and have the same label.
+
+    Four corners are in one plane if moving each by no more than `within` brings them there: what they enclose changes
+    by as much times the area across from each. A plane through a small triangle would tell little of a large one.
+    """
     ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
     edge = ends.min(axis=1) * (int(faces.max()) + 1) + ends.max(axis=1)
     order = np.argsort(edge, kind="stable")
     _, first, uses = np.unique(edge[order], return_index=True, return_counts=True)
     pairs = order[first[uses == 2][:, None] + [0, 1]]  # an edge of three triangles or more is where facets meet
     (near, far), (side, beyond) = pairs.T // 3, pairs.T % 3
-    start, end = corners[near, side], corners[near, (side + 1) % 3]
-    own, tip = corners[near, (side + 2) % 3] - start, corners[far, (beyond + 2) % 3] - start
-    flat = np.abs(np.einsum("ki,ki->k", tip, normals[near])) <= within
-    flat &= np.abs(np.einsum("ki,ki->k", own, normals[far])) <= within
-    # Folded over, two triangles of a plane lie on each other.
-    aside = np.cross(normals[near], end - start)
-    flat &= np.einsum("ki,ki->k", tip, aside) * np.einsum("ki,ki->k", own, aside) < 0.0
+    start, along = corners[near, side], corners[near, (side + 1) % 3] - corners[near, side]
+    own, other = corners[near, (side + 2) % 3] - start, corners[far, (beyond + 2) % 3] - start
+    sides = ((along, own), (along, other), (own, other), (own - along, other - along))
+    areas = sum(np.linalg.norm(np.cross(a, b), axis=1) for a, b in sides)
+    flat = np.abs(_dot(np.cross(along, own), other)) <= within * areas
+    # Folded over, two triangles of a plane lie on each other: by as much as the smaller one reaches.
+    unit = np.divide(along, length := np.linalg.norm(along, axis=1, keepdims=True), where=length > 0.0, out=0.0 * along)
+    own, other = own - _dot(own, unit)[:, None] * unit, other - _dot(other, unit)[:, None] * unit
+    flat &= _dot(own, other) <= within * np.sqrt(np.maximum(_dot(own, own), _dot(other, other)))
     flat &= labels[near] == labels[far]
     return near[flat], far[flat]
 
@@ -106,8 +109,18 @@ def _connected(count: int, one: Index, other: Index) -> Index:
     return cast(Index, connected_components(graph, directed=False)[1].astype(np.intp))
 
 
-def _normals(corners: Array) -> tuple[Array, Array]:
-    """Unit normals [F, 3] of triangles, 0 of those without area, and twice their areas [F]."""
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    size = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.divide(normals, size, out=np.zeros_like(normals), where=size > 0.0), size[:, 0]
+def _planes(corners: Array, of: Index) -> tuple[Array, Array]:
+    """Unit normals [K, 3] of the planes that facets lie in, and how far off corners of each triangle are [F]."""
+    count = int(of.max()) + 1
+    uses = 3.0 * np.bincount(of, minlength=count)
+    middle = np.zeros((count, 3))
+    np.add.at(middle, of, corners.sum(axis=1))
+    local = corners - (middle / uses[:, None])[of, None]
+    spread = np.zeros((count, 3, 3))
+    np.add.at(spread, of, np.einsum("fki,fkj->fij", local, local))
+    normals = np.linalg.eigh(spread)[1][:, :, 0]
+    return normals, np.abs(np.einsum("fki,fi->fk", local, normals[of])).max(axis=1)
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray(np.einsum("ki,ki->k", a, b))

@@ -8,14 +8,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from symrefine.errors import InputError
 from symrefine.fit.action import generators, mean_back, permutations
 from symrefine.fit.anchors import LARGEST, permuting_group
 from symrefine.fit.facets import Facets
 from symrefine.fit.finite import finite_group
-from symrefine.fit.placed import Placed
+from symrefine.fit.placed import Placed, common_center
 from symrefine.fit.refine import MAX_OUTER
 from symrefine.geometry import Array, orthogonal_factor, tight_diagonal
 from symrefine.groups import PointGroup
+from symrefine.groups.identify import identify
 from symrefine.groups.standard import GOLDEN
 from symrefine.rounding import DOUBLE, SINGLE
 from symrefine.samples import GLANCE
@@ -67,8 +69,8 @@ class OnVertices:
         group: where it stands.
         center: [3] the point that its operations leave in place, input units.
         finite: the operations that map the points: all of the group, or the fold that a continuous one has in them.
-        miss: the largest distance of an image to its counterpart, or that a face is out of its plane by, as a fraction
-            of the diagonal.
+        miss: the largest distance of an image to its counterpart, or between faces of the same edges that are not quite
+            plane, as a fraction of the diagonal.
         faces: whether faces are mapped onto faces, with their labels, triangles in one plane as one; true where there
             are none.
     """
@@ -83,6 +85,11 @@ class OnVertices:
     def proves(self) -> bool:
         """Whether the shape itself has a symmetry, and not only what is sampled of it."""
         return self.faces and self.group.name != "C1"
+
+    def beside(self, point: Array) -> "OnVertices":
+        """The same about the point nearest to another one [3] that the group leaves in place."""
+        moved = common_center([Placed(group=self.group, center=self.center - point)])
+        return replace(self, center=point + moved)
 
     def rounded(self, group: PointGroup) -> "OnVertices | None":
         """A continuous group where the fold of it stands that was found; None if that leaves its centre free."""
@@ -110,6 +117,30 @@ def exact_symmetry(shape: Shape, diagonal: float) -> OnVertices | None:
         if found := _on(shape, own, group, Placed(group=group, center=middle), origin, ROUNDED, diagonal):
             return found
     return None
+
+
+def proven_symmetry(shape: Shape, exact: OnVertices, diagonal: float) -> OnVertices | None:
+    """That part of what maps the vertices of a mesh which maps its faces, too; None if nothing of it does.
+
+    Of an open box that has all the mirrors of a box in its vertices the two that keep the opening.
+    """
+    if exact.faces or exact.group.name == "C1":
+        return exact if exact.proves else None
+    own, place = Distinct.of(shape, exact.center, diagonal, weld=SINGLE), Placed(group=exact.group, center=np.zeros(3))
+    operations = place.group.operations()
+    images = permutations(own.points, operations, own.labels, NEAR)
+    if images is None or shape.faces is None or len(operations) * len(shape.faces) > LARGEST:
+        return None
+    facets = Facets.flat(own.points, *_told_faces(shape, shape.faces, own), ROUNDED)
+    here = facets.prints(images[0])
+    kept = [np.array_equal(facets.prints(image), here) for image in images]
+    try:
+        group = identify(operations[kept])
+    except InputError:  # of what lies within rounding of being mapped
+        return None
+    if group.name == "C1":
+        return None
+    return _on(shape, own, group, replace(place, group=group), exact.center, ROUNDED, diagonal)
 
 
 def on_vertices(
@@ -155,7 +186,7 @@ def _on(
         group=PointGroup(name=group.name, frame=place.group.frame),
         center=center + diagonal * place.center,
         finite=place.group,
-        miss=miss if bend is None else max(miss, bend),
+        miss=miss if bend is None else max(miss, 2.0 * bend),  # two faces may be out of one plane on both its sides
         faces=bend is not None,
     )
 
@@ -215,13 +246,18 @@ def _faces_miss(shape: Shape, own: Distinct, operations: Array, images: Index) -
     """
     if shape.faces is None:
         return 0.0
-    labels = np.zeros(len(shape.faces), dtype=np.int64) if shape.labels is None else shape.labels
-    every = np.column_stack([np.sort(own.back[shape.faces], axis=1), labels])
-    told, often = np.unique(every, axis=0, return_counts=True)
-    faces, kinds = told[:, :3], told[:, 3] * (often.max() + 1) + often
+    faces, kinds = _told_faces(shape, shape.faces, own)
     moved, still = [images[h] for h, _ in generators(operations)], np.arange(len(own.points))
     for facets in (Facets.single(faces, kinds), Facets.flat(own.points, faces, kinds, ROUNDED)):
         here = facets.prints(still)
         if all(np.array_equal(facets.prints(image), here) for image in moved):
             return facets.bend
     return None
+
+
+def _told_faces(shape: Shape, faces: Index, own: Distinct) -> tuple[Index, Index]:
+    """Triangles [F, 3] of distinct points, and kinds [F] of them: by their labels, and by how often they are there."""
+    labels = np.zeros(len(faces), dtype=np.int64) if shape.labels is None else shape.labels
+    every = np.column_stack([np.sort(own.back[faces], axis=1), labels])
+    told, often = np.unique(every, axis=0, return_counts=True)
+    return told[:, :3], told[:, 3] * (often.max() + 1) + often

@@ -44,8 +44,8 @@ class Evidence:
     """What is known before any point is matched: moments, the class of the n-tuples, and points to take azimuths of.
 
     `atoms` says that the points stand for themselves, so that they can be counted. `vertices` is the group that maps
-    those of a mesh, or the points of a cloud, onto one another, where they put it; `proven` says that it maps the
-    faces, too. `spectra` are those that `azimuths` told, by the bytes of their axes.
+    those of a mesh, or the points of a cloud, onto one another, where they put it; `proven` that of
+    it which maps the faces, too. `spectra` are those that `azimuths` told, by the bytes of their axes.
     """
 
     moments: Moments
@@ -54,7 +54,7 @@ class Evidence:
     weights: Array
     atoms: bool = False
     vertices: Placed | None = None
-    proven: bool = False
+    proven: Placed | None = None
     spectra: dict[bytes, tuple[Array, Array]] = field(default_factory=dict)
 
     @cached_property
