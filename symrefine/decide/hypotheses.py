@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from symrefine.decide.looks import COARSE, Look, exact_need, mended, seems, slid
+from symrefine.decide.looks import COARSE, Look, exact_need, least_around, mended, seems, slid
 from symrefine.decide.place import is_told, least_elsewhere
 from symrefine.decide.posterior import EVEN, EVEN_MIRROR, certain
 from symrefine.fit.placed import FITTED, Operations, Placed, elements
@@ -147,7 +147,11 @@ def fitted(
             return Hypothesis(placed=start, elements=(), need=min(asked, needs), before=before)
     history, end = tuple(steps), start.moved(steps[-1].state)
     if not surface.is_open and history[-1].converged:
-        return _placed(surface, end, history, before)
+        found = _placed(surface, end, history, before)
+        if found.need <= max(exact_need(surface.floor), doubtless(surface)):
+            return found
+        other = _placed(surface, least_around(surface, start, history), history, before)
+        return min(found, other, key=lambda h: h.need)
     asked = asked if surface.is_open else seems(surface, start)
     every = [(seems(surface, end), end, history), (asked, start, history[:1])]
     needs, first, history = min(every, key=lambda k: k[0])

@@ -100,6 +100,10 @@ def looked_at(
         if not iterate.converged and (stayed := seems(surface, start)) < needs:
             aside, needs = slid(surface, start, stayed, useful)
             return Look(placed=aside, history=tuple(history[:1]), needs=needs, error_rad=error)
+        if needs > useful and not surface.is_open:
+            there = least_around(surface, start, history)
+            needs, aside = min((needs, start.moved(iterate.state)), (seems(surface, there), there), key=lambda k: k[0])
+            return Look(placed=aside, history=tuple(history), needs=needs, error_rad=error)
     off = max(iterate.step, math.sqrt(max(float(np.diag(iterate.covariance).max()), 0.0)))
     aside = start.moved(iterate.state)
     # Where it asks to believe in too much it is not worth a search, and where little is missing most of it tells.
@@ -107,6 +111,21 @@ def looked_at(
         aside, needs = slid(surface, aside, needs, useful)
     needs = math.hypot(needs, asked)
     return Look(placed=aside, history=tuple(history), needs=needs, error_rad=min(error, RIM * off))
+
+
+def least_around(surface: Surface, start: Placed, history: Sequence[Iterate]) -> Placed:
+    """Where a fit passed, or may as well have come to, a group seems to need least, by a few points.
+
+    What is round but for a handle is turned about its axis by noise of all of it: the fit passes where the handle is
+    met, and goes on to where the rest agrees a little better. So places are asked along the direction that it tells
+    least, as far as it may be off there.
+    """
+    end = history[-1]
+    variance, ways = np.linalg.eigh(end.covariance)
+    aside = math.sqrt(max(float(variance[-1]), 0.0)) * ways[:, -1]
+    states = [*(i.state for i in history), *(end.state.moved(k * aside) for k in np.arange(-RIM, RIM + 1.0) if k)]
+    places = [start.moved(state) for state in states]
+    return places[int(np.argmin(glances(surface, places)))]
 
 
 def slid(surface: Surface, placed: Placed, needs: float, useful: float = math.inf) -> tuple[Placed, float]:
