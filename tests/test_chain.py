@@ -18,7 +18,7 @@ from experiments.studies.boundary import Case, look
 from symrefine.decide.chain import _best, _excluded, chain
 from symrefine.decide.explore import _holding, _with, explore
 from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted
-from symrefine.decide.joins import _told_apart
+from symrefine.decide.joins import _told_apart, better_parts
 from symrefine.decide.looks import by_chance
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import Link, decide
@@ -562,3 +562,12 @@ def test_the_mirror_that_azimuths_tell_is_proposed(monkeypatch):
         monkeypatch.setattr("symrefine.propose.candidates.mirror_through", lambda *_, n=normal: n)
         mirrors = [p.group.frame[2] for p in proposals(evidence) if p.group.name == "Cs"]
         assert any(line_angle_rad(m, told) < 1e-9 for m in mirrors) == (normal is not None)
+
+
+def test_an_element_is_no_part_of_itself():
+    """One that all its points together tell to need more than it does alone was tried again and again."""
+    found = of("C2")
+    assert len(found.elements) == 1
+    assert better_parts(replace(found, need=10.0 * found.need + 1.0)) == []
+    whole = of("C2v")
+    assert len(better_parts(replace(whole, need=10.0 * whole.need + 1.0))) == 3
