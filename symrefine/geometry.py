@@ -100,6 +100,11 @@ def batches(count: int, each: int) -> Iterator[slice]:
     yield from (slice(start, start + step) for start in range(0, count, step))
 
 
+def dots(a: Array, b: Array) -> Array:
+    """Products [...] of vectors [..., n] with one another along the last axis."""
+    return np.asarray(np.einsum("...i,...i->...", a, b))
+
+
 def unit(vector: ArrayLike) -> Array:
     """`vector / |vector|` along the last axis."""
     v = np.asarray(vector, dtype=np.float64)

@@ -146,9 +146,11 @@ def fitted(
         if short and (needs := seems(surface, start.moved(iterate.state))) > hopeless:
             return Hypothesis(placed=start, elements=(), need=min(asked, needs), before=before)
     history, end = tuple(steps), start.moved(steps[-1].state)
+    # What leaves no doubt by what was seen leaves no less elsewhere; of a view it tells where it stands.
+    clear = exact_need(surface.floor) if surface.viewed else max(exact_need(surface.floor), doubtless(surface))
     if not surface.is_open and history[-1].converged:
         found = _placed(surface, end, history, before)
-        if found.need <= max(exact_need(surface.floor), doubtless(surface)):
+        if found.need <= clear:
             return found
         other = _placed(surface, least_around(surface, start, history), history, before)
         return min(found, other, key=lambda h: h.need)
@@ -162,10 +164,6 @@ def fitted(
         found = _placed(surface, best, history, before, GLANCE)
     else:
         found = _placed(surface, best, history, before)
-        # What leaves no doubt by what was seen leaves no less elsewhere; of a view it tells where it stands.
-        clear = exact_need(surface.floor)
-        if not surface.viewed:
-            clear = max(clear, doubtless(surface))
         if clear < found.seen and found.need <= COARSE * most:
             found = _moved(surface, found, every, was_slid=best is not first)
     if not surface.viewed or not found.elements:

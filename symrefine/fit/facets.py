@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from symrefine.geometry import Array
+from symrefine.geometry import Array, dots
 from symrefine.shape import Index
 
 
@@ -48,7 +48,7 @@ class Facets:
         bent[of[off > within]] = True
         alone = bent[of]
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        against = ~alone & (_dot(across, normals[of]) < 0.0)
+        against = ~alone & (dots(across, normals[of]) < 0.0)
         return cls(
             faces=np.where(against[:, None], faces[:, ::-1], faces),
             labels=labels,
@@ -91,11 +91,11 @@ def _pairs(corners: Array, faces: Index, labels: Index, within: float) -> tuple[
     own, other = corners[near, (side + 2) % 3] - start, corners[far, (beyond + 2) % 3] - start
     sides = ((along, own), (along, other), (own, other), (own - along, other - along))
     areas = sum(np.linalg.norm(np.cross(a, b), axis=1) for a, b in sides)
-    flat = np.abs(_dot(np.cross(along, own), other)) <= within * areas
+    flat = np.abs(dots(np.cross(along, own), other)) <= within * areas
     # Folded over, two triangles of a plane lie on each other: by as much as the smaller one reaches.
     unit = np.divide(along, length := np.linalg.norm(along, axis=1, keepdims=True), where=length > 0.0, out=0.0 * along)
-    own, other = own - _dot(own, unit)[:, None] * unit, other - _dot(other, unit)[:, None] * unit
-    flat &= _dot(own, other) <= within * np.sqrt(np.maximum(_dot(own, own), _dot(other, other)))
+    own, other = own - dots(own, unit)[:, None] * unit, other - dots(other, unit)[:, None] * unit
+    flat &= dots(own, other) <= within * np.sqrt(np.maximum(dots(own, own), dots(other, other)))
     flat &= labels[near] == labels[far]
     return near[flat], far[flat]
 
@@ -120,7 +120,3 @@ def _planes(corners: Array, of: Index) -> tuple[Array, Array]:
     np.add.at(spread, of, np.einsum("fki,fkj->fij", local, local))
     normals = np.linalg.eigh(spread)[1][:, :, 0]
     return normals, np.abs(np.einsum("fki,fi->fk", local, normals[of])).max(axis=1)
-
-
-def _dot(a: Array, b: Array) -> Array:
-    return np.asarray(np.einsum("ki,ki->k", a, b))

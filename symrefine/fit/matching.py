@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.geometry import Array, Isometry, Mask, rows
+from symrefine.geometry import Array, Isometry, Mask, dots, rows
 from symrefine.shape import Index
 from symrefine.surface.skin import LocalPlanes
 
@@ -54,14 +54,14 @@ def match(
         error, flat = distance, np.ones_like(distance)
     else:
         travel = moved - points
-        keep &= _dot(travel, travel) > cloud.spacing**2
+        keep &= dots(travel, travel) > cloud.spacing**2
         target = np.where(keep, target, 0)
         normals = rows(cloud.normals, target)
         turned = cloud.normals[source] @ turns
         keep &= facing(turned, normals)
         if cloud.eyes is not None:
             keep &= cloud.faced(moved, turned)
-        error = _dot(moved - rows(cloud.points, target), normals)
+        error = dots(moved - rows(cloud.points, target), normals)
         flat = worth(cloud.flatness[source], cloud.flatness[target])
 
     def weighted(off: Array, kept: Mask) -> Array:
@@ -80,12 +80,7 @@ def reach_of(spacing: float, uncertainty: float) -> float:
 
 def facing(moved: Array, normals: Array) -> Mask:
     """Which moved normals [..., n] agree with others, whatever their signs."""
-    return np.asarray(np.abs(_dot(moved, normals)) > AGREE)
-
-
-def _dot(a: Array, b: Array) -> Array:
-    """Inner products [...] of vectors [..., n]."""
-    return np.einsum("...i,...i->...", a, b)
+    return np.asarray(np.abs(dots(moved, normals)) > AGREE)
 
 
 def worth(source: Array, target: Array) -> Array:

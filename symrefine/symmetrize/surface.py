@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.geometry import Array
+from symrefine.geometry import Array, dots
 from symrefine.moments.quadrature import sample_surface
 from symrefine.shape import Index, Shape
 from symrefine.surface.skin import local_planes
@@ -38,7 +38,7 @@ def _closest_on_cloud(shape: Shape, rng: np.random.Generator) -> Closest:
 
     def closest(queries: Array) -> Array:
         near = tree.nearest(queries)[1]
-        across = _dot(queries - points[near], normals[near])
+        across = dots(queries - points[near], normals[near])
         return np.asarray(queries - (trust[near] * across)[:, None] * normals[near])
 
     return closest
@@ -80,7 +80,7 @@ class _Triangles:
     @classmethod
     def of(cls, corners: Array) -> "_Triangles":
         edges = np.roll(corners, -1, axis=1) - corners
-        square, normals = _dot(edges, edges), np.cross(edges[:, 0], edges[:, 1])
+        square, normals = dots(edges, edges), np.cross(edges[:, 0], edges[:, 1])
         size = np.linalg.norm(normals, axis=1, keepdims=True)
         normals = np.divide(normals, size, out=np.full_like(normals, np.nan), where=size > 0.0)
         return cls(
@@ -96,16 +96,12 @@ class _Triangles:
         rows = np.arange(len(queries))
         there = queries[:, None, None] - self.corners[near]
         edges = self.edges[near]
-        share = np.clip(_dot(there, edges) * self.inverse[near], 0.0, 1.0)
+        share = np.clip(dots(there, edges) * self.inverse[near], 0.0, 1.0)
         beside = there - share[..., None] * edges
-        far = _dot(beside, beside)
+        far = dots(beside, beside)
         nearest = far.argmin(axis=2)
-        height = _dot(there[:, :, 0], self.normals[near])
-        above = np.asarray((_dot(there, self.inward[near]) >= 0.0).all(axis=2))
+        height = dots(there[:, :, 0], self.normals[near])
+        above = np.asarray((dots(there, self.inward[near]) >= 0.0).all(axis=2))
         best = np.where(above, height**2, far.min(axis=2)).argmin(axis=1)
         straight = height[rows, best, None] * self.normals[near[rows, best]]
         return np.where(above[rows, best, None], straight, beside[rows, best, nearest[rows, best]])
-
-
-def _dot(a: Array, b: Array) -> Array:
-    return np.asarray(np.einsum("...i,...i->...", a, b))
