@@ -9,6 +9,7 @@ from typing import cast
 
 import numpy as np
 
+from symrefine.fit.distinct import connected
 from symrefine.geometry import Array, dots
 from symrefine.shape import Index
 
@@ -41,7 +42,7 @@ class Facets:
         Only those of the same label [F].
         """
         corners = points[faces]
-        of = _connected(len(faces), *_pairs(corners, faces, labels, within))
+        of = connected(len(faces), *_pairs(corners, faces, labels, within))
         normals, off = _planes(corners, of)
         # What bends little by little is no facet: each of its triangles is one.
         bent = np.zeros(len(normals), dtype=bool)
@@ -98,15 +99,6 @@ def _pairs(corners: Array, faces: Index, labels: Index, within: float) -> tuple[
     flat &= dots(own, other) <= within * np.sqrt(np.maximum(dots(own, own), dots(other, other)))
     flat &= labels[near] == labels[far]
     return near[flat], far[flat]
-
-
-def _connected(count: int, one: Index, other: Index) -> Index:
-    """Which connected part each of so many things is of, where pairs are connected."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
-    return cast(Index, connected_components(graph, directed=False)[1].astype(np.intp))
 
 
 def _planes(corners: Array, of: Index) -> tuple[Array, Array]:

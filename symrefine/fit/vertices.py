@@ -11,6 +11,7 @@ import numpy as np
 from symrefine.errors import InputError
 from symrefine.fit.action import generators, mean_back, permutations
 from symrefine.fit.anchors import LARGEST, permuting_group
+from symrefine.fit.distinct import Distinct
 from symrefine.fit.facets import Facets
 from symrefine.fit.finite import finite_group
 from symrefine.fit.placed import Placed, common_center
@@ -18,7 +19,6 @@ from symrefine.fit.refine import MAX_OUTER
 from symrefine.geometry import Array, orthogonal_factor, tight_diagonal
 from symrefine.groups import PointGroup
 from symrefine.groups.identify import identify
-from symrefine.groups.standard import GOLDEN
 from symrefine.rounding import DOUBLE, SINGLE
 from symrefine.samples import GLANCE
 from symrefine.shape import Index, Shape
@@ -28,37 +28,6 @@ from symrefine.surface.tree import Tree
 NEAR = 2e-3
 # A shape is exact where no vertex misses its counterpart by more than what rounding to five digits leaves.
 ROUNDED = 1e-5
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Distinct:
-    """The distinct points (and labels) of a shape, in units of a diagonal about a centre.
-
-    `rows` [M] are those of the distinct points in the shape, `back` [N] tells which of them each point is.
-    """
-
-    points: Array
-    rows: Index
-    back: Index
-    labels: Index | None
-
-    @classmethod
-    def of(cls, shape: Shape, center: Array, diagonal: float, *, weld: float = 0.0) -> "Distinct":
-        """The labels of a cloud tell points apart, those of a mesh are of its faces.
-
-        Points in one cell of a grid of `weld` are one, if that is not 0: whatever the grid, few of those that touch lie
-        on two sides of its walls.
-        """
-        local = (shape.points - center) / diagonal
-        labels = shape.labels if shape.faces is None else None
-        # Round numbers, of which designs are full, lie nowhere near the walls of this grid.
-        place = np.floor(local / weld + GOLDEN) if weld else local
-        key = place if labels is None else np.column_stack([place, labels])
-        order = np.lexsort(key.T[::-1])
-        first = np.append(True, (np.diff(key[order], axis=0) != 0.0).any(axis=1))
-        rows, back = order[first], np.empty(len(key), dtype=np.intp)
-        back[order] = np.cumsum(first) - 1
-        return cls(points=local[rows], rows=rows, back=back, labels=None if labels is None else labels[rows])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

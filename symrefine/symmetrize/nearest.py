@@ -14,9 +14,10 @@ from scipy.spatial import cKDTree
 
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.fit.action import generators, mean_back
+from symrefine.fit.distinct import Distinct
 from symrefine.fit.finite import finite_group
 from symrefine.fit.placed import Placed, fitted_matrices
-from symrefine.fit.vertices import NEAR, Distinct, on_vertices, settled, towards
+from symrefine.fit.vertices import NEAR, on_vertices, settled, towards
 from symrefine.geometry import Array, ReadOnly, tight_diagonal, unit
 from symrefine.groups import PointGroup
 from symrefine.groups.names import TURNS
