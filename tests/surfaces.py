@@ -28,3 +28,17 @@ def half_of(points: Array, count: int, rng: np.random.Generator, **given: Any) -
     """What half of the points [N, 3] show of the surface of all, at `count` of them; `given` the skin."""
     whole = make_skin(points, rng, **given)
     return lambda some: whole.half(some).local_planes(drawn(len(some), count, rng))
+
+
+def distance_to_mesh(points: Array, corners: Array) -> Array:
+    """How far points [N, 3] are from the nearest of triangles [F, 3, 3], which may have no area; one by one."""
+    nearest = np.full(len(points), np.inf)
+    for triangle in corners:
+        sides, local = np.roll(triangle, -1, axis=0) - triangle, points[:, None] - triangle
+        along = np.einsum("nki,ki->nk", local, sides) / np.maximum((sides**2).sum(axis=1), 1e-300)
+        off = np.linalg.norm(local - np.clip(along, 0.0, 1.0)[..., None] * sides, axis=2).min(axis=1)
+        normal = np.cross(sides[0], sides[1])
+        within = (np.einsum("nki,ki->nk", local, np.cross(normal, sides)) >= 0.0).all(axis=1) & normal.any()
+        above = np.abs(local[:, 0] @ normal) / max(float(np.linalg.norm(normal)), 1e-300)
+        nearest = np.minimum(nearest, np.where(within, above, off))
+    return nearest

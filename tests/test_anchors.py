@@ -70,8 +70,8 @@ def test_points_that_are_gone_are_missed_though_some_hundreds_do_not_know():
     left = on_mirror[np.linalg.norm(np.cross(on_mirror, on_mirror[0]), axis=1) > 0.1]
     assert (len(on_mirror), len(left), len(tips)) == (24, 22, 6)
     whole, broken = (np.concatenate([tips, points, some]) for some in (on_mirror, left))
-    assert exact_symmetry(Shape(whole), 2.0).group.name == "Oh"
-    assert exact_symmetry(Shape(broken), 2.0).group.name == "C2h"
+    assert exact_symmetry(Shape(whole), 2.0)[0].group.name == "Oh"
+    assert exact_symmetry(Shape(broken), 2.0)[0].group.name == "C2h"
 
 
 def test_labels_tell_points_apart():

@@ -45,5 +45,5 @@ def test_a_box_whose_corners_are_written_for_every_face_has_its_group_in_any_pos
         rng = np.random.default_rng(seed)
         posed = box @ random_orthogonal(rng).T + rng.standard_normal(3)
         apart = posed[faces].reshape(-1, 3) + 2e-7 * rng.uniform(-1.0, 1.0, (36, 3))
-        found = exact_symmetry(Shape(apart, np.arange(36).reshape(-1, 3)), 2.6)
+        found = exact_symmetry(Shape(apart, np.arange(36).reshape(-1, 3)), 2.6)[0]
         assert (found.group.name, found.faces) == ("D2h", True)

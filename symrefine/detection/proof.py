@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from symrefine.detection.measure import Measured
 from symrefine.fit.placed import Placed
-from symrefine.fit.vertices import OnVertices, exact_symmetry, proven_symmetry
+from symrefine.fit.vertices import OnVertices, exact_symmetry
 from symrefine.propose.candidates import Evidence
 
 
@@ -13,10 +13,9 @@ def by_vertices(
 ) -> tuple[OnVertices | None, OnVertices | None, Evidence]:
     """The group that vertices of a mesh, or points of a cloud, have, what of it faces prove, and the evidence."""
     origin, scale = measured.moments.center, measured.moments.scale
-    exact = exact_symmetry(measured.shape, scale * diagonal)
+    exact, proof = exact_symmetry(measured.shape, scale * diagonal)
     if exact is None or exact.group.name == "C1":
         return exact, None, evidence
-    proof = proven_symmetry(measured.shape, exact, scale * diagonal)
     found = [None if known is None else known.beside(origin) for known in (exact, proof)]
     placed = [None if k is None else Placed(group=k.group, center=(k.center - origin) / scale) for k in found]
     return found[0], found[1], replace(evidence, vertices=placed[0], proven=placed[1])

@@ -1,39 +1,43 @@
 """Facets of a mesh: triangles that lie in one plane and share edges count as one, however they were cut.
 
 Two triangulations of a box are the same box. What a facet covers, and how often, is told by the edges around it, all in
-one sense: no two sums of triangles of a plane have the same boundary.
+one sense: no two sums of triangles of a plane have the same boundary. Nor does a boundary change where an edge is cut
+in two: vertices that it passes straight through are none of its corners.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
 
 from symrefine.fit.distinct import connected
-from symrefine.geometry import Array, dots
+from symrefine.geometry import Array, Mask, dots
 from symrefine.shape import Index
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Facets:
-    """Triangles put together where they lie in one plane.
+    """Triangles put together where they lie in one plane, each facet by the edges around it.
 
     Attributes:
-        faces: [F, 3] corners of each triangle, in one sense all over a facet.
-        labels: [F] integers, alike all over a facet.
-        of: [F] which facet each is of.
-        bend: the farthest that a corner of a facet of several triangles is out of its plane.
+        edges: [E, 2] of points, from one to the other: in one sense all around a facet.
+        often: [E] how often the edge is there.
+        of: [E] which facet it is of.
+        labels: [K] integers, of each facet.
+        bend: the farthest that a corner of a facet of several triangles is out of its plane, and what was left out of
+            an edge off that.
     """
 
-    faces: Index
-    labels: Index
+    edges: Index
+    often: Index
     of: Index
+    labels: Index
     bend: float
 
     @classmethod
     def single(cls, faces: Index, labels: Index) -> "Facets":
         """Every triangle [F, 3] by itself."""
-        return cls(faces=faces, labels=labels, of=cast(Index, np.arange(len(faces))), bend=0.0)
+        return cls._around(faces, labels, cast(Index, np.arange(len(faces))), 0.0)
 
     @classmethod
     def flat(cls, points: Array, faces: Index, labels: Index, within: float) -> "Facets":
@@ -42,7 +46,10 @@ class Facets:
         Only those of the same label [F].
         """
         corners = points[faces]
-        of = connected(len(faces), *_pairs(corners, faces, labels, within))
+        near, far = _pairs(corners, faces, labels, within)
+        if not len(near):
+            return cls.single(faces, labels)
+        of = connected(len(faces), near, far)
         normals, off = _planes(corners, of)
         # What bends little by little is no facet: each of its triangles is one.
         bent = np.zeros(len(normals), dtype=bool)
@@ -50,30 +57,131 @@ class Facets:
         alone = bent[of]
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         against = ~alone & (dots(across, normals[of]) < 0.0)
-        return cls(
-            faces=np.where(against[:, None], faces[:, ::-1], faces),
-            labels=labels,
-            of=cast(Index, np.where(alone, len(bent) + np.arange(len(faces)), of)),
-            bend=float(off[~alone].max(initial=0.0)),
+        of = np.unique(np.where(alone, len(bent) + np.arange(len(faces)), of), return_inverse=True)[1].ravel()
+        faces = np.where(against[:, None], faces[:, ::-1], faces)
+        return cls._around(faces, labels, cast(Index, of), float(off[~alone].max(initial=0.0)))
+
+    @classmethod
+    def _around(cls, faces: Index, labels: Index, of: Index, bend: float) -> "Facets":
+        """What is left of the edges of triangles [F, 3] where those that a facet [F] has both ways are gone."""
+        ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
+        kinds = np.empty(int(of.max()) + 1, dtype=np.int64)
+        kinds[of] = labels
+        every = cls(edges=ends, often=np.ones(len(ends), dtype=np.int64), of=np.repeat(of, 3), labels=kinds, bend=bend)
+        return _summed(every) if len(kinds) < len(faces) else every
+
+    @property
+    def corners(self) -> Index:
+        """The points that edges end in, ascending."""
+        return np.unique(self.edges)
+
+    def straight(self, points: Array, within: float) -> "Facets":
+        """The same with edges that go straight on put together, where no point is off the line by more than `within`.
+
+        What is no wider than that, so that nothing is left around it, stays as it is.
+        """
+        found, left = self, within - self.bend
+        while left > 0.0:
+            longer = found._longer(points, left)
+            if len(longer.edges) == len(found.edges):
+                break
+            found, left = longer, within - longer.bend
+        return found
+
+    def _longer(self, points: Array, within: float) -> "Facets":
+        """The same with each run of edges that go straight on as one edge, if no point of it is off that."""
+        into, out = self._passing(points, within)
+        run = connected(len(self.edges), into, out)
+        # A run starts where none goes on into it; what goes round and round has no such end.
+        starts, ends = np.setdiff1d(np.arange(len(run)), out), np.setdiff1d(np.arange(len(run)), into)
+        head, last = np.full((2, int(run.max()) + 1), -1)
+        head[run[starts]], last[run[ends]] = starts, self.edges[ends, 1]
+        first = self.edges[head, 0]
+        off, worst = _off_line(points, self.edges[into, 1], first[run[into]], last[run[into]]), np.zeros(len(head))
+        np.maximum.at(worst, run[into], off)
+        whole = (worst <= within) & (head >= 0) & (first != last)
+        left, head = ~whole[run], head[whole]
+        new = replace(self, edges=np.column_stack([first, last])[whole], often=self.often[head], of=self.of[head])
+        old = replace(self, edges=self.edges[left], often=self.often[left], of=self.of[left])
+        made = _summed(_joined(old, new))
+        # What is no wider than that has both its sides on one line.
+        gone = ~np.isin(self.of, made.of)
+        made = _joined(made, replace(self, edges=self.edges[gone], often=self.often[gone], of=self.of[gone]))
+        return replace(made, bend=self.bend + float(worst[whole].max(initial=0.0)))
+
+    def _passing(self, points: Array, within: float) -> tuple[Index, Index]:
+        """Edges that go straight on into others, and those: where a facet has one into a point and one out of it."""
+        from_, to = (self.of * len(points) + self.edges[:, side] for side in (0, 1))
+        (ends, into, arrive), (begins, out, leave) = (
+            np.unique(nodes, return_index=True, return_counts=True) for nodes in (to, from_)
         )
+        one, other = np.intersect1d(ends[arrive == 1], begins[leave == 1], assume_unique=True, return_indices=True)[1:]
+        into, out = into[arrive == 1][one], out[leave == 1][other]
+        before, at, after = self.edges[into, 0], self.edges[into, 1], self.edges[out, 1]
+        on = dots(points[at] - points[before], points[after] - points[at]) > 0.0
+        on &= _off_line(points, at, before, after) <= within
+        return into[on], out[on]
+
+    def of_these(self, points: Index) -> "Facets":
+        """The same with points numbered as they come among these, ascending."""
+        return replace(self, edges=np.searchsorted(points, self.edges))
 
     def prints(self, images: Index) -> Index:
         """A number for each facet, ascending, where every corner went to its image [N]: that of one facet is its own.
 
-        Every corner draws two numbers and every label one, of 64 bits, so that others are the same once in 1e19 times.
-        An edge has one sign in one sense, and the other in the other, so that what two triangles share is gone.
+        What is there twice is there. Every corner draws two numbers and every label one, of 64 bits, so that others are
+        the same once in 1e19 times. An edge has one sign in one sense, and the other in the other.
         """
         rng, kinds = np.random.default_rng(0), np.unique(self.labels, return_inverse=True)[1].ravel()
         one, two = rng.integers(2**64, size=(2, len(images)), dtype=np.uint64)
         of_kind = rng.integers(2**64, size=int(kinds.max()) + 1, dtype=np.uint64)
-        here = images[self.faces]
-        there = np.roll(here, -1, axis=1)
-        around = (one[here] * two[there] - one[there] * two[here]).sum(axis=1, dtype=np.uint64)
-        told = np.zeros(int(self.of.max()) + 1, dtype=np.uint64)
-        np.add.at(told, self.of, around)
+        here, there = images[self.edges].T
+        told = np.zeros(len(self.labels), dtype=np.uint64)
+        np.add.at(told, self.of, self.often.astype(np.uint64) * (one[here] * two[there] - one[there] * two[here]))
         told = np.minimum(told, np.negative(told))  # seen from either side
-        told[self.of] ^= of_kind[kinds]
-        return cast(Index, np.sort(told))
+        return cast(Index, np.unique(told ^ of_kind[kinds]))
+
+
+def _joined(one: Facets, other: Facets) -> Facets:
+    """The edges of two, of facets that are numbered alike."""
+    edges = np.concatenate([one.edges, other.edges])
+    often, of = np.concatenate([one.often, other.often]), np.concatenate([one.of, other.of])
+    return replace(one, edges=edges, often=often, of=of)
+
+
+def _summed(facets: Facets) -> Facets:
+    """The same with every edge of a facet once, and none that it has as often one way as the other."""
+    low, high = facets.edges.min(axis=1), facets.edges.max(axis=1)
+    order = np.lexsort([high, low, facets.of])
+    key = np.column_stack([facets.of, low, high])[order]
+    first = np.flatnonzero(np.append(True, (np.diff(key, axis=0) != 0).any(axis=1)))
+    signed = np.where(facets.edges[:, 0] == low, facets.often, -facets.often)[order]
+    often = np.add.reduceat(signed, first)
+    first, often = first[often != 0], often[often != 0]
+    edges = np.where(often[:, None] > 0, key[first, 1:], key[first, :0:-1])
+    return replace(facets, edges=edges, often=np.abs(often), of=key[first, 0])
+
+
+def slivers(points: Array, faces: Index, within: float) -> Mask:
+    """Which triangles [F, 3] are but a part of an edge of others: no wider than that, and along one.
+
+    Those that close the gap where a corner of one triangle lies on the edge of another.
+    """
+    corners = points[faces]
+    sides = np.roll(corners, -1, axis=1) - corners
+    lengths = np.linalg.norm(sides, axis=2)
+    longest = lengths.argmax(axis=1)
+    thin = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) <= within * lengths.max(axis=1)
+    if not thin.any():
+        return thin
+    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2)
+    edge = ends[..., 0] * len(points) + ends[..., 1]
+    along, covered = edge[np.arange(len(faces)), longest], ~lengths.any(axis=1)
+    while True:  # what lies along an edge of such a one does, too
+        more = thin & ~covered & np.isin(along, edge[~thin | covered])
+        if not more.any():
+            return covered
+        covered |= more
 
 
 def _pairs(corners: Array, faces: Index, labels: Index, within: float) -> tuple[Index, Index]:
@@ -112,3 +220,11 @@ def _planes(corners: Array, of: Index) -> tuple[Array, Array]:
     np.add.at(spread, of, np.einsum("fki,fkj->fij", local, local))
     normals = np.linalg.eigh(spread)[1][:, :, 0]
     return normals, np.abs(np.einsum("fki,fi->fk", local, normals[of])).max(axis=1)
+
+
+def _off_line(points: Array, at: Index, first: Index, last: Index) -> Array:
+    """How far points [N, 3], those with indices [K], are off the lines through others."""
+    along = points[last] - points[first]
+    length = np.linalg.norm(along, axis=1)
+    across = np.linalg.norm(np.cross(points[at] - points[first], along), axis=1)
+    return np.asarray(np.divide(across, length, where=length > 0.0, out=np.full(len(at), np.inf)))

@@ -11,15 +11,14 @@ import numpy as np
 from symrefine.errors import InputError
 from symrefine.fit.action import generators, mean_back, permutations
 from symrefine.fit.anchors import LARGEST, permuting_group
-from symrefine.fit.distinct import Distinct
-from symrefine.fit.facets import Facets
+from symrefine.fit.corners import Corners, corners
 from symrefine.fit.finite import finite_group
 from symrefine.fit.placed import Placed, common_center
 from symrefine.fit.refine import MAX_OUTER
 from symrefine.geometry import Array, orthogonal_factor, tight_diagonal
 from symrefine.groups import PointGroup
 from symrefine.groups.identify import identify
-from symrefine.rounding import DOUBLE, SINGLE
+from symrefine.rounding import DOUBLE
 from symrefine.samples import GLANCE
 from symrefine.shape import Index, Shape
 from symrefine.surface.tree import Tree
@@ -67,14 +66,24 @@ class OnVertices:
         return replace(self, group=PointGroup(name=group.name, frame=self.group.frame))
 
 
-def exact_symmetry(shape: Shape, diagonal: float) -> OnVertices | None:
-    """The group that maps the points of a shape, the vertices of a mesh, onto one another to rounding.
+def exact_symmetry(shape: Shape, diagonal: float) -> tuple[OnVertices | None, OnVertices | None]:
+    """The group that maps points of a shape, corners of a mesh, onto one another to rounding, and what of it is proven.
 
-    Nothing else has to be known of the shape but its diagonal, input units. None if it cannot be told so (see
-    `permuting_group`).
+    Nothing else has to be known of the shape but its diagonal, input units. The first is None if it cannot be told so
+    (see `permuting_group`). The second is that part of it which maps the faces, too: of an open box, that has all the
+    mirrors of a box in its corners, the two that keep the opening. None if nothing of it does.
     """
-    origin = shape.points.mean(axis=0)
-    own = Distinct.of(shape, origin, diagonal, weld=SINGLE)
+    origin, best = shape.points.mean(axis=0), list[OnVertices | None]()
+    for own in corners(shape, origin, diagonal, ROUNDED):
+        exact = _exact(own, origin, diagonal)
+        if (proof := _proven(own, exact, origin, diagonal)) is not None:
+            return exact, proof
+        best.append(exact)
+    return max(best, key=lambda known: 1.0 if known is None else known.finite.order), None
+
+
+def _exact(own: Corners, origin: Array, diagonal: float) -> OnVertices | None:
+    """The group that maps corners onto one another, in units of the diagonal about the origin."""
     middle = own.points.mean(axis=0)
     # What some of the points seem to have a few others may break: then all are asked.
     for every in (False, True):
@@ -83,39 +92,36 @@ def exact_symmetry(shape: Shape, diagonal: float) -> OnVertices | None:
             continue
         if group.name == "C1":
             return OnVertices(group=group, center=origin, finite=group, miss=0.0, faces=True)
-        if found := _on(shape, own, group, Placed(group=group, center=middle), origin, ROUNDED, diagonal):
+        if found := _on(own, group, Placed(group=group, center=middle), origin, ROUNDED, diagonal):
             return found
     return None
 
 
-def proven_symmetry(shape: Shape, exact: OnVertices, diagonal: float) -> OnVertices | None:
-    """That part of what maps the vertices of a mesh which maps its faces, too; None if nothing of it does.
-
-    Of an open box that has all the mirrors of a box in its vertices the two that keep the opening.
-    """
-    if exact.faces or exact.group.name == "C1":
-        return exact if exact.proves else None
-    own, place = Distinct.of(shape, exact.center, diagonal, weld=SINGLE), Placed(group=exact.group, center=np.zeros(3))
+def _proven(own: Corners, exact: OnVertices | None, origin: Array, diagonal: float) -> OnVertices | None:
+    """What of it maps the facets between the corners, too."""
+    if exact is None or exact.faces or exact.group.name == "C1":
+        return exact if exact is not None and exact.proves else None
+    place = Placed(group=exact.group, center=(exact.center - origin) / diagonal)
     operations = place.group.operations()
-    images = permutations(own.points, operations, own.labels, NEAR)
-    if images is None or shape.faces is None or len(operations) * len(shape.faces) > LARGEST:
+    images = permutations(own.points - place.center, operations, own.labels, NEAR)
+    if images is None or not own.facets or len(operations) * len(own.facets[-1].edges) > 3 * LARGEST:
         return None
-    facets = Facets.flat(own.points, *_told_faces(shape, shape.faces, own), ROUNDED)
-    here = facets.prints(images[0])
-    kept = [np.array_equal(facets.prints(image), here) for image in images]
+    here = own.facets[-1].prints(images[0])
+    kept = [np.array_equal(own.facets[-1].prints(image), here) for image in images]
     try:
         group = identify(operations[kept])
     except InputError:  # of what lies within rounding of being mapped
         return None
     if group.name == "C1":
         return None
-    return _on(shape, own, group, replace(place, group=group), exact.center, ROUNDED, diagonal)
+    found = _on(own, group, replace(place, group=group), origin, ROUNDED, diagonal)
+    return found if found is not None and found.proves else None
 
 
 def on_vertices(
     shape: Shape, group: PointGroup, center: Array, *, within: float = ROUNDED, diagonal: float = 0.0
 ) -> OnVertices | None:
-    """Where the points of a shape, the vertices of a mesh, put its group, if it maps them onto one another.
+    """Where the points of a shape, the corners of a mesh, put its group, if it maps them onto one another.
 
     Args:
         shape: in 3-space.
@@ -130,19 +136,21 @@ def on_vertices(
     """
     if group.name == "C1" or group.symbol.family in ("K", "Kh"):
         return None
-    diagonal = diagonal or tight_diagonal(shape.points)
-    own = Distinct.of(shape, center, diagonal, weld=SINGLE)
-    place = Placed(group=finite_group(group, own.points), center=np.zeros(3))
-    if place.group.order * len(own.rows) > LARGEST:
-        return None
-    glanced = _glanced(own, place, within)
-    return None if glanced is None else _on(shape, own, group, glanced, center, within, diagonal)
+    diagonal, found = diagonal or tight_diagonal(shape.points), None
+    for own in corners(shape, center, diagonal, ROUNDED):
+        place = Placed(group=finite_group(group, own.points), center=np.zeros(3))
+        glanced = _glanced(own, place, within) if place.group.order * len(own.points) <= LARGEST else None
+        placed = None if glanced is None else _on(own, group, glanced, center, within, diagonal)
+        if placed is not None and placed.faces:
+            return placed
+        found = placed or found
+    return found
 
 
 def _on(
-    shape: Shape, own: Distinct, group: PointGroup, near: Placed, center: Array, within: float, diagonal: float
+    own: Corners, group: PointGroup, near: Placed, center: Array, within: float, diagonal: float
 ) -> OnVertices | None:
-    """Where the distinct points of a shape put a group of which the finite part that maps them stands nearby."""
+    """Where corners about a centre put a group of which the finite part that maps them stands nearby."""
     images = permutations(own.points - near.center, near.group.operations(), own.labels, NEAR)
     if images is None:
         return None
@@ -150,7 +158,7 @@ def _on(
     miss = _largest_miss(own.points - place.center, place.group.operations(), images)
     if miss > within:
         return None
-    bend = _faces_miss(shape, own, place.group.operations(), images)
+    bend = own.bend_under([images[h] for h, _ in generators(place.group.operations())])
     return OnVertices(
         group=PointGroup(name=group.name, frame=place.group.frame),
         center=center + diagonal * place.center,
@@ -182,7 +190,7 @@ def towards(place: Placed, points: Array, wanted: Array) -> tuple[Placed, float]
     return Placed(group=PointGroup(name=place.group.name, frame=place.group.frame @ turn), center=center), step
 
 
-def _glanced(own: Distinct, place: Placed, within: float) -> Placed | None:
+def _glanced(own: Corners, place: Placed, within: float) -> Placed | None:
     """The place that some of the points know already, if they have counterparts; several rounds, as none is matched."""
     some = own.points[:: max(1, len(own.points) // GLANCE)]
     if len(some) == len(own.points):
@@ -206,27 +214,3 @@ def _largest_miss(points: Array, operations: Array, images: Index) -> float:
     """Largest distance of an image of points [N, 3] about the centre to its counterpart."""
     pairs = zip(operations, images, strict=True)
     return max(float(np.linalg.norm(points @ g.T - points[image], axis=1).max()) for g, image in pairs)
-
-
-def _faces_miss(shape: Shape, own: Distinct, operations: Array, images: Index) -> float | None:
-    """By how much faces miss one another besides their corners; None if some are mapped onto none of the same label.
-
-    Each as often as it is there. Triangles that lie in one plane are one face, where they are not mapped one by one.
-    """
-    if shape.faces is None:
-        return 0.0
-    faces, kinds = _told_faces(shape, shape.faces, own)
-    moved, still = [images[h] for h, _ in generators(operations)], np.arange(len(own.points))
-    for facets in (Facets.single(faces, kinds), Facets.flat(own.points, faces, kinds, ROUNDED)):
-        here = facets.prints(still)
-        if all(np.array_equal(facets.prints(image), here) for image in moved):
-            return facets.bend
-    return None
-
-
-def _told_faces(shape: Shape, faces: Index, own: Distinct) -> tuple[Index, Index]:
-    """Triangles [F, 3] of distinct points, and kinds [F] of them: by their labels, and by how often they are there."""
-    labels = np.zeros(len(faces), dtype=np.int64) if shape.labels is None else shape.labels
-    every = np.column_stack([np.sort(own.back[faces], axis=1), labels])
-    told, often = np.unique(every, axis=0, return_counts=True)
-    return told[:, :3], told[:, 3] * (often.max() + 1) + often

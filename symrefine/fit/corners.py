@@ -1,0 +1,71 @@
+"""What a shape is told by: its points, of a mesh the corners of its facets, and the facets between them.
+
+A vertex within a plane part of a mesh, or where every edge goes straight on, says how the mesh was cut, and nothing of
+the shape.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from symrefine.fit.distinct import Distinct
+from symrefine.fit.facets import Facets, slivers
+from symrefine.geometry import Array
+from symrefine.rounding import SINGLE
+from symrefine.shape import Index, Shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Corners:
+    """Points [N, 3] in units of a diagonal about a centre, labels of those of a cloud, and what lies between them.
+
+    `facets` are ways to tell one and the same mesh, the most forgiving last; none of a cloud.
+    """
+
+    points: Array
+    labels: Index | None
+    facets: tuple[Facets, ...]
+
+    def bend_under(self, moved: Sequence[Index]) -> float | None:
+        """By how much facets miss one another besides their corners; None if some are mapped onto none.
+
+        Args:
+            moved: the images [N] of all points under each of some operations.
+        """
+        if not self.facets:
+            return 0.0
+        for facets in self.facets:
+            here = facets.prints(np.arange(len(self.points)))
+            if all(np.array_equal(facets.prints(image), here) for image in moved):
+                return facets.bend
+        return None
+
+
+def corners(shape: Shape, center: Array, diagonal: float, within: float) -> Iterator[Corners]:
+    """The corners of the facets of a mesh, if some of its vertices are none, and then all of its points.
+
+    Args:
+        center: [3] where the points told are counted from.
+        diagonal: input units.
+        within: by what fraction of it points may be off the plane or the line that they are taken to lie in.
+    """
+    own = Distinct.of(shape, center, diagonal, weld=SINGLE)
+    if shape.faces is None:
+        yield Corners(points=own.points, labels=own.labels, facets=())
+        return
+    faces, kinds = _once(own.back[shape.faces], shape.labels)
+    flat = Facets.flat(own.points, faces, kinds, within)
+    thick = ~slivers(own.points, faces, SINGLE)
+    least = flat if thick.all() else Facets.flat(own.points, faces[thick], kinds[thick], within)
+    least = least.straight(own.points, within)
+    if len(ends := least.corners) < len(own.points):
+        yield Corners(points=own.points[ends], labels=None, facets=(least.of_these(ends),))
+    yield Corners(points=own.points, labels=None, facets=(Facets.single(faces, kinds), flat))
+
+
+def _once(faces: Index, labels: Index | None) -> tuple[Index, Index]:
+    """Triangles [F, 3], each once, whichever way round, and their labels [F]: twice the same surface is the surface."""
+    kinds = np.zeros(len(faces), dtype=np.int64) if labels is None else labels
+    told = np.unique(np.column_stack([np.sort(faces, axis=1), kinds]), axis=0)
+    return told[:, :3], told[:, 3]
