@@ -87,8 +87,38 @@ def test_what_has_none_is_c1_and_what_cannot_be_told_is_none():
     assert permuting_group(cloud - cloud.mean(axis=0), None, WITHIN).name == "C1"
     line = np.outer(np.linspace(-1.0, 1.0, 9), [1.0, 2.0, 3.0])
     assert permuting_group(line, None, WITHIN) is None
-    ball = unit(rng.standard_normal((4000, 3)))
-    assert permuting_group(ball, None, WITHIN) is None  # all as far from the centre: too many pairs
+    angles = 2.0 * np.pi * np.arange(6000) / 6000
+    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(6000)], axis=1)
+    assert permuting_group(ring, None, WITHIN) is None  # of so many folds
+
+
+@pytest.mark.parametrize("count", [30, 4000])
+@pytest.mark.parametrize("name", ["C1", "Ci", "C3v", "D5d", "Td", "Ih"])
+def test_points_that_are_all_as_far_from_the_centre_have_their_group(name, count):
+    """As on a sphere, where distances from the centre tell nothing."""
+    rng = np.random.default_rng(count)
+    group = PointGroup(name=name, frame=random_orthogonal(rng))
+    seeds = unit(rng.standard_normal((max(2, count // group.order), 3)))
+    points = rng.permutation(np.concatenate([seeds @ g.T for g in group.operations()]))
+    found = permuting_group(points - points.mean(axis=0), None, WITHIN)
+    assert found.name == name
+    turned = unit(points @ random_orthogonal(rng).T)
+    assert permuting_group(turned - turned.mean(axis=0), None, WITHIN, every=True).name == name
+    one_off = turned.copy()
+    one_off[7] = unit(one_off[7] + 0.01 * rng.standard_normal(3))
+    broken = permuting_group(one_off - one_off.mean(axis=0), None, WITHIN, every=True)
+    assert broken.order < group.order or name == "C1"
+
+
+@pytest.mark.parametrize(("sides", "rings"), [(12, 6), (64, 32), (180, 90)])
+def test_a_ball_of_rings_has_the_fold_of_its_sides(sides, rings):
+    height, angle = np.pi * np.arange(1, rings) / rings, 2.0 * np.pi * np.arange(sides) / sides
+    height, angle = (a.ravel() for a in np.meshgrid(height, angle))
+    ball = np.stack([np.sin(height) * np.cos(angle), np.sin(height) * np.sin(angle), np.cos(height)], axis=1)
+    ball = np.concatenate([ball, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]]) @ random_orthogonal(np.random.default_rng(1)).T
+    assert permuting_group(ball, None, WITHIN).name == f"D{sides}h"
+    cap = ball[ball @ ball[-2] > -0.49]
+    assert permuting_group(cap - cap.mean(axis=0), None, WITHIN).name == f"C{sides}v"
 
 
 def test_a_mirror_image_is_told_from_a_turn():

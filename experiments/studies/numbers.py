@@ -83,7 +83,7 @@ KIND_OF = {
         "decide.place": "HALVED",
         "detection.measure": "ORDER PLANES SAMPLES",
         "detection.sketch": "MANY SAMPLE",
-        "fit.anchors": "LEVER PROBES",
+        "fit.anchors": "LEVER AROUND PROBES",
         "fit.matching": "ROBUST SCALE_FLOOR AGREE",
         "fit.placed": "FREE_TURNS SAMPLED FITTED",
         "fit.refine": "MAX_OUTER SETTLED WITHIN_NOISE LONGEST SHORT",

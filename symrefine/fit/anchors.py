@@ -2,14 +2,16 @@
 
 An operation leaves the centroid in place. So it carries a point onto one that is as far from there, and a second point
 onto one that is as far and under the same angle; the two images and the determinant tell it. Two points whose distances
-few others share leave few operations to ask.
+few others share leave few operations to ask. Where all are as far, on a sphere, they are told by their neighbours.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.fit.action import labelled
-from symrefine.geometry import Array, unit
+from symrefine.geometry import Array, Mask, unit
 from symrefine.groups import PointGroup
 from symrefine.groups.identify import identify
 from symrefine.groups.names import MAX_FOLD
@@ -20,6 +22,8 @@ from symrefine.shape import Index
 LEVER = 0.05
 # Pairs of points that are compared, or images that are looked up, and pairs whose operations are asked, at most.
 LARGEST, CANDIDATES = 5_000_000, 20_000
+# Neighbours whose distances tell points apart: those that a vertex has in most triangulations.
+AROUND = 6
 # Points that operations are asked of in turn: most fail at once.
 PROBES = (4, 40, 400)
 
@@ -40,17 +44,18 @@ def permuting_group(points: Array, labels: Index | None, within: float, *, every
     tree, shifted = labelled(points, labels)
     radii = np.linalg.norm(points, axis=1)
     distant, reach = LEVER * radii.max(), 2.0 * within
-    own = radii + shifted
-    ordered = np.sort(own)
-    alike = np.searchsorted(ordered, own + reach, side="right") - np.searchsorted(ordered, own - reach)
-    first = _rarest(alike, radii >= distant)
+    kinds = _Kinds.of((radii + shifted)[None], reach)
+    first, second = _anchors(points, kinds, distant)
+    if kinds.alike[first] * kinds.alike[second] > CANDIDATES:
+        # On a sphere all are alike but for what is around them, which moves by as much as both ends do.
+        kinds = kinds.and_of(tree.query(tree.points, AROUND, skip=1)[0].T, 2.0 * reach)
+        first, second = _anchors(points, kinds, distant)
     aside = np.linalg.norm(np.cross(points, unit(points[first])), axis=1)
-    if aside.max() < distant:
+    if aside[second] < distant:
         return None
-    second = _rarest(alike, aside >= distant)
-    if alike[first] * alike[second] > LARGEST:
+    goals = [points[kinds.like(k)] for k in (first, second)]
+    if len(goals[0]) * len(goals[1]) > LARGEST:
         return None
-    goals = [points[np.abs(own - own[k]) <= reach] for k in (first, second)]
     cosines = goals[0] @ goals[1].T - points[first] @ points[second]
     rows, columns = np.nonzero(np.abs(cosines) <= reach * (radii[first] + radii[second]))
     if len(rows) > CANDIDATES:
@@ -75,9 +80,44 @@ def permuting_group(points: Array, labels: Index | None, within: float, *, every
         return None
 
 
-def _rarest(alike: Index, allowed: Array) -> int:
-    """The point allowed whose distance the fewest share."""
-    return int(np.flatnonzero(allowed)[np.argmin(alike[allowed])])
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Kinds:
+    """What operations leave of each point: `traits` [T, N], each to its `reach` [T]; `alike` [N] share the rarest."""
+
+    traits: Array
+    reach: Array
+    alike: Index
+
+    @classmethod
+    def of(cls, traits: Array, reach: float) -> "_Kinds":
+        alike = [
+            np.searchsorted(ordered, own + reach, side="right") - np.searchsorted(ordered, own - reach)
+            for own, ordered in zip(traits, np.sort(traits, axis=1), strict=True)
+        ]
+        return cls(traits=traits, reach=np.full(len(traits), reach), alike=np.min(alike, axis=0))
+
+    def and_of(self, traits: Array, reach: float) -> "_Kinds":
+        more = self.of(traits, reach)
+        return _Kinds(
+            traits=np.concatenate([self.traits, more.traits]),
+            reach=np.concatenate([self.reach, more.reach]),
+            alike=np.minimum(self.alike, more.alike),
+        )
+
+    def rarest(self, allowed: Mask) -> int:
+        """The point allowed of which there are the fewest."""
+        return int(np.flatnonzero(allowed)[np.argmin(self.alike[allowed])])
+
+    def like(self, point: int) -> Mask:
+        """Which points [N] one may be carried to."""
+        return np.asarray((np.abs(self.traits - self.traits[:, [point]]) <= self.reach[:, None]).all(axis=0))
+
+
+def _anchors(points: Array, kinds: _Kinds, distant: float) -> tuple[int, int]:
+    """The rarest point so far out, and the rarest so far off the line through it; the farthest off if none is."""
+    first = kinds.rarest(np.linalg.norm(points, axis=1) >= distant)
+    aside = np.linalg.norm(np.cross(points, unit(points[first])), axis=1)
+    return first, kinds.rarest(aside >= min(distant, float(aside.max())))
 
 
 def _frames(first: Array, second: Array) -> Array:

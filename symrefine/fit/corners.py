@@ -55,17 +55,19 @@ def corners(shape: Shape, center: Array, diagonal: float, within: float) -> Iter
         yield Corners(points=own.points, labels=own.labels, facets=())
         return
     faces, kinds = _once(own.back[shape.faces], shape.labels)
-    flat = Facets.flat(own.points, faces, kinds, within)
     thick = ~slivers(own.points, faces, SINGLE)
-    least = flat if thick.all() else Facets.flat(own.points, faces[thick], kinds[thick], within)
-    least = least.straight(own.points, within)
+    flat = Facets.flat(own.points, faces[thick], kinds[thick], within)
+    least = flat.straight(own.points, within)
     if len(ends := least.corners) < len(own.points):
         yield Corners(points=own.points[ends], labels=None, facets=(least.of_these(ends),))
+    flat = flat if thick.all() else Facets.flat(own.points, faces, kinds, within)
     yield Corners(points=own.points, labels=None, facets=(Facets.single(faces, kinds), flat))
 
 
 def _once(faces: Index, labels: Index | None) -> tuple[Index, Index]:
     """Triangles [F, 3], each once, whichever way round, and their labels [F]: twice the same surface is the surface."""
     kinds = np.zeros(len(faces), dtype=np.int64) if labels is None else labels
-    told = np.unique(np.column_stack([np.sort(faces, axis=1), kinds]), axis=0)
+    key = np.column_stack([np.sort(faces, axis=1), kinds])
+    key = key[np.lexsort(key.T)]
+    told = key[np.append(True, (np.diff(key, axis=0) != 0).any(axis=1))]
     return told[:, :3], told[:, 3]

@@ -73,54 +73,23 @@ class Facets:
     @property
     def corners(self) -> Index:
         """The points that edges end in, ascending."""
-        return np.unique(self.edges)
+        return np.flatnonzero(np.bincount(self.edges.ravel()))
 
     def straight(self, points: Array, within: float) -> "Facets":
         """The same with edges that go straight on put together, where no point is off the line by more than `within`.
 
         What is no wider than that, so that nothing is left around it, stays as it is.
         """
-        found, left = self, within - self.bend
+        several = (np.bincount(self.of) > 3)[self.of]  # edges: of three none can go
+        if not several.any():
+            return self
+        found, left = _only(self, several), within - self.bend
         while left > 0.0:
-            longer = found._longer(points, left)
+            longer = _longer(found, points, left)
             if len(longer.edges) == len(found.edges):
                 break
             found, left = longer, within - longer.bend
-        return found
-
-    def _longer(self, points: Array, within: float) -> "Facets":
-        """The same with each run of edges that go straight on as one edge, if no point of it is off that."""
-        into, out = self._passing(points, within)
-        run = connected(len(self.edges), into, out)
-        # A run starts where none goes on into it; what goes round and round has no such end.
-        starts, ends = np.setdiff1d(np.arange(len(run)), out), np.setdiff1d(np.arange(len(run)), into)
-        head, last = np.full((2, int(run.max()) + 1), -1)
-        head[run[starts]], last[run[ends]] = starts, self.edges[ends, 1]
-        first = self.edges[head, 0]
-        off, worst = _off_line(points, self.edges[into, 1], first[run[into]], last[run[into]]), np.zeros(len(head))
-        np.maximum.at(worst, run[into], off)
-        whole = (worst <= within) & (head >= 0) & (first != last)
-        left, head = ~whole[run], head[whole]
-        new = replace(self, edges=np.column_stack([first, last])[whole], often=self.often[head], of=self.of[head])
-        old = replace(self, edges=self.edges[left], often=self.often[left], of=self.of[left])
-        made = _summed(_joined(old, new))
-        # What is no wider than that has both its sides on one line.
-        gone = ~np.isin(self.of, made.of)
-        made = _joined(made, replace(self, edges=self.edges[gone], often=self.often[gone], of=self.of[gone]))
-        return replace(made, bend=self.bend + float(worst[whole].max(initial=0.0)))
-
-    def _passing(self, points: Array, within: float) -> tuple[Index, Index]:
-        """Edges that go straight on into others, and those: where a facet has one into a point and one out of it."""
-        from_, to = (self.of * len(points) + self.edges[:, side] for side in (0, 1))
-        (ends, into, arrive), (begins, out, leave) = (
-            np.unique(nodes, return_index=True, return_counts=True) for nodes in (to, from_)
-        )
-        one, other = np.intersect1d(ends[arrive == 1], begins[leave == 1], assume_unique=True, return_indices=True)[1:]
-        into, out = into[arrive == 1][one], out[leave == 1][other]
-        before, at, after = self.edges[into, 0], self.edges[into, 1], self.edges[out, 1]
-        on = dots(points[at] - points[before], points[after] - points[at]) > 0.0
-        on &= _off_line(points, at, before, after) <= within
-        return into[on], out[on]
+        return _joined(found, _only(self, ~several))
 
     def of_these(self, points: Index) -> "Facets":
         """The same with points numbered as they come among these, ascending."""
@@ -140,6 +109,45 @@ class Facets:
         np.add.at(told, self.of, self.often.astype(np.uint64) * (one[here] * two[there] - one[there] * two[here]))
         told = np.minimum(told, np.negative(told))  # seen from either side
         return cast(Index, np.unique(told ^ of_kind[kinds]))
+
+
+def _longer(facets: Facets, points: Array, within: float) -> Facets:
+    """The same with each run of edges that go straight on as one edge, if no point of it is off that."""
+    into, out = _passing(facets, points, within)
+    run = connected(len(facets.edges), into, out)
+    # A run starts where none goes on into it; what goes round and round has no such end.
+    starts, ends = np.ones((2, len(run)), dtype=bool)
+    starts[out] = ends[into] = False
+    head, last = np.full((2, int(run.max()) + 1), -1)
+    head[run[starts]], last[run[ends]] = np.flatnonzero(starts), facets.edges[ends, 1]
+    first = facets.edges[head, 0]
+    off, worst = _off_line(points, facets.edges[into, 1], first[run[into]], last[run[into]]), np.zeros(len(head))
+    np.maximum.at(worst, run[into], off)
+    whole = (worst <= within) & (head >= 0) & (first != last)
+    new = replace(_only(facets, head[whole]), edges=np.column_stack([first, last])[whole])
+    made = _summed(_joined(_only(facets, ~whole[run]), new))
+    # What is no wider than that has both its sides on one line.
+    made = _joined(made, _only(facets, ~np.isin(facets.of, made.of)))
+    return replace(made, bend=facets.bend + float(worst[whole].max(initial=0.0)))
+
+
+def _passing(facets: Facets, points: Array, within: float) -> tuple[Index, Index]:
+    """Edges that go straight on into others, and those: where a facet has one into a point and one out of it."""
+    from_, to = (facets.of * len(points) + facets.edges[:, side] for side in (0, 1))
+    (ends, into, arrive), (begins, out, leave) = (
+        np.unique(nodes, return_index=True, return_counts=True) for nodes in (to, from_)
+    )
+    one, other = np.intersect1d(ends[arrive == 1], begins[leave == 1], assume_unique=True, return_indices=True)[1:]
+    into, out = into[arrive == 1][one], out[leave == 1][other]
+    before, at, after = facets.edges[into, 0], facets.edges[into, 1], facets.edges[out, 1]
+    on = dots(points[at] - points[before], points[after] - points[at]) > 0.0
+    on &= _off_line(points, at, before, after) <= within
+    return into[on], out[on]
+
+
+def _only(facets: Facets, rows: Index | Mask) -> Facets:
+    """Some of the edges."""
+    return replace(facets, edges=facets.edges[rows], often=facets.often[rows], of=facets.of[rows])
 
 
 def _joined(one: Facets, other: Facets) -> Facets:
@@ -193,13 +201,14 @@ def _pairs(corners: Array, faces: Index, labels: Index, within: float) -> tuple[
     ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
     edge = ends.min(axis=1) * (int(faces.max()) + 1) + ends.max(axis=1)
     order = np.argsort(edge, kind="stable")
-    _, first, uses = np.unique(edge[order], return_index=True, return_counts=True)
+    first = np.flatnonzero(np.append(True, np.diff(edge[order]) != 0))
+    uses = np.diff(np.append(first, len(edge)))
     pairs = order[first[uses == 2][:, None] + [0, 1]]  # an edge of three triangles or more is where facets meet
     (near, far), (side, beyond) = pairs.T // 3, pairs.T % 3
     start, along = corners[near, side], corners[near, (side + 1) % 3] - corners[near, side]
     own, other = corners[near, (side + 2) % 3] - start, corners[far, (beyond + 2) % 3] - start
     sides = ((along, own), (along, other), (own, other), (own - along, other - along))
-    areas = sum(np.linalg.norm(np.cross(a, b), axis=1) for a, b in sides)
+    areas = sum(np.sqrt(dots(c := np.cross(a, b), c)) for a, b in sides)
     flat = np.abs(dots(np.cross(along, own), other)) <= within * areas
     # Folded over, two triangles of a plane lie on each other: by as much as the smaller one reaches.
     unit = np.divide(along, length := np.linalg.norm(along, axis=1, keepdims=True), where=length > 0.0, out=0.0 * along)
