@@ -38,7 +38,9 @@ def distance_to_mesh(points: Array, corners: Array) -> Array:
         along = np.einsum("nki,ki->nk", local, sides) / np.maximum((sides**2).sum(axis=1), 1e-300)
         off = np.linalg.norm(local - np.clip(along, 0.0, 1.0)[..., None] * sides, axis=2).min(axis=1)
         normal = np.cross(sides[0], sides[1])
-        within = (np.einsum("nki,ki->nk", local, np.cross(normal, sides)) >= 0.0).all(axis=1) & normal.any()
-        above = np.abs(local[:, 0] @ normal) / max(float(np.linalg.norm(normal)), 1e-300)
-        nearest = np.minimum(nearest, np.where(within, above, off))
+        within = (np.einsum("nki,ki->nk", local, np.cross(normal, sides)) >= 0.0).all(axis=1)
+        area = float(np.linalg.norm(normal))
+        if area > 1e-9 * float((sides**2).sum()):
+            off = np.where(within, np.abs(local[:, 0] @ normal) / area, off)
+        nearest = np.minimum(nearest, off)
     return nearest

@@ -93,8 +93,9 @@ class Exact:
 
     Attributes:
         miss: largest distance of an image to its counterpart, a fraction of the diagonal; rounding alone leaves 1e-15.
-        faces: whether faces are mapped onto faces as well, triangles in one plane as one; if not, a triangulation
-            chose its diagonals where four corners lie in no plane. None of a cloud.
+        faces: whether faces are mapped onto faces as well, triangles in one plane as one, and vertices are but the
+            corners of those; if not, a triangulation chose its diagonals where four corners lie in no plane. None of a
+            cloud.
         point_group: what does so: the group, or the fold that a continuous one has in the vertices.
     """
 

@@ -58,7 +58,7 @@ def corners(shape: Shape, center: Array, diagonal: float, within: float) -> Iter
     thick = ~slivers(own.points, faces, SINGLE)
     flat = Facets.flat(own.points, faces[thick], kinds[thick], within)
     least = flat.straight(own.points, within)
-    if len(ends := least.corners) < len(own.points):
+    if 0 < len(ends := least.corners) < len(own.points):
         yield Corners(points=own.points[ends], labels=None, facets=(least.of_these(ends),))
     flat = flat if thick.all() else Facets.flat(own.points, faces, kinds, within)
     yield Corners(points=own.points, labels=None, facets=(Facets.single(faces, kinds), flat))

@@ -63,11 +63,17 @@ class Facets:
 
     @classmethod
     def _around(cls, faces: Index, labels: Index, of: Index, bend: float) -> "Facets":
-        """What is left of the edges of triangles [F, 3] where those that a facet [F] has both ways are gone."""
-        ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
+        """What is left of the edges of triangles [F, 3] where those that a facet [F] has both ways are gone.
+
+        Of a triangle with one corner twice its one edge: it stands for itself.
+        """
+        ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)
+        real = ends[..., 0] != ends[..., 1]
+        real[:, 2] &= real[:, :2].all(axis=1)
         kinds = np.empty(int(of.max()) + 1, dtype=np.int64)
         kinds[of] = labels
-        every = cls(edges=ends, often=np.ones(len(ends), dtype=np.int64), of=np.repeat(of, 3), labels=kinds, bend=bend)
+        edges, of = ends[real], np.repeat(of, real.sum(axis=1))
+        every = cls(edges=edges, often=np.ones(len(edges), dtype=np.int64), of=of, labels=kinds, bend=bend)
         return _summed(every) if len(kinds) < len(faces) else every
 
     @property
@@ -188,7 +194,7 @@ def slivers(points: Array, faces: Index, within: float) -> Mask:
     while True:  # what lies along an edge of such a one does, too
         more = thin & ~covered & np.isin(along, edge[~thin | covered])
         if not more.any():
-            return covered
+            return covered & ~covered.all()  # where there is nothing else they are the shape
         covered |= more
 
 

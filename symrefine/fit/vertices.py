@@ -1,7 +1,8 @@
 """Vertices that a group maps onto vertices: they know its place to rounding, where samples know it to 1e-4.
 
 Exact or not is a matter of vertices, not of samples: all of them are asked, and, of a mesh, whether its faces are
-mapped onto faces as well. The same fit places the group for reports, exports and the nearest symmetric shape.
+mapped onto faces as well. What is a vertex only of how faces were cut is asked where the others tell nothing. The same
+fit places the group for reports, exports and the nearest symmetric shape.
 """
 
 from dataclasses import dataclass, replace
