@@ -60,7 +60,6 @@ def corners(shape: Shape, center: Array, diagonal: float, within: float) -> Iter
     least = flat.straight(own.points, within)
     if 0 < len(ends := least.corners) < len(own.points):
         yield Corners(points=own.points[ends], labels=None, facets=(least.of_these(ends),))
-    flat = flat if thick.all() else Facets.flat(own.points, faces, kinds, within)
     yield Corners(points=own.points, labels=None, facets=(Facets.single(faces, kinds), flat))
 
 
