@@ -264,7 +264,7 @@ def openings(
         aside[floor.meets(cloud.points, cloud.beside)] = 0.0
     far = _lines(cloud, (aside > FAR_ASIDE) & ~(cloud.lonely & strays))
     far[far] = ~_folded(cloud.points[far], points, tree, None if near is None else near[far])
-    is_open = width <= WIDEST and far.mean() >= least * width and far.any()
+    is_open = width <= WIDEST and far.mean() >= least * width and _is_long(cloud.points[far], cloud.beside, width)
     evident = bool(is_open and far.mean() > EVIDENT * width)
     if blurred or not is_open:
         closed = Openings(line=none, border=none, evident=evident, clumps=clumps, floor=floor)
@@ -355,6 +355,21 @@ def _folded(at: Array, points: Array, tree: Tree, near: Index | None) -> Mask:
     size = np.linalg.norm(off, axis=1) * np.linalg.norm(depth, axis=1)
     parted = np.einsum("nk,nk->n", off, depth) / np.maximum(size, DOUBLE)
     return _together(at, parted, AROUND + 1) > PARTED
+
+
+def _is_long(points: Array, beside: float, width: float) -> bool:
+    """Whether some of points [N, 3] stand in a row that is longer than neighbourhoods are wide (RMS radii).
+
+    At the corner of a box all that is near lies to one side, too, but so it does nowhere beside the corner. What lies
+    within `beside` of another one hangs together with it.
+    """
+    if not len(points):
+        return False
+    away, near = Tree(points).query(points, min(AROUND, len(points)))
+    linked = away < beside
+    part = connected_parts(np.nonzero(linked)[0], near[linked], len(points))
+    middles = np.stack([np.bincount(part, column) for column in points.T], axis=1) / np.bincount(part)[:, None]
+    return bool(np.linalg.norm(points - middles[part], axis=1).max() > width)
 
 
 def _lines(cloud: LocalPlanes, chosen: Mask) -> Mask:
