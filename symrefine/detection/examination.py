@@ -250,10 +250,10 @@ def _likeliest(
 
 
 def _suspects(found: Examined, _: Array, tolerance: float) -> tuple[Index, ...]:
-    """Groups of points that fill a volume beside the body, unless each has counterparts."""
+    """Groups of points that fill a volume beside the body, unless each is a part of it."""
     blobs = found.measured.blobs
-    has = all(_has_counterparts(found, points, tolerance) for _, points in blobs)
-    return () if has else tuple(indices for indices, _ in blobs)
+    own = all(_is_part(found, points, tolerance) for _, points in blobs)
+    return () if own else tuple(indices for indices, _ in blobs)
 
 
 def _strangers(found: Examined, points: Array, tolerance: float) -> tuple[Index, ...]:
@@ -338,20 +338,25 @@ def _examined(
     )
 
 
-def _has_counterparts(found: Examined, blob: Array, tolerance: float) -> bool:
-    """Whether points that fill a volume beside the body are a part of it as others are, which they are carried to.
+def _is_part(found: Examined, blob: Array, tolerance: float) -> bool:
+    """Whether points that fill a volume beside the body are a part of it, or hide nothing of it.
 
-    Most of their images have to leave them and their rim, lest a mirror passes through by chance, and to meet the body.
+    A part is carried as others are to where it has counterparts. Most of the images have to leave the points and their
+    rim, lest a mirror passes through by chance, and to meet the body. What every operation keeps that leaves a single
+    point of space in place lies about that point, as all larger groups of the rest do, which a clump there, round as it
+    is, would not break.
     """
     surface, cloud, moments = found.surface, found.surface.cloud.of_one_class(), found.measured.moments
     points, margin = (blob - moments.center) / moments.scale, surface.far * surface.diagonal
-    elements = found.link(tolerance).elements
-    motions = [m for element in elements for m in element.motions]
+    link = found.link(tolerance)
+    motions = [m for element in link.elements for m in element.motions]
     if not motions or found.doubt(tolerance):
         return False
     moved = np.concatenate([m.apply(points) for m in motions])
-    own = Tree(points).nearest(cloud.points)[0] <= 2.0 * cloud.reach
-    others = moved[~own[cloud.nearest(moved, None)[1]]]
+    own = (Tree(points).nearest(cloud.points)[0] <= 2.0 * cloud.reach)[cloud.nearest(moved, None)[1]]
+    if not link.group.is_polar and own.reshape(len(motions), -1).mean(axis=1).min() > 0.5:
+        return True
+    others = moved[~own]
     met = disc_distances(cloud, others) <= margin
     return 2 * len(others) > len(moved) and bool(met.mean() > 0.5)
 
