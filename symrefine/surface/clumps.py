@@ -87,8 +87,8 @@ def clump_among(points: Array, unmet: Mask) -> Index:
 def _is_filled(points: Array) -> bool:
     """Whether points [N, 3] fill a volume, as neighbourhoods say that are large parts of it."""
     tree, queries = Tree(points), points[:: max(1, len(points) // GLANCE)]
-    thick = (np.median(_blobness(points, tree, queries, max(len(points) // k, NEIGHBOURS[0]))) for k in FRACTIONS)
-    return bool(min(thick) > VOLUME)
+    sizes = (max(len(points) // k, NEIGHBOURS[0]) for k in FRACTIONS)
+    return all(np.median(_blobness(points, tree, queries, size)) > VOLUME for size in sizes)
 
 
 def parts_among(around: Surroundings) -> Index:
