@@ -90,11 +90,14 @@ class _Kinds:
 
     @classmethod
     def of(cls, traits: Array, reach: float) -> "_Kinds":
-        alike = [
-            np.searchsorted(ordered, own + reach, side="right") - np.searchsorted(ordered, own - reach)
-            for own, ordered in zip(traits, np.sort(traits, axis=1), strict=True)
-        ]
-        return cls(traits=traits, reach=np.full(len(traits), reach), alike=np.min(alike, axis=0))
+        alike = np.empty(traits.shape, dtype=np.intp)
+        for own, found in zip(traits, alike, strict=True):
+            # Numbers in order are looked up ten times as fast.
+            order = np.argsort(own)
+            ascending = own[order]
+            found[order] = np.searchsorted(ascending, ascending + reach, side="right")
+            found[order] -= np.searchsorted(ascending, ascending - reach)
+        return cls(traits=traits, reach=np.full(len(traits), reach), alike=alike.min(axis=0))
 
     def and_of(self, traits: Array, reach: float) -> "_Kinds":
         more = self.of(traits, reach)

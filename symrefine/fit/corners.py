@@ -4,13 +4,16 @@ A vertex within a plane part of a mesh, or where every edge goes straight on, sa
 the shape.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from symrefine.fit.distinct import Distinct
-from symrefine.fit.facets import Facets, slivers
+from symrefine.fit.facets import Facets
+from symrefine.fit.ordered import ordered
+from symrefine.fit.triangles import Triangles
 from symrefine.geometry import Array
 from symrefine.rounding import SINGLE
 from symrefine.shape import Index, Shape
@@ -20,12 +23,13 @@ from symrefine.shape import Index, Shape
 class Corners:
     """Points [N, 3] in units of a diagonal about a centre, labels of those of a cloud, and what lies between them.
 
-    `facets` are ways to tell one and the same mesh, the most forgiving last; none of a cloud.
+    `facets` are ways to tell one and the same mesh, the most forgiving last; none of a cloud. They are put together
+    where they are asked for: where points are mapped.
     """
 
     points: Array
     labels: Index | None
-    facets: tuple[Facets, ...]
+    facets: tuple[Callable[[], Facets], ...]
 
     def bend_under(self, moved: Sequence[Index]) -> float | None:
         """By how much facets miss one another besides their corners; None if some are mapped onto none.
@@ -35,7 +39,8 @@ class Corners:
         """
         if not self.facets:
             return 0.0
-        for facets in self.facets:
+        for put_together in self.facets:
+            facets = put_together()
             here = facets.prints(np.arange(len(self.points)))
             if all(np.array_equal(facets.prints(image), here) for image in moved):
                 return facets.bend
@@ -54,19 +59,23 @@ def corners(shape: Shape, center: Array, diagonal: float, within: float) -> Iter
     if shape.faces is None:
         yield Corners(points=own.points, labels=own.labels, facets=())
         return
-    faces, kinds = _once(own.back[shape.faces], shape.labels)
-    thick = ~slivers(own.points, faces, SINGLE)
-    flat = Facets.flat(own.points, faces[thick], kinds[thick], within)
+    triangles = Triangles.of(own.points, *_once(own.back[shape.faces], shape.labels))
+    thick = triangles.only(~triangles.slivers(SINGLE))
+    several = Facets.several(thick, within)
+    flat = Facets.single(thick.faces, thick.labels) if several is None else several
     least = flat.straight(own.points, within)
     if 0 < len(ends := least.corners) < len(own.points):
-        yield Corners(points=own.points[ends], labels=None, facets=(least.of_these(ends),))
-    yield Corners(points=own.points, labels=None, facets=(Facets.single(faces, kinds), flat))
+        yield Corners(points=own.points[ends], labels=None, facets=(lambda: least.of_these(ends),))
+    single = cache(lambda: Facets.single(triangles.faces, triangles.labels))
+    yield Corners(points=own.points, labels=None, facets=(single, lambda: flat))
 
 
 def _once(faces: Index, labels: Index | None) -> tuple[Index, Index]:
     """Triangles [F, 3], each once, whichever way round, and their labels [F]: twice the same surface is the surface."""
     kinds = np.zeros(len(faces), dtype=np.int64) if labels is None else labels
-    key = np.column_stack([np.sort(faces, axis=1), kinds])
-    key = key[np.lexsort(key.T)]
-    told = key[np.append(True, (np.diff(key, axis=0) != 0).any(axis=1))]
-    return told[:, :3], told[:, 3]
+    a, b, c = faces.T
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    columns = [low, a + b + c - low - high, high, kinds]
+    order, first = ordered(columns[::-1])
+    told = order[first]
+    return np.column_stack([column[told] for column in columns[:3]]), kinds[told]

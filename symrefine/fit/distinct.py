@@ -5,7 +5,8 @@ from typing import cast
 
 import numpy as np
 
-from symrefine.geometry import Array
+from symrefine.fit.ordered import ordered
+from symrefine.geometry import Array, unit
 from symrefine.groups.standard import GOLDEN
 from symrefine.shape import Index, Shape
 from symrefine.surface.tree import pairs_within
@@ -34,14 +35,12 @@ class Distinct:
         labels = shape.labels if shape.faces is None else None
         # Round numbers, of which designs are full, lie nowhere near the walls of this grid.
         place = np.floor(local / weld + GOLDEN) if weld else local
-        key = place if labels is None else np.column_stack([place, labels])
-        order = np.lexsort(key.T[::-1])
-        first = np.append(True, (np.diff(key[order], axis=0) != 0.0).any(axis=1))
+        order, first = ordered([*place.T] if labels is None else [*place.T, labels])
         rows: Index = order[first]
-        back: Index = np.empty(len(key), dtype=np.intp)
-        back[order] = np.cumsum(first) - 1
+        back: Index = np.empty(len(order), dtype=np.intp)
+        back[order] = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(order))))
         if weld:
-            one, other = pairs_within(local[rows], weld).T
+            one, other = _touching(local[rows], weld).T
             alike = np.ones(len(one), dtype=bool) if labels is None else labels[rows[one]] == labels[rows[other]]
             if alike.any():
                 part = connected(len(rows), one[alike], other[alike])
@@ -49,10 +48,33 @@ class Distinct:
         return cls(points=local[rows], rows=rows, back=back, labels=None if labels is None else labels[rows])
 
 
+def _touching(points: Array, radius: float) -> Index:
+    """All pairs [P, 2] of points [N, 3] that are no farther apart than a radius, where few are.
+
+    They stand as near along any line. Along one in which no lattice has two points at one place few others do, so that
+    a tree, which takes ten times as long, is asked only where many do.
+    """
+    along = points @ unit(np.sqrt([1.0, 2.0, 3.0]))
+    order = np.argsort(along)
+    along, columns = along[order], np.take(points.T, order, axis=1)
+    here, found = np.arange(len(points)), [np.empty((0, 2), dtype=np.intp)]
+    for step in range(1, len(points).bit_length() + 1):
+        here = here[: np.searchsorted(here, len(points) - step)]
+        here = here[along[here + step] - along[here] <= radius]
+        if not len(here):
+            return np.concatenate(found)
+        apart = np.take(columns, here, axis=1) - np.take(columns, here + step, axis=1)
+        near = here[np.sqrt((apart**2).sum(axis=0)) <= radius]
+        found.append(np.column_stack([order[near], order[near + step]]))
+    return pairs_within(points, radius)
+
+
 def connected(count: int, one: Index, other: Index) -> Index:
     """Which connected part each of so many things is of, where pairs are connected; numbered as they come."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    graph = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
+    # Numbers that it would have to copy into narrower ones otherwise.
+    ends = (one.astype(np.int32), other.astype(np.int32)) if count <= np.iinfo(np.int32).max else (one, other)
+    graph = coo_array((np.ones(len(one)), ends), shape=(count, count))
     return cast(Index, connected_components(graph, directed=False)[1].astype(np.intp))

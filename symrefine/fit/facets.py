@@ -11,8 +11,11 @@ from typing import cast
 import numpy as np
 
 from symrefine.fit.distinct import connected
+from symrefine.fit.ordered import ordered
+from symrefine.fit.triangles import Triangles
 from symrefine.geometry import Array, Mask, dots
 from symrefine.shape import Index
+from symrefine.surface.neighbourhoods import renumbered
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,25 +48,41 @@ class Facets:
 
         Only those of the same label [F].
         """
-        corners = points[faces]
-        near, far = _pairs(corners, faces, labels, within)
+        triangles = Triangles.of(points, faces, labels)
+        return cls.several(triangles, within) or cls.single(faces, labels)
+
+    @classmethod
+    def several(cls, triangles: Triangles, within: float) -> "Facets | None":
+        """The same of triangles that are measured; None where every one is by itself."""
+        faces, labels = triangles.faces, triangles.labels
+        near, far = triangles.pairs(within)
         if not len(near):
-            return cls.single(faces, labels)
+            return None
         of = connected(len(faces), near, far)
-        normals, off = _planes(corners, of)
+        rows = np.flatnonzero((np.bincount(of) > 1)[of])
+        of = renumbered(of[rows], len(faces))[1]
+        normals, off = triangles.planes(rows, of)
         # What bends little by little is no facet: each of its triangles is one.
-        bent = np.zeros(len(normals), dtype=bool)
+        bent = np.zeros(normals.shape[1], dtype=bool)
         bent[of[off > within]] = True
-        alone = bent[of]
-        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        against = ~alone & (dots(across, normals[of]) < 0.0)
-        of = np.unique(np.where(alone, len(bent) + np.arange(len(faces)), of), return_inverse=True)[1].ravel()
-        faces = np.where(against[:, None], faces[:, ::-1], faces)
-        return cls._around(faces, labels, cast(Index, of), float(off[~alone].max(initial=0.0)))
+        if bent.all():
+            return None
+        whole = ~bent[of]
+        rows, of = rows[whole], (np.cumsum(~bent) - 1)[of[whole]]
+        against = np.einsum("if,if->f", triangles.across[:, rows], normals[:, ~bent][:, of]) < 0.0
+        own = np.where(against[:, None], faces[rows, ::-1], faces[rows])
+        found = _summed(cls._around(own, labels[rows], of, float(off[whole].max())))
+        alone = np.ones(len(faces), dtype=bool)
+        alone[rows] = False
+        if not alone.any():
+            return found
+        others = cls.single(faces[alone], labels[alone])
+        kinds = np.concatenate([found.labels, others.labels])
+        return _joined(replace(found, labels=kinds), replace(others, of=others.of + len(found.labels)))
 
     @classmethod
     def _around(cls, faces: Index, labels: Index, of: Index, bend: float) -> "Facets":
-        """What is left of the edges of triangles [F, 3] where those that a facet [F] has both ways are gone.
+        """The edges of triangles [F, 3], each of a facet [F].
 
         Of a triangle with one corner twice its one edge: it stands for itself.
         """
@@ -72,9 +91,10 @@ class Facets:
         real[:, 2] &= real[:, :2].all(axis=1)
         kinds = np.empty(int(of.max()) + 1, dtype=np.int64)
         kinds[of] = labels
-        edges, of = ends[real], np.repeat(of, real.sum(axis=1))
-        every = cls(edges=edges, often=np.ones(len(edges), dtype=np.int64), of=of, labels=kinds, bend=bend)
-        return _summed(every) if len(kinds) < len(faces) else every
+        edges, of = (
+            (ends.reshape(-1, 2), np.repeat(of, 3)) if real.all() else (ends[real], np.repeat(of, real.sum(axis=1)))
+        )
+        return cls(edges=edges, often=np.ones(len(edges), dtype=np.int64), of=of, labels=kinds, bend=bend)
 
     @property
     def corners(self) -> Index:
@@ -107,7 +127,7 @@ class Facets:
         What is there twice is there. Every corner draws two numbers and every label one, of 64 bits, so that others are
         the same once in 1e19 times. An edge has one sign in one sense, and the other in the other.
         """
-        rng, kinds = np.random.default_rng(0), np.unique(self.labels, return_inverse=True)[1].ravel()
+        rng, kinds = np.random.default_rng(0), _numbered(self.labels)
         one, two = rng.integers(2**64, size=(2, len(images)), dtype=np.uint64)
         of_kind = rng.integers(2**64, size=int(kinds.max()) + 1, dtype=np.uint64)
         here, there = images[self.edges].T
@@ -165,76 +185,21 @@ def _joined(one: Facets, other: Facets) -> Facets:
 
 def _summed(facets: Facets) -> Facets:
     """The same with every edge of a facet once, and none that it has as often one way as the other."""
-    low, high = facets.edges.min(axis=1), facets.edges.max(axis=1)
-    order = np.lexsort([high, low, facets.of])
-    key = np.column_stack([facets.of, low, high])[order]
-    first = np.flatnonzero(np.append(True, (np.diff(key, axis=0) != 0).any(axis=1)))
-    signed = np.where(facets.edges[:, 0] == low, facets.often, -facets.often)[order]
-    often = np.add.reduceat(signed, first)
-    first, often = first[often != 0], often[often != 0]
-    edges = np.where(often[:, None] > 0, key[first, 1:], key[first, :0:-1])
-    return replace(facets, edges=edges, often=np.abs(often), of=key[first, 0])
+    one, other = facets.edges.T
+    low, high = np.minimum(one, other), np.maximum(one, other)
+    order, first = ordered([facets.of, low, high])
+    often = np.add.reduceat(np.where(one == low, facets.often, -facets.often)[order], first)
+    rows, often = order[first[often != 0]], often[often != 0]
+    low, high = low[rows], high[rows]
+    edges = np.column_stack([np.where(often > 0, low, high), np.where(often > 0, high, low)])
+    return replace(facets, edges=edges, often=np.abs(often), of=facets.of[rows])
 
 
-def slivers(points: Array, faces: Index, within: float) -> Mask:
-    """Which triangles [F, 3] are but a part of an edge of others: no wider than that, and along one.
-
-    Those that close the gap where a corner of one triangle lies on the edge of another.
-    """
-    corners = points[faces]
-    sides = np.roll(corners, -1, axis=1) - corners
-    lengths = np.linalg.norm(sides, axis=2)
-    longest = lengths.argmax(axis=1)
-    thin = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) <= within * lengths.max(axis=1)
-    if not thin.any():
-        return thin
-    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2)
-    edge = ends[..., 0] * len(points) + ends[..., 1]
-    along, covered = edge[np.arange(len(faces)), longest], ~lengths.any(axis=1)
-    while True:  # what lies along an edge of such a one does, too
-        more = thin & ~covered & np.isin(along, edge[~thin | covered])
-        if not more.any():
-            return covered & ~covered.all()  # where there is nothing else they are the shape
-        covered |= more
-
-
-def _pairs(corners: Array, faces: Index, labels: Index, within: float) -> tuple[Index, Index]:
-    """Triangles that share an edge, lie in one plane on both sides of it, and have the same label.
-
-    Four corners are in one plane if moving each by no more than `within` brings them there: what they enclose changes
-    by as much times the area across from each. A plane through a small triangle would tell little of a large one.
-    """
-    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-    edge = ends.min(axis=1) * (int(faces.max()) + 1) + ends.max(axis=1)
-    order = np.argsort(edge, kind="stable")
-    first = np.flatnonzero(np.append(True, np.diff(edge[order]) != 0))
-    uses = np.diff(np.append(first, len(edge)))
-    pairs = order[first[uses == 2][:, None] + [0, 1]]  # an edge of three triangles or more is where facets meet
-    (near, far), (side, beyond) = pairs.T // 3, pairs.T % 3
-    start, along = corners[near, side], corners[near, (side + 1) % 3] - corners[near, side]
-    own, other = corners[near, (side + 2) % 3] - start, corners[far, (beyond + 2) % 3] - start
-    sides = ((along, own), (along, other), (own, other), (own - along, other - along))
-    areas = sum(np.sqrt(dots(c := np.cross(a, b), c)) for a, b in sides)
-    flat = np.abs(dots(np.cross(along, own), other)) <= within * areas
-    # Folded over, two triangles of a plane lie on each other: by as much as the smaller one reaches.
-    unit = np.divide(along, length := np.linalg.norm(along, axis=1, keepdims=True), where=length > 0.0, out=0.0 * along)
-    own, other = own - dots(own, unit)[:, None] * unit, other - dots(other, unit)[:, None] * unit
-    flat &= dots(own, other) <= within * np.sqrt(np.maximum(dots(own, own), dots(other, other)))
-    flat &= labels[near] == labels[far]
-    return near[flat], far[flat]
-
-
-def _planes(corners: Array, of: Index) -> tuple[Array, Array]:
-    """Unit normals [K, 3] of the planes that facets lie in, and how far off corners of each triangle are [F]."""
-    count = int(of.max()) + 1
-    uses = 3.0 * np.bincount(of, minlength=count)
-    middle = np.zeros((count, 3))
-    np.add.at(middle, of, corners.sum(axis=1))
-    local = corners - (middle / uses[:, None])[of, None]
-    spread = np.zeros((count, 3, 3))
-    np.add.at(spread, of, np.einsum("fki,fkj->fij", local, local))
-    normals = np.linalg.eigh(spread)[1][:, :, 0]
-    return normals, np.abs(np.einsum("fki,fi->fk", local, normals[of])).max(axis=1)
+def _numbered(labels: Index) -> Index:
+    """Labels [K] by their number among those that there are, ascending."""
+    if (labels == labels[0]).all():
+        return np.zeros_like(labels)
+    return cast(Index, np.unique(labels, return_inverse=True)[1].ravel())
 
 
 def _off_line(points: Array, at: Index, first: Index, last: Index) -> Array:

@@ -105,10 +105,13 @@ def _proven(own: Corners, exact: OnVertices | None, origin: Array, diagonal: flo
     place = Placed(group=exact.group, center=(exact.center - origin) / diagonal)
     operations = place.group.operations()
     images = permutations(own.points - place.center, operations, own.labels, NEAR)
-    if images is None or not own.facets or len(operations) * len(own.facets[-1].edges) > 3 * LARGEST:
+    if images is None or not own.facets:
         return None
-    here = own.facets[-1].prints(images[0])
-    kept = [np.array_equal(own.facets[-1].prints(image), here) for image in images]
+    facets = own.facets[-1]()
+    if len(operations) * len(facets.edges) > 3 * LARGEST:
+        return None
+    here = facets.prints(images[0])
+    kept = [np.array_equal(facets.prints(image), here) for image in images]
     try:
         group = identify(operations[kept])
     except InputError:  # of what lies within rounding of being mapped
