@@ -140,6 +140,8 @@ class Facets:
 def _longer(facets: Facets, points: Array, within: float) -> Facets:
     """The same with each run of edges that go straight on as one edge, if no point of it is off that."""
     into, out = _passing(facets, points, within)
+    if not len(into):
+        return facets
     run = connected(len(facets.edges), into, out)
     # A run starts where none goes on into it; what goes round and round has no such end.
     starts, ends = np.ones((2, len(run)), dtype=bool)
@@ -153,18 +155,21 @@ def _longer(facets: Facets, points: Array, within: float) -> Facets:
     new = replace(_only(facets, head[whole]), edges=np.column_stack([first, last])[whole])
     made = _summed(_joined(_only(facets, ~whole[run]), new))
     # What is no wider than that has both its sides on one line.
-    made = _joined(made, _only(facets, ~np.isin(facets.of, made.of)))
+    gone = np.ones(len(facets.labels), dtype=bool)
+    gone[made.of] = False
+    made = _joined(made, _only(facets, gone[facets.of]))
     return replace(made, bend=facets.bend + float(worst[whole].max(initial=0.0)))
 
 
 def _passing(facets: Facets, points: Array, within: float) -> tuple[Index, Index]:
     """Edges that go straight on into others, and those: where a facet has one into a point and one out of it."""
+    count = len(facets.edges)
     from_, to = (facets.of * len(points) + facets.edges[:, side] for side in (0, 1))
-    (ends, into, arrive), (begins, out, leave) = (
-        np.unique(nodes, return_index=True, return_counts=True) for nodes in (to, from_)
-    )
-    one, other = np.intersect1d(ends[arrive == 1], begins[leave == 1], assume_unique=True, return_indices=True)[1:]
-    into, out = into[arrive == 1][one], out[leave == 1][other]
+    order, first = ordered([np.concatenate([to, from_])])
+    first = first[np.diff(np.append(first, len(order))) == 2]
+    into, out = order[first], order[first + 1] - count
+    both = (into < count) & (out >= 0)
+    into, out = into[both], out[both]
     before, at, after = facets.edges[into, 0], facets.edges[into, 1], facets.edges[out, 1]
     on = dots(points[at] - points[before], points[after] - points[at]) > 0.0
     on &= _off_line(points, at, before, after) <= within

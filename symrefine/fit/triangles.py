@@ -59,17 +59,21 @@ class Triangles:
         Those that close the gap where a corner of one triangle lies on the edge of another.
         """
         longest = self.sides.max(axis=0)
-        thin = self.areas <= within * longest
+        thin: Mask = np.asarray(self.areas <= within * longest)
         if not thin.any():
-            return np.asarray(thin)
-        edge = self._edges().reshape(-1, 3)
-        along = edge[np.arange(len(edge)), self.sides.argmax(axis=0)]
-        covered = ~self.sides.any(axis=0)
+            return thin
+        edge, rows = self._edges().reshape(-1, 3), np.flatnonzero(thin)
+        along, own = np.unique(edge[rows, self.sides.argmax(axis=0)[rows]], return_inverse=True)
+        place = np.minimum(np.searchsorted(along, edge), len(along) - 1)
+        place[along[place] != edge] = len(along)
+        covered: Mask = np.asarray(~self.sides.any(axis=0))
+        there = np.zeros(len(along) + 1, dtype=bool)
+        there[place[~thin | covered]] = True
         while True:  # what lies along an edge of such a one does, too
-            more = thin & ~covered & np.isin(along, edge[~thin | covered])
-            if not more.any():
-                return np.asarray(covered & ~covered.all())  # where there is nothing else they are the shape
-            covered |= more
+            more = rows[there[own.ravel()] & ~covered[rows]]
+            if not len(more):
+                return covered & ~covered.all()  # where there is nothing else they are the shape
+            covered[more] = there[place[more]] = True
 
     def pairs(self, within: float) -> tuple[Index, Index]:
         """Triangles that share an edge, lie in one plane on both sides of it, and have the same label.
