@@ -5,7 +5,9 @@ onto one that is as far and under the same angle; the two images and the determi
 few others share leave few operations to ask. Where all are as far, on a sphere, they are told by their neighbours.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -29,17 +31,22 @@ PROBES = (4, 40, 400)
 
 
 def permuting_group(points: Array, labels: Index | None, within: float, *, every: bool = False) -> PointGroup | None:
+    """The first of `permuting_groups`, or with `every` the second; None where it cannot be told."""
+    return next(islice(permuting_groups(points, labels, within), int(every), None), None)
+
+
+def permuting_groups(points: Array, labels: Index | None, within: float) -> Iterator[PointGroup | None]:
     """The finite group about the centroid whose operations carry points onto points of the same label.
 
     Args:
         points: [N, 3] distinct, about their centroid.
         labels: [N], or None.
         within: by how much a point may be out of place.
-        every: whether all points are asked in the end, and not some hundreds.
 
-    Returns:
-        C1 if nothing else does; None where that cannot be told: where points lie on a line, where too many operations
-        would have to be asked, for folds beyond `MAX_FOLD`, and where some points are mapped by what makes no group.
+    Yields:
+        What some hundreds of the points tell, and then all: C1 if nothing else does; None where that cannot be told.
+        Nothing where none of them can tell: where points lie on a line, where too many operations would have to be
+        asked. None for folds beyond `MAX_FOLD`, and where some points are mapped by what makes no group.
     """
     tree, shifted = labelled(points, labels)
     radii = np.linalg.norm(points, axis=1)
@@ -52,26 +59,32 @@ def permuting_group(points: Array, labels: Index | None, within: float, *, every
         first, second = _anchors(points, kinds, distant)
     aside = np.linalg.norm(np.cross(points, unit(points[first])), axis=1)
     if aside[second] < distant:
-        return None
+        return
     goals = [points[kinds.like(k)] for k in (first, second)]
     if len(goals[0]) * len(goals[1]) > LARGEST:
-        return None
+        return
     cosines = goals[0] @ goals[1].T - points[first] @ points[second]
     rows, columns = np.nonzero(np.abs(cosines) <= reach * (radii[first] + radii[second]))
     if len(rows) > CANDIDATES:
-        return None
+        return
     here, there = _frames(points[[first]], points[[second]]), _frames(goals[0][rows], goals[1][columns])
     proper = np.swapaxes(there, 1, 2) @ here
     mirror = np.eye(3) - 2.0 * np.outer(here[0, 2], here[0, 2])
     operations = np.concatenate([proper, proper @ mirror])
     miss = reach * (1.0 + radii.max() / radii[first] + radii.max() / aside[second])
-    for probes in (*PROBES, *([len(points)] if every else [])):
-        if len(operations) * probes > LARGEST:
-            return None
-        some = np.arange(0, len(points), max(1, len(points) // probes))
-        moved = points[some] @ np.swapaxes(operations, 1, 2)
-        goal = np.dstack([moved, np.broadcast_to(shifted[some], moved.shape[:2])])
-        operations = operations[(tree.nearest(goal)[0] <= miss).all(axis=1)]
+    for part in (PROBES, (len(points),)):
+        for probes in part:
+            if len(operations) * probes > LARGEST:
+                return
+            some = np.arange(0, len(points), max(1, len(points) // probes))
+            moved = points[some] @ np.swapaxes(operations, 1, 2)
+            goal = np.dstack([moved, np.broadcast_to(shifted[some], moved.shape[:2])])
+            operations = operations[(tree.nearest(goal)[0] <= miss).all(axis=1)]
+        yield _identified(operations)
+
+
+def _identified(operations: Array) -> PointGroup | None:
+    """The group of operations [K, 3, 3]; None where they are none, or too many."""
     if len(operations) > 4 * MAX_FOLD:
         return None
     try:

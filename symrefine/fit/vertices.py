@@ -11,7 +11,7 @@ import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.fit.action import generators, mean_back, permutations
-from symrefine.fit.anchors import LARGEST, permuting_group
+from symrefine.fit.anchors import LARGEST, permuting_groups
 from symrefine.fit.corners import Corners, corners
 from symrefine.fit.finite import finite_group
 from symrefine.fit.placed import Placed, common_center
@@ -71,7 +71,7 @@ def exact_symmetry(shape: Shape, diagonal: float) -> tuple[OnVertices | None, On
     """The group that maps points of a shape, corners of a mesh, onto one another to rounding, and what of it is proven.
 
     Nothing else has to be known of the shape but its diagonal, input units. The first is None if it cannot be told so
-    (see `permuting_group`). The second is that part of it which maps the faces, too: of an open box, that has all the
+    (see `permuting_groups`). The second is that part of it which maps the faces, too: of an open box, that has all the
     mirrors of a box in its corners, the two that keep the opening. None if nothing of it does.
     """
     origin, best = shape.points.mean(axis=0), list[OnVertices | None]()
@@ -87,8 +87,7 @@ def _exact(own: Corners, origin: Array, diagonal: float) -> OnVertices | None:
     """The group that maps corners onto one another, in units of the diagonal about the origin."""
     middle = own.points.mean(axis=0)
     # What some of the points seem to have a few others may break: then all are asked.
-    for every in (False, True):
-        group = permuting_group(own.points - middle, own.labels, ROUNDED, every=every)
+    for group in permuting_groups(own.points - middle, own.labels, ROUNDED):
         if group is None:
             continue
         if group.name == "C1":
