@@ -8,9 +8,6 @@ import numpy as np
 from symrefine.geometry import Array
 from symrefine.shape import Index
 
-# Numbers that 64 bits with a sign hold from 0 on.
-_HELD = 2**63
-
 
 def ordered(columns: Sequence[Array | Index]) -> tuple[Index, Index]:
     """The order [N] of rows, of which the first of the columns [N] counts most, and where [K] in it another row begins.
@@ -23,7 +20,7 @@ def ordered(columns: Sequence[Array | Index]) -> tuple[Index, Index]:
     if key is None:
         order: Index = np.lexsort(columns[::-1])
         new = np.any([np.diff(column[order]) != 0 for column in columns], axis=0)
-    elif wide << bits <= _HELD:
+    elif wide << bits <= 2**63:
         # With its place behind it every row is another: it need not be carried along.
         placed = np.sort(key << bits | np.arange(count))
         order, key = placed & ((1 << bits) - 1), placed >> bits
@@ -44,7 +41,7 @@ def _packed(columns: Sequence[Array | Index]) -> tuple[Index | None, int]:
     lows = [column.min() for column in columns]
     widths = [int(column.max()) - int(low) + 1 for column, low in zip(columns, lows, strict=True)]
     wide = math.prod(widths)
-    if wide > _HELD:
+    if wide > 2**63:
         return None, wide
     key = np.zeros(len(columns[0]), dtype=np.int64)
     for column, low, width in zip(columns, lows, widths, strict=True):
