@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from experiments.objects import group_shapes
+from experiments.objects.built_symmetry import specimen
 from experiments.objects.poses import Pose
 from experiments.objects.shapes import SHAPES, box, join, mirror_normals, mug, revolve, sample, table
 from experiments.studies import groups
@@ -623,7 +624,28 @@ def test_the_uncertainty_of_a_plane_is_what_samples_show():
         for p in found.planes:
             ratios.append(min(line_angle_rad(p.plane.normal, n) for n in truth) / p.sigma_rad)
             assert 0 < p.sigma < 1e-3 * found.diagonal
-    assert 0.5 < np.sqrt(np.mean(np.square(ratios))) < 3.0  # two directions, one of them the less certain one
+    # Two directions, one of them the less certain one; and planes that share points are taken to share all of them.
+    assert 0.33 < np.sqrt(np.mean(np.square(ratios))) < 1.5
+
+
+@pytest.mark.parametrize(("name", "body"), [("tower", "volume"), ("mug", "surface")])
+def test_noise_tells_nothing_of_where_a_plane_stands(name, body):
+    """Points anywhere in a volume have a nearest one wherever they are moved, normals of a round wall lean to a side.
+
+    Fits took both for knowledge, and were off by ten times what they said.
+    """
+    mesh, truth = specimen("household", name)
+    normals = truth.group.mirrors()
+    for seed in range(3):
+        rng = np.random.default_rng(40 + seed)
+        turn = random_orthogonal(rng)
+        found = detect(sample(mesh, 8000, 0.01, rng) @ turn.T)
+        assert (found.point_group, found.examined.surface.cloud.body) == (truth.group.name, body)
+        end = found.history[-1]
+        told = math.sqrt(np.linalg.eigvalsh(end.covariance[:3, :3])[-1])
+        for p in found.planes:
+            assert min(line_angle_rad(p.plane.normal, n) for n in normals @ turn.T) < 3.0 * p.sigma_rad
+        assert max(p.sigma_rad for p in found.planes) > 2.0 * told
 
 
 def test_iterations_count_those_of_the_parts_too():

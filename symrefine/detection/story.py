@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
 from symrefine.decide.hypotheses import Element, Hypothesis, fitted, judged
-from symrefine.decide.looks import COARSE
+from symrefine.decide.looks import COARSE, start_error
 from symrefine.decide.place import slack
 from symrefine.decide.posterior import NEAR, Decision, alternatives
 from symrefine.detection.examination import Examined, examined
@@ -18,11 +18,13 @@ from symrefine.detection.result import Candidate, Detection, Exact, FoundAxis, F
 from symrefine.detection.sketch import Sketch
 from symrefine.errors import InputError
 from symrefine.fit.placed import Placed
-from symrefine.fit.refine import Iterate
+from symrefine.fit.refine import answered
 from symrefine.fit.vertices import OnVertices
 from symrefine.geometry import Array, Axis, Plane, cross_matrix, positive
+from symrefine.samples import GLANCE, LOOK
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
+from symrefine.surface.surface import Surface
 from symrefine.threads import one_thread
 
 # Tolerances of the staircase that the command line tells.
@@ -156,8 +158,7 @@ def _report(
     chosen = links[index]
     names, needs = [h.group.name for h in links], [h.need for h in links]
     told = alternatives(names, needs, decision, -1 if reason else index)
-    history = chosen.history
-    loose = slack(surface, chosen.placed) if surface.viewed and chosen.elements else np.zeros((6, 6))
+    history, known = chosen.history, _covariance(surface, chosen)
     on = found.vertices_of(chosen)
     chosen = chosen if on is None else _polished(chosen, on, measured)
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
@@ -180,8 +181,8 @@ def _report(
                 plane=_plane(e, origin, scale),
                 residual=e.deviation,
                 confidence=sure[id(e)],
-                sigma_rad=(known := _uncertainty(history, e, loose))[0],
-                sigma=known[1] * scale,
+                sigma_rad=(off := _uncertainty(known, e))[0],
+                sigma=off[1] * scale,
                 coverage=e.coverage,
             )
             for e in sorted(planes, key=lambda e: e.need)
@@ -193,8 +194,8 @@ def _report(
                 improper=e.operations.kind == "improper",
                 residual=e.deviation,
                 confidence=sure[id(e)],
-                sigma_rad=(known := _uncertainty(history, e, loose))[0],
-                sigma=known[1] * scale,
+                sigma_rad=(off := _uncertainty(known, e))[0],
+                sigma=off[1] * scale,
                 coverage=e.coverage,
             )
             for e in sorted(turns, key=lambda e: (-e.operations.order, e.need))
@@ -307,19 +308,30 @@ def _near_miss(element: Element, origin: Array, scale: float, tolerance: float) 
     )
 
 
-def _uncertainty(history: tuple[Iterate, ...], element: Element, slack: Array) -> tuple[float, float]:
+def _covariance(surface: Surface, chosen: Hypothesis) -> Array | None:
+    """The covariance [6, 6] of a small turn and a shift of a group, along the axes of space; None if nothing tells it.
+
+    That of the joint refinement, as far as pairs told in noise where the group stands, and what nobody saw.
+    """
+    loose = slack(surface, chosen.placed) if surface.viewed and chosen.elements else np.zeros((6, 6))
+    if len(chosen.history) < 2:
+        return loose if loose.any() else None
+    end, covariance = chosen.history[-1], chosen.history[-1].covariance
+    if surface.is_noisy:
+        stride = surface.stride(max(GLANCE, LOOK // len(end.state.standard)), matched=True)
+        covariance = answered(surface.cloud, end, start_error(surface), stride=stride)
+    axes = np.kron(np.eye(2), end.state.frame)
+    return np.asarray(axes.T @ covariance @ axes + loose)
+
+
+def _uncertainty(covariance: Array | None, element: Element) -> tuple[float, float]:
     """Standard deviations of an element's direction (radians) and place (RMS radii), each where it is least certain.
 
-    The covariance of the joint refinement is that of a small turn w and a shift of the common frame: a direction u
-    moves by w x u, a plane along its normal, an axis across itself. To it comes what nobody saw, along the axes of
-    space [6, 6].
+    The group turns by a small w: a direction u moves by w x u. It shifts: a plane along its normal, an axis across
+    itself.
     """
-    if len(history) < 2 and not slack.any():
+    if covariance is None:
         return math.nan, math.nan
-    covariance = slack
-    if history:
-        axes = np.kron(np.eye(2), history[-1].state.frame)
-        covariance = axes.T @ history[-1].covariance @ axes + slack
     u = element.operations.direction
     cross = cross_matrix(u)
     along = np.outer(u, u)

@@ -170,6 +170,38 @@ def refine(
             return
 
 
+def answered(cloud: LocalPlanes, end: Iterate, reach: float, *, stride: int = 1) -> Array:
+    """The covariance [6, 6] of the end of a fit, by what of the pairs' information tells where the operations stand.
+
+    In noise pairs seem to know more. Normals of a round wall point a little to either side, so that any turn about its
+    axis seems to be told; and of points that fill a volume one is the nearest wherever they are moved. Moved by `reach`
+    to either side (radians, RMS radii), operations would be led all the way back if all of it told where they stand;
+    what they are led back by is the part that does. The rest only adds to what chance leads astray, the less so the
+    more planes share a point: one that tells nothing is no neighbour's double.
+
+    Args:
+        cloud: local planes, normalised units.
+        end: the last iterate.
+        reach: how far operations are moved, as far as a start may be off.
+        stride: use every stride-th local plane as a source.
+    """
+
+    def led(aside: Array) -> Array:
+        state = end.state.moved(aside)
+        pairs = match(cloud, state.motions, reach, stride=stride)
+        return _solve(np.stack([pair_gram(cloud, p) for p in pairs]), state, 0.0)[0].x
+
+    variances, ways = np.linalg.eigh(end.covariance)
+    for k in np.flatnonzero(variances > DOUBLE * variances[-1]):
+        aside = reach * ways[:, k]
+        back = float(ways[:, k] @ (led(-aside) - led(aside))) / (2.0 * reach)
+        told = min(max(back, DOUBLE), 1.0)
+        more = (1.0 + (1.0 - told) / (cloud.redundancy * told)) / told
+        # Where nothing is told all of half a turn is as likely.
+        variances[k] = min(more * variances[k], math.pi**2 / 12.0)
+    return (ways * variances) @ ways.T
+
+
 def _remaining(x: Array, last: Array) -> float:
     """Factor that sums the geometric series of the steps to come.
 

@@ -108,6 +108,11 @@ class Surface:
         return self.viewed or (self.openings is not None and bool(self.openings.line.any()))
 
     @property
+    def is_noisy(self) -> bool:
+        """Whether noise leaves no planes to the smallest neighbourhoods, or no surface at all."""
+        return self.cloud.body == "volume" or (self.skin is not None and self.skin.noisy)
+
+    @property
     def lacks_much(self) -> bool:
         """Whether much of it may be missing: what it ends at is no whim of the sample, or it stands on something."""
         return self.is_open and self.openings is not None and self.openings.hide_much
