@@ -173,11 +173,13 @@ def refine(
 def answered(cloud: LocalPlanes, end: Iterate, reach: float, *, stride: int = 1) -> Array:
     """The covariance [6, 6] of the end of a fit, by what of the pairs' information tells where the operations stand.
 
-    In noise pairs seem to know more. Normals of a round wall point a little to either side, so that any turn about its
-    axis seems to be told; and of points that fill a volume one is the nearest wherever they are moved. Moved by `reach`
-    to either side (radians, RMS radii), operations would be led all the way back if all of it told where they stand;
-    what they are led back by is the part that does. The rest only adds to what chance leads astray, the less so the
-    more planes share a point: one that tells nothing is no neighbour's double.
+    In noise pairs seem to know more. Normals of a round wall lean a little to either side, so that any turn about its
+    axis seems to be told; and of points that fill a volume one is the nearest wherever they are moved. If all that
+    pairs say told where the operations stand, these would be led all the way back from where they are moved aside by
+    `reach` (radians, RMS radii). The part of the way that they are is the part of the information H that tells. Chance
+    leads them astray by what all of it says, the variance v of a pair for each: those that tell err together with the
+    `redundancy` of planes that share their points, the rest each for itself. So the covariance is v (redundancy told +
+    1 - told) / (told^2 H), where the fit says v redundancy / H.
 
     Args:
         cloud: local planes, normalised units.
@@ -196,7 +198,7 @@ def answered(cloud: LocalPlanes, end: Iterate, reach: float, *, stride: int = 1)
         aside = reach * ways[:, k]
         back = float(ways[:, k] @ (led(-aside) - led(aside))) / (2.0 * reach)
         told = min(max(back, DOUBLE), 1.0)
-        more = (1.0 + (1.0 - told) / (cloud.redundancy * told)) / told
+        more = (told + (1.0 - told) / cloud.redundancy) / told**2
         # Where nothing is told all of half a turn is as likely.
         variances[k] = min(more * variances[k], math.pi**2 / 12.0)
     return (ways * variances) @ ways.T
