@@ -501,12 +501,12 @@ def test_a_sharp_rim_is_no_border(half_height):
     assert made.openings.border[out > out.max() - 0.02].mean() > 0.8
 
 
-@pytest.mark.parametrize(("name", "count"), [("cross", 20000), ("rotor5", 20000), ("rotor5", 2000)])
-def test_corners_are_no_border_and_a_hole_beside_them_is_one(name, count):
+@pytest.mark.parametrize("name", ["cross", "rotor5"])
+def test_corners_are_no_border_and_a_hole_beside_them_is_one(name):
     """All that is near a corner lies to one side of it, and so it does nowhere beside it."""
     mesh, rng = specimen("shape", name)[0], np.random.default_rng(29)
     for _ in range(3):
-        assert not surface_of(posed(sample(mesh, count, 0.0, rng), 30)[0]).is_open
+        assert not surface_of(posed(sample(mesh, 20000, 0.0, rng), 30)[0]).is_open
     whole = sample(mesh, 20000, 0.0, rng)
     assert surface_of(whole[np.linalg.norm(whole - whole[0], axis=1) > 0.15 * mesh.diagonal]).is_open
 

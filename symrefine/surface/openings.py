@@ -6,6 +6,7 @@ cameras are known, they say it better: a patch in space that they saw to be free
 clump of strays hides what it covers, and its own rim is not told from the surface.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -264,7 +265,7 @@ def openings(
         aside[floor.meets(cloud.points, cloud.beside)] = 0.0
     far = _lines(cloud, (aside > FAR_ASIDE) & ~(cloud.lonely & strays))
     far[far] = ~_folded(cloud.points[far], points, tree, None if near is None else near[far])
-    is_open = width <= WIDEST and far.mean() >= least * width and _is_long(cloud.points[far], cloud.beside, width)
+    is_open = width <= WIDEST and far.mean() >= least * width and _is_long(cloud.points[far], width)
     evident = bool(is_open and far.mean() > EVIDENT * width)
     if blurred or not is_open:
         closed = Openings(line=none, border=none, evident=evident, clumps=clumps, floor=floor)
@@ -357,16 +358,16 @@ def _folded(at: Array, points: Array, tree: Tree, near: Index | None) -> Mask:
     return _together(at, parted, AROUND + 1) > PARTED
 
 
-def _is_long(points: Array, beside: float, width: float) -> bool:
+def _is_long(points: Array, width: float) -> bool:
     """Whether some of points [N, 3] stand in a row that is longer than neighbourhoods are wide (RMS radii).
 
-    At the corner of a box all that is near lies to one side, too, but so it does nowhere beside the corner. What lies
-    within `beside` of another one hangs together with it.
+    At the corner of a box all that is near lies to one side, too, but so it does nowhere beside the corner. Points hang
+    together whose neighbourhoods overlap, discs of the square root of two RMS radii.
     """
     if not len(points):
         return False
     away, near = Tree(points).query(points, min(AROUND, len(points)))
-    linked = away < beside
+    linked = away < 2.0 * math.sqrt(2.0) * width
     part = connected_parts(np.nonzero(linked)[0], near[linked], len(points))
     middles = np.stack([np.bincount(part, column) for column in points.T], axis=1) / np.bincount(part)[:, None]
     return bool(np.linalg.norm(points - middles[part], axis=1).max() > width)
