@@ -1,9 +1,11 @@
 """The group that permutes points, found from nothing but the points."""
 
+from itertools import islice
+
 import numpy as np
 import pytest
 
-from symrefine.fit.anchors import permuting_group
+from symrefine.fit.anchors import permuting_groups
 from symrefine.fit.vertices import exact_symmetry
 from symrefine.geometry import random_orthogonal, unit
 from symrefine.groups import PointGroup, point_group
@@ -14,6 +16,11 @@ NAMES = (
     *("Cs", "Ci", "C2", "C7", "C2v", "C5v", "C3h", "S4", "S10", "D2", "D9", "D2d", "D5d", "D2h", "D7h"),
     *("T", "Td", "Th", "O", "Oh", "I", "Ih", "C60", "D48h"),
 )
+
+
+def permuting_group(points, labels, within, *, every=False):
+    """What some hundreds of the points tell, or all of them; None where they cannot."""
+    return next(islice(permuting_groups(points, labels, within), int(every), None), None)
 
 
 def orbits(group, rng, count=3):

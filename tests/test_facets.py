@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from symrefine.fit.facets import Facets
+from symrefine.fit.triangles import Triangles
 from symrefine.geometry import random_orthogonal, unit
 
 WITHIN = 1e-5
@@ -15,7 +16,7 @@ ONE_WAY, OTHER_WAY = np.array([[0, 1, 2], [0, 2, 3]]), np.array([[0, 1, 3], [1, 
 def told(points, faces, labels=None, within=WITHIN):
     """Of which facet triangles are, and what tells the facets."""
     labels = np.zeros(len(faces), dtype=int) if labels is None else np.asarray(labels)
-    facets = Facets.flat(points, faces, labels, within)
+    facets = Facets.flat(Triangles.of(points, faces, labels), within)
     return facets.of, facets.prints(np.arange(len(points)))
 
 

@@ -79,7 +79,7 @@ def looked_at(
     sideways, stays where the fit put it.
     """
     state, error, history = start.roughly_framed(), start_error(surface), list[Iterate]()
-    stride = surface.stride(max(GLANCE, LOOK // len(state.standard)), matched=True)
+    stride = look_stride(surface, len(state.standard))
     for iterate in refine(surface.cloud, state, start_error_rad=error, stride=stride):
         history.append(iterate)
         if iterate.converged or iterate.index < SHORT:
@@ -111,6 +111,11 @@ def looked_at(
         aside, needs = slid(surface, aside, needs, useful)
     needs = math.hypot(needs, asked)
     return Look(placed=aside, history=tuple(history), needs=needs, error_rad=min(error, RIM * off))
+
+
+def look_stride(surface: Surface, operations: int) -> int:
+    """Stride that leaves local planes enough for a fit of so many operations on a few points."""
+    return surface.stride(max(GLANCE, LOOK // operations), matched=True)
 
 
 def least_around(surface: Surface, start: Placed, history: Sequence[Iterate]) -> Placed:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from symrefine.clock import Clock
 from symrefine.decide.hypotheses import Element, Hypothesis, fitted, judged
-from symrefine.decide.looks import COARSE, start_error
+from symrefine.decide.looks import COARSE, look_stride, start_error
 from symrefine.decide.place import slack
 from symrefine.decide.posterior import NEAR, Decision, alternatives
 from symrefine.detection.examination import Examined, examined
@@ -21,7 +21,6 @@ from symrefine.fit.placed import Placed
 from symrefine.fit.refine import answered
 from symrefine.fit.vertices import OnVertices
 from symrefine.geometry import Array, Axis, Plane, cross_matrix, positive
-from symrefine.samples import GLANCE, LOOK
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.surface import Surface
@@ -318,7 +317,7 @@ def _covariance(surface: Surface, chosen: Hypothesis) -> Array | None:
         return loose if loose.any() else None
     end, covariance = chosen.history[-1], chosen.history[-1].covariance
     if surface.is_noisy:
-        stride = surface.stride(max(GLANCE, LOOK // len(end.state.standard)), matched=True)
+        stride = look_stride(surface, len(end.state.standard))
         covariance = answered(surface.cloud, end, start_error(surface), stride=stride)
     axes = np.kron(np.eye(2), end.state.frame)
     return np.asarray(axes.T @ covariance @ axes + loose)

@@ -7,7 +7,6 @@ few others share leave few operations to ask. Where all are as far, on a sphere,
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice
 
 import numpy as np
 
@@ -28,11 +27,6 @@ LARGEST, CANDIDATES = 5_000_000, 20_000
 AROUND = 6
 # Points that operations are asked of in turn: most fail at once.
 PROBES = (4, 40, 400)
-
-
-def permuting_group(points: Array, labels: Index | None, within: float, *, every: bool = False) -> PointGroup | None:
-    """The first of `permuting_groups`, or with `every` the second; None where it cannot be told."""
-    return next(islice(permuting_groups(points, labels, within), int(every), None), None)
 
 
 def permuting_groups(points: Array, labels: Index | None, within: float) -> Iterator[PointGroup | None]:

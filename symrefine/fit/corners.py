@@ -61,11 +61,10 @@ def corners(shape: Shape, center: Array, diagonal: float, within: float) -> Iter
         return
     triangles = Triangles.of(own.points, *_once(own.back[shape.faces], shape.labels))
     thick = triangles.only(~triangles.slivers(SINGLE))
-    several = Facets.several(thick, within)
-    flat = Facets.single(thick.faces, thick.labels) if several is None else several
+    flat = Facets.flat(thick, within)
     least = flat.straight(own.points, within)
     if 0 < len(ends := least.corners) < len(own.points):
-        yield Corners(points=own.points[ends], labels=None, facets=(lambda: least.of_these(ends),))
+        yield Corners(points=own.points[ends], labels=None, facets=(cache(lambda: least.of_these(ends)),))
     single = cache(lambda: Facets.single(triangles.faces, triangles.labels))
     yield Corners(points=own.points, labels=None, facets=(single, lambda: flat))
 

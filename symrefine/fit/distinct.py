@@ -1,7 +1,6 @@
 """The distinct points of a shape: those that files write again for every face are one."""
 
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
@@ -9,6 +8,7 @@ from symrefine.fit.ordered import ordered
 from symrefine.geometry import Array, unit
 from symrefine.groups.standard import GOLDEN
 from symrefine.shape import Index, Shape
+from symrefine.surface.neighbourhoods import connected_parts
 from symrefine.surface.tree import pairs_within
 
 
@@ -43,7 +43,7 @@ class Distinct:
             one, other = _touching(local[rows], weld).T
             alike = np.ones(len(one), dtype=bool) if labels is None else labels[rows[one]] == labels[rows[other]]
             if alike.any():
-                part = connected(len(rows), one[alike], other[alike])
+                part = connected_parts(one[alike], other[alike], len(rows))
                 rows, back = rows[np.unique(part, return_index=True)[1]], part[back]
         return cls(points=local[rows], rows=rows, back=back, labels=None if labels is None else labels[rows])
 
@@ -67,14 +67,3 @@ def _touching(points: Array, radius: float) -> Index:
         near = here[np.sqrt((apart**2).sum(axis=0)) <= radius]
         found.append(np.column_stack([order[near], order[near + step]]))
     return pairs_within(points, radius)
-
-
-def connected(count: int, one: Index, other: Index) -> Index:
-    """Which connected part each of so many things is of, where pairs are connected; numbered as they come."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    # Numbers that it would have to copy into narrower ones otherwise.
-    ends = (one.astype(np.int32), other.astype(np.int32)) if count <= np.iinfo(np.int32).max else (one, other)
-    graph = coo_array((np.ones(len(one)), ends), shape=(count, count))
-    return cast(Index, connected_components(graph, directed=False)[1].astype(np.intp))

@@ -10,12 +10,11 @@ from typing import cast
 
 import numpy as np
 
-from symrefine.fit.distinct import connected
 from symrefine.fit.ordered import ordered
 from symrefine.fit.triangles import Triangles
 from symrefine.geometry import Array, Mask, dots
 from symrefine.shape import Index
-from symrefine.surface.neighbourhoods import renumbered
+from symrefine.surface.neighbourhoods import connected_parts, renumbered
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,22 +42,16 @@ class Facets:
         return cls._around(faces, labels, cast(Index, np.arange(len(faces))), 0.0)
 
     @classmethod
-    def flat(cls, points: Array, faces: Index, labels: Index, within: float) -> "Facets":
-        """Triangles [F, 3] of points [N, 3] put together where corners are out of the plane by no more than `within`.
+    def flat(cls, triangles: Triangles, within: float) -> "Facets":
+        """Triangles put together where corners are out of the plane by no more than `within`; those of the same label.
 
-        Only those of the same label [F].
+        Each is by itself where no two are.
         """
-        triangles = Triangles.of(points, faces, labels)
-        return cls.several(triangles, within) or cls.single(faces, labels)
-
-    @classmethod
-    def several(cls, triangles: Triangles, within: float) -> "Facets | None":
-        """The same of triangles that are measured; None where every one is by itself."""
         faces, labels = triangles.faces, triangles.labels
         near, far = triangles.pairs(within)
         if not len(near):
-            return None
-        of = connected(len(faces), near, far)
+            return cls.single(faces, labels)
+        of = connected_parts(near, far, len(faces))
         rows = np.flatnonzero((np.bincount(of) > 1)[of])
         of = renumbered(of[rows], len(faces))[1]
         normals, off = triangles.planes(rows, of)
@@ -66,7 +59,7 @@ class Facets:
         bent = np.zeros(normals.shape[1], dtype=bool)
         bent[of[off > within]] = True
         if bent.all():
-            return None
+            return cls.single(faces, labels)
         whole = ~bent[of]
         rows, of = rows[whole], (np.cumsum(~bent) - 1)[of[whole]]
         against = np.einsum("if,if->f", triangles.across[:, rows], normals[:, ~bent][:, of]) < 0.0
@@ -142,7 +135,7 @@ def _longer(facets: Facets, points: Array, within: float) -> Facets:
     into, out = _passing(facets, points, within)
     if not len(into):
         return facets
-    run = connected(len(facets.edges), into, out)
+    run = connected_parts(into, out, len(facets.edges))
     # A run starts where none goes on into it; what goes round and round has no such end.
     starts, ends = np.ones((2, len(run)), dtype=bool)
     starts[out] = ends[into] = False

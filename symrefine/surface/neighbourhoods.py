@@ -152,8 +152,10 @@ def connected_parts(one: Index, other: Index, count: int) -> Index:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    links = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
-    return np.asarray(connected_components(links, directed=False)[1])
+    # Numbers that it would have to copy into narrower ones otherwise.
+    ends = (one.astype(np.int32), other.astype(np.int32)) if count <= np.iinfo(np.int32).max else (one, other)
+    links = coo_array((np.ones(len(one)), ends), shape=(count, count))
+    return np.asarray(connected_components(links, directed=False)[1].astype(np.intp))
 
 
 def renumbered(chosen: Index, count: int) -> tuple[Index, Index]:
