@@ -17,6 +17,7 @@ from symrefine.decide.ends import (
 from symrefine.decide.hypotheses import (
     Hypothesis,
     belief_in_as_much,
+    doubtless,
     fitted,
     has_all,
     hidden_need,
@@ -160,9 +161,14 @@ def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tup
 
 def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
     """The pool with candidates fitted, but for those that the group so far has anyway."""
-    parts: list[Placed] = []
+    parts, inside = list[Placed](), 0
     for start, glance in _glanced(surface, pool, starts):
         if not pool.wants(start) or pool.shows(start, glance):
+            continue
+        # Parts of what is round beyond doubt only matter to smaller tolerances, and the first of them tell.
+        clear = not pool.largest.group.is_finite and pool.largest.need <= doubtless(surface)
+        inside += clear and pool.largest.holds(start)
+        if inside > FOLLOWED:
             continue
         if glance >= hopeless(start_error(surface)):
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
@@ -200,8 +206,6 @@ def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
     Where the largest has it already and holds worse, that is the largest of those in it that need nothing; of what is
     round any two mirrors through its axis make some fold, which says nothing.
     """
-    if pool.largest.holds(start) and not pool.largest.group.is_finite:
-        return pool
     exact = [h for h in pool.small if h.need <= pool.nothing and h.elements] if pool.largest.holds(start) else []
     known = max(exact or [pool.largest], key=lambda h: size_of(h.placed))
     if known.holds(start) or has_all(start, known.placed):
