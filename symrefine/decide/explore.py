@@ -102,7 +102,9 @@ def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float
     better = [h for h in pool.small if ALIKE * h.need < pool.largest.need]
     for known in {h.group.name: h for h in (*better, pool.largest)}.values():
         pool = _with(surface, pool, turned_over(evidence, known.placed))
-    nearest = sorted((*pool.looked, *pool.hopeless), key=lambda k: k[1])[:FOLLOWED] if not pool.small else []
+    # Where nothing comes near, what comes nearest is told of.
+    seen = sorted((*pool.looked, *pool.hopeless), key=lambda k: k[1])
+    nearest = seen[:FOLLOWED] if not pool.small and seen and seen[0][1] > COARSE * limit else []
     return replace(pool, small=(*pool.small, *(fitted(surface, start) for start, _ in nearest)))
 
 

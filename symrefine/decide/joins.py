@@ -55,7 +55,7 @@ def generated(
     look = looked_at(surface, placed, COARSE * most)
     if look.needs > most:
         return Hypothesis(placed=placed, elements=(), need=look.needs)
-    if look.needs > (ALIKE if look.settled else COARSE) * close:
+    if look.needs > ALIKE * close:
         return roughly_judged(surface, look, before=before)
     return fitted(surface, look.placed, error_rad=look.error_rad, before=before)
 

@@ -58,11 +58,6 @@ class Look:
     needs: float
     error_rad: float
 
-    @property
-    def settled(self) -> bool:
-        """Whether the fit came to its end."""
-        return self.history[-1].converged
-
 
 def looked_at(
     surface: Surface,
