@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from symrefine.detection.measure import Outliers, is_few
+from symrefine.detection.masses import is_few
+from symrefine.detection.measure import Outliers
 from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
 from symrefine.errors import InputError

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from symrefine.detection.measure import Outliers, floor_under, heavy, is_few
+from symrefine.detection.masses import heavy, is_few
+from symrefine.detection.measure import Outliers, floor_under
 from symrefine.detection.sketch import MANY, is_large, sampled, sketched
 from symrefine.errors import InputError, about
 from symrefine.geometry import LARGEST_TOLERANCE, Array, check_tolerance, tight_diagonal

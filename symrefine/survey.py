@@ -6,7 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from symrefine.detection.measure import floor_under, heavy, is_few
+from symrefine.detection.masses import heavy, is_few
+from symrefine.detection.measure import floor_under
 from symrefine.detection.sketch import is_large, sampled
 from symrefine.errors import DegenerateShapeError
 from symrefine.geometry import Array, ReadOnly

@@ -9,7 +9,8 @@ import pytest
 from experiments.objects.boundary import instance
 from experiments.objects.shapes import bottle, mug, sample, table
 from symrefine import Shape, detect
-from symrefine.detection.measure import doubt, gather, is_few, measure
+from symrefine.detection.masses import is_few
+from symrefine.detection.measure import doubt, gather, measure
 from symrefine.geometry import random_orthogonal
 from symrefine.groups import point_group
 from symrefine.moments.moments import central_moments

@@ -14,7 +14,8 @@ import numpy as np
 from experiments.ecins import SHIPPED, TUNED, Settings, ecins, estimated_normals
 from experiments.ecins.starts import grid_normals
 from experiments.peers.trimesh_inertia import trimesh_symmetry
-from symrefine.detection.measure import ORDER, PARTS, PLANES, gather, measure
+from symrefine.detection.masses import ORDER
+from symrefine.detection.measure import PARTS, PLANES, gather, measure
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError
 from symrefine.fit.matching import match, pair_equations

@@ -10,7 +10,8 @@ from symrefine.align.landscape import harmonic_pair
 from symrefine.align.moment_fit import MomentPair
 from symrefine.align.polish import Polished, Similarity
 from symrefine.align.procrustes import Procrustes, procrustes
-from symrefine.detection.measure import SAMPLES, density_of
+from symrefine.detection.masses import density_of
+from symrefine.detection.measure import SAMPLES
 from symrefine.geometry import Array, Isometry, tight_diagonal
 from symrefine.moments.moments import Moments, central_moments
 from symrefine.moments.quadrature import sample_surface

@@ -5,7 +5,8 @@ import numpy as np
 from symrefine.align.alignment import OK
 from symrefine.align.moment_fit import ROUNDING
 from symrefine.align.pair import Side, shares
-from symrefine.detection.measure import SAMPLES, class_moments
+from symrefine.detection.masses import class_moments
+from symrefine.detection.measure import SAMPLES
 from symrefine.geometry import Array
 from symrefine.moments.moments import Moments, central_moments, deviations, tensor_index
 from symrefine.moments.quadrature import mesh_nodes

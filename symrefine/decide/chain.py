@@ -91,7 +91,7 @@ def _best(tried: Sequence[Hypothesis], hidden: float, noise: float) -> Hypothesi
         return need, -size_of(found.placed), mean
 
     best = min((h for h in tried if h.elements), key=rank, default=None)
-    if best is None or best.need > hidden:
+    if best is None:
         return best
     apart, most = [best.placed], max(ALIKE * best.need, noise)
     for other in sorted((h for h in tried if h.elements and h.need <= most), key=rank):

@@ -165,7 +165,7 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
     """The pool with candidates fitted, but for those that the group so far has anyway."""
     parts, inside = list[Placed](), 0
     for start, glance in _glanced(surface, pool, starts):
-        if not pool.wants(start) or pool.shows(start, glance):
+        if not pool.wants(start) or pool.shows(start, glance, whole=not surface.is_open):
             continue
         # Parts of what is round beyond doubt only matter to smaller tolerances, and the first of them tell.
         clear = not pool.largest.group.is_finite and pool.largest.need <= doubtless(surface)

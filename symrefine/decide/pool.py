@@ -77,10 +77,11 @@ class Pool:
         """Whether a group was fitted at this very place."""
         return any(is_at(h.placed, placed) for h in self.small)
 
-    def shows(self, start: Placed, glance: float) -> bool:
+    def shows(self, start: Placed, glance: float, *, whole: bool = True) -> bool:
         """Whether the largest group carries a group that was seen onto this one, which looks no better at a glance.
 
         Of what is in a continuous group something may hold better than the rest, and a start is too rough to tell.
+        Where the `whole` was not seen, operations carry what was onto what was not: one shows itself alone there.
         """
         if not self.largest.group.is_finite and self.largest.holds(start):
             return False
@@ -93,7 +94,9 @@ class Pool:
             if end.group.name == name and seemed <= glance and np.linalg.norm(end.center - start.center) < START_ERROR
         ]
         return any(
-            is_same(image, start, within) for p, within in alike for image in _images(p, self.largest.group, start)
+            is_same(image, start, within)
+            for p, within in alike
+            for image in (_images(p, self.largest.group, start) if whole else [p])
         )
 
     def with_failed(self, failed: Hypothesis | None) -> "Pool":

@@ -10,15 +10,16 @@ import numpy as np
 
 from symrefine.decide.doubts import on_a_line, set_by_strays
 from symrefine.decide.posterior import least_told
+from symrefine.detection.masses import class_moments, classes_of, heavy, is_few, mass_of
 from symrefine.errors import InputError
 from symrefine.geometry import Array, tight_diagonal
-from symrefine.moments.moments import PARTS, Moments, shape_moments
-from symrefine.moments.quadrature import mesh_nodes, sample_surface
+from symrefine.moments.moments import PARTS, Moments
+from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import FixedSubspace, fixed_subspace
-from symrefine.propose.candidates import Evidence
+from symrefine.propose.candidates import START_ERROR, Evidence
 from symrefine.samples import COUNT
-from symrefine.shape import Index, Shape, kinds_of_mass
+from symrefine.shape import Index, Shape
 from symrefine.surface.cameras import Camera, cameras, outwards
 from symrefine.surface.clumps import Clump
 from symrefine.surface.drift import Drift
@@ -26,14 +27,12 @@ from symrefine.surface.floor import Floor, floor_of
 from symrefine.surface.misses import TOLERANCE, noise_distances, sampling_distances
 from symrefine.surface.neighbourhoods import fills_volume
 from symrefine.surface.openings import NEIGHBOURS, openings
-from symrefine.surface.sampling import distinct, sampling
+from symrefine.surface.sampling import distinct, face_densities, sampling
 from symrefine.surface.skin import FEW, LocalPlanes, drawn, isolated_points, make_skin
 from symrefine.surface.surface import Surface
 from symrefine.surface.tree import Tree, morton_order
 
 Outliers = Literal["auto", "floor", "none"]
-# Order of the moments.
-ORDER = 8
 # Local planes of a cloud; points that a volume is known by, and planes of a mesh, whose normals are exact.
 PLANES, SAMPLES = 8000, 20000
 # Share of the points of a scan that others hide from the cameras given, from which on these are wrong: of true views,
@@ -57,6 +56,7 @@ class Measured:
         blobs: the same of each group of points still in it that fills a volume beside the body.
         solid: whether some of its points show no surface at any width, so that all may fill a volume.
         classes: of its points or faces, that must match.
+        density: how much surface an area of each face stands for; None where all do for as much.
         moments: to order 8.
         vectors: the n-tuples of them.
     """
@@ -70,6 +70,7 @@ class Measured:
     blobs: tuple[tuple[Index, Array], ...]
     solid: bool
     classes: Index | None
+    density: Array | None
     moments: Moments
     vectors: NTuples
 
@@ -151,11 +152,14 @@ def measure(
             shape = replace(shape.chosen(seen.even), weights=seen.shares)
         elif len(seen.kept) < len(shape.points):
             shape = shape.chosen(seen.kept)
-    classes = _classes(shape)
+    classes = classes_of(shape)
+    of_area = shape.faces is not None and shape.measure == "surface"
+    density = face_densities(shape, SAMPLES, START_ERROR, np.random.default_rng(0)) if of_area else None
     if whole is not None and shape is every:
         moments = whole
     else:
-        moments = class_moments(shape, classes, parts=0 if is_few(shape) or shape.faces is not None else PARTS)
+        parts = 0 if is_few(shape) or shape.faces is not None else PARTS
+        moments = class_moments(shape, classes, parts=parts, density=density)
     vectors = ntuples(moments)
     return Measured(
         shape=shape,
@@ -167,6 +171,7 @@ def measure(
         blobs=blobs,
         solid=solid,
         classes=classes,
+        density=density,
         moments=moments,
         vectors=vectors,
     )
@@ -192,16 +197,6 @@ def floor_under(shape: Shape, outliers: Outliers) -> Floor | None:
     kept = sampling(own.points, np.random.default_rng(0), outliers=True, groups=False).kept
     found = floor_of(own.points[kept], None if own.viewpoint is None else own.viewpoint[kept])
     return None if found is None or np.count_nonzero(~found.covers(own.points)) <= FEW else found
-
-
-def heavy(shape: Shape) -> Shape:
-    """The points that weigh anything."""
-    return shape if shape.weights is None else shape.chosen(np.flatnonzero(shape.weights > 0.0))
-
-
-def is_few(shape: Shape) -> bool:
-    """Whether the points are few enough to stand for themselves."""
-    return shape.faces is None and len(shape.points) <= FEW
 
 
 def doubt(measured: Measured, surface: Surface, tolerance: float) -> str:
@@ -263,48 +258,10 @@ def _above(value: float) -> str:
     return f"{math.ceil(value / digit) * digit:.2g}"
 
 
-def _classes(shape: Shape) -> Index | None:
-    """Classes 0, 1, ... of the points (faces, for a mesh) that must match: labels, and masses where points are few."""
-    kinds = [] if shape.labels is None else [shape.labels]
-    if is_few(shape) and shape.weights is not None:
-        kinds.append(kinds_of_mass(shape.weights))
-    if not kinds:
-        return None
-    classes = np.unique(np.stack(kinds), axis=1, return_inverse=True)[1].reshape(-1)
-    return classes if classes.any() else None
-
-
-def masses(shape: Shape) -> Array:
-    """Masses [N] of the points of a cloud, where each class has a density of its own."""
-    classes = _classes(shape)
-    return _mass(shape) if classes is None else _mass(shape) * density_of(classes)
-
-
-def _mass(shape: Shape) -> Array:
-    return np.ones(len(shape.points)) if shape.weights is None else shape.weights
-
-
-def density_of(classes: Index) -> Array:
-    """Densities of classes [N]: multiples of the golden ratio modulo 1 keep any number of them apart."""
-    return np.asarray(0.5 + np.modf(0.6180339887498949 * (classes + 1))[0])
-
-
-def class_moments(shape: Shape, classes: Index | None, parts: int, order: int = ORDER) -> Moments:
-    """Moments of the shape in which each class has a density of its own, so that they know one class from another."""
-    if classes is None:
-        return shape_moments(shape, order, parts=parts)
-    if shape.faces is None:
-        return shape_moments(replace(shape, weights=_mass(shape) * density_of(classes)), order, parts=parts)
-    density = density_of(classes)
-    nodes, weights = mesh_nodes(replace(shape, measure="surface"), order)
-    heavier = weights * np.repeat(density, len(weights) // len(density))
-    return shape_moments(Shape(points=shape.points[0] + nodes, weights=heavier), order)
-
-
 def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLERANCE) -> tuple[Evidence, Surface]:
     """What proposals are made of, and the surface that judges them."""
     shape, moments = measured.shape, measured.moments
-    points, normals, weights, labels = _cloud(shape, measured.classes, rng)
+    points, normals, weights, labels = _cloud(measured, rng)
     local = (points - moments.center) / moments.scale
     evidence = Evidence(
         moments=moments,
@@ -389,11 +346,11 @@ def _volume(points: Array, labels: Index | None, tolerance: float, rng: np.rando
     return Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, drift=drift, tolerance=tolerance)
 
 
-def _cloud(
-    shape: Shape, classes: Index | None, rng: np.random.Generator
-) -> tuple[Array, Array | None, Array, Index | None]:
+def _cloud(measured: Measured, rng: np.random.Generator) -> tuple[Array, Array | None, Array, Index | None]:
     """Points, normals, weights and classes: samples with exact normals for a mesh, else the points themselves."""
+    shape, classes, density = measured.shape, measured.classes, measured.density
     if shape.faces is not None:
         points, normals, face = sample_surface(shape, 2 * SAMPLES, rng)
-        return points, normals, np.ones(len(points)), None if classes is None else classes[face]
-    return shape.points, shape.normals, _mass(shape), classes
+        weights = np.ones(len(points)) if density is None else density[face]
+        return points, normals, weights, None if classes is None else classes[face]
+    return shape.points, shape.normals, mass_of(shape), classes

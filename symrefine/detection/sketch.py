@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.clock import passed
-from symrefine.detection.measure import ORDER, Measured, masses
+from symrefine.detection.masses import ORDER, masses
+from symrefine.detection.measure import Measured
 from symrefine.geometry import Array
 from symrefine.moments.moments import PARTS, Moments
 from symrefine.moments.running import running_moments

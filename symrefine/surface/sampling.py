@@ -1,16 +1,20 @@
 """How a cloud was sampled: which points belong to no surface, and how much surface each of the others stands for.
 
+Of a mesh, how much surface an area stands for.
+
 A few thousand of the points tell whether there is anything to be done at all; only then all of them are asked. What is
 decided here depends on the surroundings of a point alone, so that it breaks no symmetry.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from symrefine.geometry import Array, Mask, hull_volume
-from symrefine.shape import Index
+from symrefine.moments.quadrature import sample_surface
+from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import clumps, filled
 from symrefine.surface.misses import SHARES
 from symrefine.surface.neighbourhoods import FLAT, WIDEST, fills_volume, planes_of, thickness_of
@@ -216,6 +220,32 @@ def _is_uneven(around: Surroundings, points: Array) -> bool:
     return len(around.points) < len(points) and _is_uneven(Surroundings.of(points), points)
 
 
+def face_densities(mesh: Shape, count: int, off: float, rng: np.random.Generator) -> Array | None:
+    """How much surface an area of each face stands for [F], up to a factor; None where that makes no odds.
+
+    Where one side is rougher than the other, or has an inner wall, it has more area, which draws the centroid to it. So
+    many samples of the mesh tell it as points of a cloud do. Faces that none lies on take what the nearest tells.
+
+    Args:
+        mesh: whose areas are masses.
+        count: samples.
+        off: how far off the centroid may be (RMS radii).
+        rng: of the samples.
+    """
+    assert mesh.faces is not None
+    samples, _, face = sample_surface(mesh, count, rng)
+    points = (samples - samples.mean(axis=0)) / math.sqrt(samples.var(axis=0).sum())
+    some = around_some(points, rng)
+    if np.linalg.norm(np.average(some.points, axis=0, weights=_evenness(some)) - some.points.mean(axis=0)) <= off:
+        return None
+    told = _evenness(Surroundings.of(points))
+    held = np.bincount(face, minlength=len(mesh.faces))
+    density = np.bincount(face, told, len(mesh.faces)) / np.maximum(held, 1)
+    middles = mesh.points[mesh.faces[held == 0]].mean(axis=1)
+    density[held == 0] = told[Tree(samples).nearest(middles)[1]]
+    return np.asarray(density / density.mean())
+
+
 def _trend(points: Array, values: Array) -> float:
     """Standard deviation of the linear function of points [N, 3] that comes closest to values [N]."""
     place = np.column_stack([np.ones(len(values)), points - points.mean(axis=0)])
@@ -228,11 +258,15 @@ def _evened(points: Array, rng: np.random.Generator) -> tuple[Index, Array]:
     Weights alone would even out moments. But a dense part is known more finely than its image in a sparse one, and what
     the two miss one another by is no noise that halves of the cloud would show.
     """
-    around = Surroundings.of(points)
-    area = _area(around)[around.near].mean(axis=1)
+    area = _evenness(Surroundings.of(points))
     chance = np.minimum(DENSER * area / np.quantile(area, 1.0 - SHARES[2]), 1.0)
     even = np.flatnonzero(rng.random(len(points)) < chance)
     return even, (area / chance)[even]
+
+
+def _evenness(around: Surroundings) -> Array:
+    """How much surface [N] the points around each stand for in the mean."""
+    return np.asarray(_area(around)[around.near].mean(axis=1))
 
 
 def _area(around: Surroundings) -> Array:
