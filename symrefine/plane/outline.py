@@ -128,14 +128,33 @@ def _seen(line: Array, aside: Array, diagonal: float, least: float, rng: np.rand
 
 def _telling(raster: Raster) -> Array:
     """The levels whose outlines tell apart: one, if the weights between the levels are only the soft edge."""
-    top = float(np.quantile(raster.values[raster.values > 0], 0.95))
+    top = _top(raster.values)
     lengths_at = _lengths_at(raster.values / top)
     levels = _beside_tones(lengths_at) * top
     found = outlines(raster, levels)
-    soft = np.count_nonzero((raster.values >= levels[1]) & (raster.values < levels[2]))
+    between_levels = (raster.values >= levels[1]) & (raster.values < levels[2])
+    is_edge = np.count_nonzero(between_levels) <= LONGER * len(found[0]) and not _has_tones(raster, levels)
     kept = levels[[_tells(p) for p in found]]
-    kept = levels[:1] if soft <= LONGER * len(found[0]) or not len(kept) else kept
+    kept = levels[:1] if is_edge or not len(kept) else kept
     return np.concatenate([kept, _above(raster, top, lengths_at)])
+
+
+def _top(values: Array) -> float:
+    """The weight that only one cell in twenty exceeds, of those in no soft edge: what lies between tones is none."""
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    even = (values > 0) & (maximum_filter(values, size=3) <= LONGER * minimum_filter(values, size=3))
+    return float(np.quantile(values[even if even.any() else values > 0], 0.95))
+
+
+def _has_tones(raster: Raster, levels: Array) -> bool:
+    """Whether cells between the levels lie within the object, more of them than count: beside a soft edge it ends."""
+    from scipy.ndimage import minimum_filter
+
+    body = raster.values >= levels[1]
+    # The edge itself is a cell wide, and what it cuts may be either.
+    inner = minimum_filter(body, size=5, mode="constant", cval=0)
+    return bool(np.count_nonzero(inner & (raster.values < levels[2])) > SHARES[-1] * np.count_nonzero(body))
 
 
 def _above(raster: Raster, top: float, lengths_at: Callable[[Array], Index]) -> Array:
