@@ -160,12 +160,13 @@ def _has_tones(raster: Raster, levels: Array) -> bool:
 def _above(raster: Raster, top: float, lengths_at: Callable[[Array], Index]) -> Array:
     """The lowest level [0 or 1] above all the rest at which details stand out, by as much as the levels are apart.
 
-    Grain stands out as well, but its outline hangs on where the level is.
+    Grain stands out as well, but its outline hangs on where the level is; that of a small detail does by as much more
+    as its soft edge is wide.
     """
     step = LEVELS[0] - LEVELS[1]
     levels = np.arange(1.0 + step, float(raster.values.max()) / top, step)
     lengths = lengths_at(levels[:, None] + np.linspace(-0.5, 0.5, STEPS + 1) * step)
-    steady = levels[lengths.max(axis=1) <= LONGER * lengths.min(axis=1)] * top
+    steady = levels[lengths.max(axis=1) <= LONGER**2 * lengths.min(axis=1)] * top
     lines = outlines(raster, steady[:1])
     return steady[:1] if lines and _tells(lines[0]) else np.zeros(0)
 
