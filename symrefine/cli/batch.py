@@ -20,14 +20,7 @@ from symrefine.cli.outputs import (
     write_all,
 )
 from symrefine.cli.signs import counting
-from symrefine.cli.values import (
-    add_class_options,
-    add_detection_options,
-    add_frame_option,
-    add_scan_options,
-    detection_options,
-    millimetres,
-)
+from symrefine.cli.values import add_object_options, detection_options, millimetres
 from symrefine.errors import InputError
 from symrefine.files import text_writer
 
@@ -68,10 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--recursive", action="store_true", help="directories inside directories too")
     add_fleet_options(parser, "file")
-    add_class_options(parser)
-    add_frame_option(parser, otherwise="each of them; with --bop there has to be one")
-    add_scan_options(parser)
-    add_detection_options(parser)
+    add_object_options(parser, otherwise="each of them; with --bop there has to be one")
 
 
 def run(args: argparse.Namespace) -> int:
