@@ -88,9 +88,9 @@ class Detection(Found, BareDetection):
         Raises:
             SymrefineError: there is no display; `save("x.rrd")` and `symrefine view x.rrd --web` do without one.
         """
-        from symrefine.viewer import show
+        from symrefine.viewer import recorded
 
-        return show(self, self.shape)
+        return recorded(self, self.shape).show("detection")
 
     def kinds(self) -> dict[str, Callable[[], Writer]]:
         return Found.kinds(self) | {".rrd": self._recording}
