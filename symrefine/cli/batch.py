@@ -10,15 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from symrefine.cli.fleet import add_fleet_options, executor, write_rows
-from symrefine.cli.outputs import (
-    check_bop,
-    check_outputs,
-    complain,
-    is_quiet,
-    note,
-    print_lines,
-    write_all,
-)
+from symrefine.cli.outputs import check_bop, check_outputs, complain, is_quiet, note, print_lines, write_all
 from symrefine.cli.signs import counting
 from symrefine.cli.values import add_object_options, detection_options, millimetres
 from symrefine.errors import InputError

@@ -65,9 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="millimetres in one unit of PATH: 1000 if it is in metres (default: 1)",
     )
     add_outputs(
-        parser,
-        recording="write the iterations, for `symrefine view`",
-        report="write a page with pictures and tables",
+        parser, recording="write the iterations, for `symrefine view`", report="write a page with pictures and tables"
     )
     parser.add_argument(
         "--threshold",
