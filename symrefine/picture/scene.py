@@ -180,7 +180,7 @@ class Scene:
 def make_scene(detection: Detection, shape: Shape) -> Scene:
     """The scene of a detection; planes are named 1, 2, ... in their order there, axes by their symbol."""
     stage, solid = make_stage(detection, shape), None
-    if are_atoms(detection, shape):
+    if shape.faces is None and detection.surface.cloud.body == "atoms":  # points that stand for themselves
         solid = balls(replace(shape, points=shape.points - detection.center))
         stage = replace(stage, points=solid.points)
     missed_planes, missed_axes = _missed(detection, stage)
@@ -194,11 +194,6 @@ def make_scene(detection: Detection, shape: Shape) -> Scene:
         balls=solid,
         outliers=detection.outliers,
     )
-
-
-def are_atoms(detection: Detection, shape: Shape) -> bool:
-    """Whether the points of a shape stand for themselves."""
-    return shape.faces is None and detection.surface.cloud.body == "atoms"
 
 
 def _scan(detection: Detection, shape: Shape) -> Scan:

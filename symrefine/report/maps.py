@@ -116,13 +116,9 @@ def _facts(found: Alignment, pair: Pair) -> str:
         ("Scale", f"{found.scale:.6g}"),
         ("RMS distance", percent(found.rms)),
         ("Rotation known to", known),
-        *((f"{name} as drawn: {side.name}", str(shares)) for name, side, shares in _told(pair)),
     ]
-    return facts(pairs)
-
-
-def _told(pair: Pair) -> list[tuple[str, Side, Shares]]:
-    return [(n, s, t) for n, s, t in zip(("Source", "Target"), pair.sides, pair.shares(0), strict=True)]
+    drawn = zip(("Source", "Target"), pair.sides, pair.shares(0), strict=True)
+    return facts([*pairs, *((f"{name} as drawn: {side.name}", str(shares)) for name, side, shares in drawn)])
 
 
 def _matrix(found: Alignment, pair: Pair) -> str:
@@ -167,11 +163,7 @@ def _body(pair: Pair, side: Side) -> dict[str, Any]:
         surface = replace(surface, colours=colours)
     parts = packed(surface, side.scene(pair.diagonal), most)
     misses = np.maximum(pair.misses(side.index, parts.pop("places")), 0.0)
-    return {
-        **parts,
-        "outline": outline(side.outline / pair.diagonal),
-        **heat(misses, pair.tolerance),
-    }
+    return {**parts, "outline": outline(side.outline / pair.diagonal), **heat(misses, pair.tolerance)}
 
 
 def _element(index: int, way: Way, pair: Pair, beside: Array) -> dict[str, Any]:
