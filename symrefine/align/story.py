@@ -54,13 +54,10 @@ def align(
     """Orthogonal map and translation that take one object onto another; samplings, densities and formats may differ.
 
     Args:
-        source: a `Shape`, or points [N, n]. Labels count where both have them: only what is of one class meets.
+        source: a `Shape`, or points [N, n].
         target: a `Shape`, or points [M, n].
-        scale: whether the objects may differ in size; then `target ~ scale * matrix @ source + translation`.
-        polish: refine on the points (3-space only); without it the moments have the last word.
-        allow_reflection: whether determinant -1 is an answer.
-        tolerance: largest miss that still counts as agreement, as in `detect`: decides between rivals, and symmetry.
-        seed: of the random choices (samples of meshes, subsets of clouds).
+        scale: and what follows as of `symrefine.align`.
+        tolerance: as a fraction of the diagonal: it decides between rivals, and about symmetry.
 
     Raises:
         InputError: points that cannot be used, of different dimensions, or options out of range.
