@@ -36,7 +36,7 @@ class FlatScene:
         center: [2] what the turns leave in place.
         diagonal: of the smallest box around the object.
         raster: its pixels, or None for points.
-        points: [N, 2] of it; some, where they are many.
+        points: [N, 2] of it; some, where they are many; of pixels, how far they reach.
         lines: mirror lines that were found.
         missed: those of the near misses, None for turns.
         order: of the turns; 1 where there are none.
@@ -62,7 +62,7 @@ def flat_scene(detection: PlanarDetection, shape: Shape) -> FlatScene:
     """What there is to draw."""
     points = shape.points - detection.center
     raster = raster_of(shape.points, shape.weights)
-    missed = [None if m.line is None else m.line for m in detection.near_misses]
+    some = points[:: max(1, -(-len(points) // MOST_POINTS))]
 
     def stroke(line: Plane, name: str, colour: Colour) -> Stroke:
         foot = (line.offset - float(line.normal @ detection.center)) * line.normal
@@ -76,9 +76,12 @@ def flat_scene(detection: PlanarDetection, shape: Shape) -> FlatScene:
         center=detection.center,
         diagonal=detection.diagonal,
         raster=None if raster is None else coarser(raster, MOST_CELLS),
-        points=points[:: max(1, -(-len(points) // MOST_POINTS))] if raster is None else _corners(points),
+        points=some if raster is None else np.stack([points.min(axis=0), points.max(axis=0)]),
         lines=tuple(stroke(found.line, str(k + 1), plane_colour(k)) for k, found in enumerate(detection.lines)),
-        missed=tuple(None if m is None else stroke(m, f"near miss {k}", MISS) for k, m in enumerate(missed, start=1)),
+        missed=tuple(
+            None if m.line is None else stroke(m.line, f"near miss {k}", MISS)
+            for k, m in enumerate(detection.near_misses, start=1)
+        ),
         order=1.0 if detection.rotation is None else detection.rotation.order,
     )
 
@@ -137,10 +140,3 @@ def _draw_object(axes, scene: FlatScene) -> None:  # type: ignore[no-untyped-def
 def shares(raster: Raster) -> Array:
     """How much [H, W] of each cell is object, 0 to 1."""
     return np.asarray(np.clip(raster.values / max(float(np.quantile(raster.values, 0.99)), 1e-300), 0.0, 1.0))
-
-
-def _corners(points: Array) -> Array:
-    """The outermost of many points, which say how far they reach."""
-    angles = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
-    reach = points @ np.stack([np.cos(angles), np.sin(angles)])
-    return np.asarray(points[np.unique(reach.argmax(axis=0))])
