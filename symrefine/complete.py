@@ -6,15 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.detection.masses import is_few
-from symrefine.detection.measure import Outliers
 from symrefine.detection.result import Detection
-from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.fit.placed import Placed
 from symrefine.geometry import Array
 from symrefine.groups.names import TURNS
 from symrefine.shape import Shape
-from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.tree import Tree
 from symrefine.threads import one_thread
 
@@ -50,28 +47,17 @@ class Verdicts:
 
 
 @one_thread()
-def complete(
-    shape: Shape,
-    found: Detection | None = None,
-    *,
-    outliers: Outliers = "auto",
-    tolerance: float = TOLERANCE,
-    seed: int = 0,
-) -> Completion:
+def complete(shape: Shape, found: Detection) -> Completion:
     """The points of a scan and their images where nobody looked, under the group that is found in it.
 
     Args:
         shape: a cloud in 3-space, with its viewpoint where that is known.
-        found: what `detect` found in it; the options that follow are those of `detect` where this is None.
-        outliers: as of `detect`.
-        tolerance: as of `detect`.
-        seed: as of `detect`.
+        found: what `detect` found in it.
 
     Raises:
         InputError: a mesh or atoms, an object without a symmetry, or none that can be decided.
     """
     check_scan(shape)
-    found = detect(shape, outliers=outliers, tolerance=tolerance, seed=seed) if found is None else found
     if found.undetermined or found.point_group == "C1":
         why = found.undetermined or "no symmetry was found"
         raise InputError(f"{shape.source}: nothing to complete it by: {why}")

@@ -1160,7 +1160,8 @@ def test_a_mesh_has_no_viewpoint():
 def test_a_cut_object_is_completed():
     whole = sample(BRICK, 20000, 0.0, np.random.default_rng(22))
     made = damage.cut(BRICK, 0.2, np.random.default_rng(24))
-    full = complete(Shape(points=made.points))
+    scan = Shape(points=made.points)
+    full = complete(scan, detect(scan))
     assert not full.inferred[: len(made.points)].any()
     inferred = full.points[full.inferred]
     assert len(inferred) > 1000
@@ -1170,10 +1171,11 @@ def test_a_cut_object_is_completed():
 
 
 def test_nothing_is_completed_without_a_symmetry():
+    scan = Shape(points=sample(NOTCHED, 8000, 0.0, np.random.default_rng(24)))
     with pytest.raises(InputError, match="nothing to complete it by"):
-        complete(Shape(points=sample(NOTCHED, 8000, 0.0, np.random.default_rng(24))))
+        complete(scan, found := detect(scan))
     with pytest.raises(InputError, match="completion is for clouds"):
-        complete(BRICK)
+        complete(BRICK, found)
 
 
 # Command line

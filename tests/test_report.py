@@ -14,7 +14,6 @@ from experiments.objects.molecule_sets import molecule
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
 from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
-from symrefine.errors import InputError
 from symrefine.files import whole
 from symrefine.geometry import Array, Plane, rotation
 from symrefine.groups import point_group
@@ -31,7 +30,6 @@ from symrefine.picture.scene import Scene, make_scene, make_stage
 from symrefine.picture.space import place_labels
 from symrefine.picture.surface import Surface, make_surface
 from symrefine.plane import detect_planar
-from symrefine.report import draw
 from symrefine.shape import Shape
 
 Case = tuple[Detection, Shape]
@@ -323,7 +321,7 @@ def test_a_picture_of_a_scan_tells_what_its_colours_mean(shapeless: Case, monkey
     assert not any("looked" in text or "outlier" in text for text in written)
 
 
-def test_pictures_of_the_plane_and_of_many_dimensions(tmp_path: Path) -> None:
+def test_pictures_of_the_plane_and_of_many_dimensions() -> None:
     corners = [[1.0, 0.2], [0.3, 0.9], [-1.0, 0.2], [-0.3, 0.9], [0.0, -1.0]]
     rows = np.random.default_rng(1).normal(size=(12, 5))
     rows = np.concatenate([rows, rows * [-1, 1, 1, 1, 1]])
@@ -332,21 +330,10 @@ def test_pictures_of_the_plane_and_of_many_dimensions(tmp_path: Path) -> None:
         (detect_nd(rows), Shape.of(rows)),
     ]
     for found, shape in cases:
-        draw(found, shape, tmp_path / "a.png")
-        picture = pixels((tmp_path / "a.png").read_bytes())
+        picture = pixels(picture_png(found, shape))
         assert picture.shape == (900, 1200, 3)
         assert coloured(picture) > 200
         assert picture_png(found, shape) == picture_png(found, shape)
-
-
-def test_files_are_written_whole_or_not_at_all(shapeless: Case, tmp_path: Path) -> None:
-    draw(*shapeless, tmp_path / "a.png")
-    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
-    with pytest.raises(InputError, match="no directory"):
-        draw(*shapeless, tmp_path / "none" / "a.png")
-    with pytest.raises(InputError, match="is a directory"):
-        draw(*shapeless, tmp_path)
-    assert [p.name for p in tmp_path.iterdir()] == ["a.png"]
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from experiments.objects.drawings import turned
+from experiments.objects.drawings import Drawing, ellipse, turned
 from experiments.objects.icons import DRAWN_SO, ICONS
-from experiments.objects.pictures import fit
+from experiments.objects.pictures import coverage, fit, picture, random_pose
 from experiments.studies import small_pictures as study
-from experiments.studies.small_pictures import Case, answer, examine
+from experiments.studies.small_pictures import Case, answer, examine, loaded
+from symrefine.plane.detection import detect_planar
 
 NAMES = ("arrow 0.16 0.75 0.5", "bent arrow", "gear 6", "ratchet 4", "N DejaVu Sans normal", "F DejaVu Serif bold")
 
@@ -23,6 +24,18 @@ def test_icons_of_64_pixels_are_right(icon: str, quality: int) -> None:
 def test_smaller_ones_are_never_sure_and_wrong(icon: str, side: int) -> None:
     for quality in (0, 75):
         assert answer(Case(icon=icon, side=side, quality=quality)).verdict != "sure and wrong"
+
+
+@pytest.mark.parametrize("quality", [0, 75])
+@pytest.mark.parametrize(("disc", "dot"), [(1.0, 0.6), (0.6, 1.0)])
+def test_a_dot_of_another_grey_leaves_a_disc_one_mirror(disc: float, dot: float, quality: int) -> None:
+    """Four percent of its area, no more cells than a soft edge has."""
+    layers = ((ellipse(0.0, 0.0, 1.0), disc), (ellipse(0.6, 0.0, 0.2), dot))
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        share = coverage(Drawing(name="dot", layers=layers, group="D1"), random_pose(rng, side=56))
+        found = detect_planar(loaded(picture(share, "clean", rng), quality))
+        assert found.point_group == "D1" or found.undetermined
 
 
 def test_what_pixels_hide_is_told() -> None:

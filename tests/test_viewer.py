@@ -199,7 +199,7 @@ def test_a_scan_shows_what_was_seen_and_what_is_inferred(tmp_path: Path) -> None
     assert expected <= entities(path)
     counts = {name: len(column(rows(path, f"/object/{name}")[0], "positions")) for name in ("cloud", "inferred")}
     assert counts["cloud"] <= len(shape.points) - len(detection.outliers)
-    assert counts["inferred"] == len(complete(shape).points) - (len(shape.points) - len(detection.outliers))
+    assert counts["inferred"] == len(complete(shape, detection).points) - (len(shape.points) - len(detection.outliers))
     (eye,) = column(rows(path, "/object/cameras")[0], "positions")
     np.testing.assert_allclose(eye, made.viewpoint[0] - detection.center, rtol=1e-5)
 

@@ -16,8 +16,8 @@ from symrefine.export.records import detection_record
 from symrefine.files import json_text
 from symrefine.geometry import Array, Plane, line_angle_rad
 from symrefine.load import load
+from symrefine.picture.draw import picture_png
 from symrefine.picture.words import count, headline
-from symrefine.report import draw
 from symrefine.report.page import html_page
 from symrefine.shape import Shape
 from symrefine.viewer import record
@@ -111,7 +111,7 @@ def write_results(detection: Detection, shape: Shape, out: Path) -> None:
     options = {"tolerance": detection.tolerance, "measure": shape.measure, "seed": 0}
     report = json_text(detection_record(detection, shape, options=options))
     (out / "report.json").write_text(report, encoding="utf-8")
-    draw(detection, shape, out / "picture.png")
+    (out / "picture.png").write_bytes(picture_png(detection, shape))
     record(detection, shape, out / "recording.rrd")
     (out / "report.html").write_text(html_page(detection, shape), encoding="utf-8", newline="")
 

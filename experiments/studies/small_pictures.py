@@ -63,10 +63,11 @@ def examine(case: Case) -> PlanarDetection:
     """The picture of a case, saved, loaded, and looked at."""
     rng = np.random.default_rng([case.seed, zlib.crc32(case.icon.encode()), case.side])
     image = picture(coverage(ICONS[case.icon], random_pose(rng, case.side)), "clean", rng)
-    return detect_planar(_loaded(image, case.quality))
+    return detect_planar(loaded(image, case.quality))
 
 
-def _loaded(image: Image.Image, quality: int) -> Shape:
+def loaded(image: Image.Image, quality: int) -> Shape:
+    """A picture as a file of it gives it, as PNG, or as JPEG of some quality."""
     file = io.BytesIO()
     if quality:
         image.save(file, "JPEG", quality=quality)

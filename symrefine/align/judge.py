@@ -13,15 +13,16 @@ import numpy as np
 
 from symrefine.align.alike import maps_between
 from symrefine.align.contact import met_by
+from symrefine.align.pair import Side
 from symrefine.align.polish import COARSE, Polished, Similarity, polish
 from symrefine.align.shown import Shown
 from symrefine.decide.maps import Merit, ahead, as_good, score, well_met
 from symrefine.decide.posterior import LEAST
 from symrefine.fit.matching import AGREE
 from symrefine.fit.refine import MAX_OUTER
-from symrefine.geometry import Array, Isometry, Mask, householder
+from symrefine.geometry import Array, Isometry, Mask, householder, tight_diagonal
 from symrefine.ntuples.rank import SIGNIFICANT
-from symrefine.propose.maps import WITHIN, maps_onto_itself
+from symrefine.propose.maps import PLANES, WITHIN, maps_onto_itself
 from symrefine.propose.votes import mirror_votes
 from symrefine.samples import FOLLOWED
 from symrefine.shape import Index
@@ -87,6 +88,22 @@ class Judge:
     target: Shown
     diagonal: float
     tolerance: float
+
+    @classmethod
+    def of(
+        cls, sides: Sequence[Side], units: Sequence[float], tolerance: float, seed: int, planes: int = PLANES
+    ) -> "Judge | None":
+        """Two sides, each about its own centre and in its own units, the coarser one made as fine as the other.
+
+        None where one of them shows no surface: see `Shown.of`.
+        """
+        source, target = (Shown.of(side, unit, seed, planes) for side, unit in zip(sides, units, strict=True))
+        if source is None or target is None:
+            return None
+        finest = min(source.cloud.spacing, target.cloud.spacing)
+        source, target = source.as_fine_as(finest), target.as_fine_as(finest)
+        diagonal = min(tight_diagonal(shown.cloud.points) for shown in (source, target))
+        return cls(source=source, target=target, diagonal=diagonal, tolerance=tolerance)
 
     @cached_property
     def near(self) -> float:
@@ -238,12 +255,7 @@ class Judge:
         return score([self.side(*way)[0] for way in (there, back)])
 
     def polished_all(
-        self,
-        known: Sequence[Met],
-        starts: Sequence[Similarity],
-        *,
-        patient: bool = False,
-        error: float | None = None,
+        self, known: Sequence[Met], starts: Sequence[Similarity], *, patient: bool = False, error: float | None = None
     ) -> list[Met]:
         """The maps that are known, and those that starts lead to and are none of them, nor far behind the best.
 

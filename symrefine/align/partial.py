@@ -13,9 +13,7 @@ import numpy as np
 from symrefine.align.alignment import OK, OPEN
 from symrefine.align.judge import Judge, Met
 from symrefine.align.pair import Evidence
-from symrefine.align.shown import Shown
 from symrefine.decide.maps import ahead, as_good, fits, said_by_both
-from symrefine.geometry import tight_diagonal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -46,18 +44,10 @@ def partial_meeting(evidence: Evidence, *, reflections: bool, factor: float = 1.
     source in units of the target.
     """
     unit = evidence.target.moments.scale
-    sides = (evidence.source, unit / factor), (evidence.target, unit)
-    source, target = (Shown.of(side, own, evidence.seed) for side, own in sides)
-    if source is None or target is None:
+    sides = evidence.source, evidence.target
+    judge = Judge.of(sides, (unit / factor, unit), evidence.tolerance, evidence.seed)
+    if judge is None:
         return None
-    finest = min(source.cloud.spacing, target.cloud.spacing)
-    source, target = source.as_fine_as(finest), target.as_fine_as(finest)
-    judge = Judge(
-        source=source,
-        target=target,
-        diagonal=min(tight_diagonal(s.cloud.points) for s in (source, target)),
-        tolerance=evidence.tolerance,
-    )
     starts = judge.promising()
     found = judge.polished_all([], starts)
     if not any(m.is_promising for m in found):
@@ -77,7 +67,7 @@ def partial_meeting(evidence: Evidence, *, reflections: bool, factor: float = 1.
     ridge = best
     best, slid = judge.uphill(ridge)
     rivals = [m for m in found if m is not ridge and not judge.same(m.motion, best.motion)]  # what leads to it is none
-    open_ = source.openings.evident or target.openings.evident
+    open_ = judge.source.openings.evident or judge.target.openings.evident
     return _weighed(best, sorted(rivals, key=lambda m: -m.score), slid, reflections=reflections, open_=open_)
 
 

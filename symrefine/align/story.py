@@ -24,16 +24,7 @@ from symrefine.align.partial import Meeting, partial_meeting
 from symrefine.align.polish import Polished, Similarity
 from symrefine.align.rivals import Choice, choose, information, polished
 from symrefine.align.scaled import Size, size_of_parts
-from symrefine.align.sides import (
-    ORDERS,
-    differ_in_size,
-    rank_of,
-    same_size,
-    side_of,
-    size_sigma,
-    thinned,
-    unlike_sizes,
-)
+from symrefine.align.sides import ORDERS, differ_in_size, rank_of, same_size, side_of, size_sigma, thinned, unlike_sizes
 from symrefine.clock import Clock
 from symrefine.decide.maps import SURE
 from symrefine.decide.posterior import Link, certain, meant
@@ -63,19 +54,19 @@ def align(
     """Orthogonal map and translation that take one object onto another; samplings, densities and formats may differ.
 
     Args:
-        source: a `Shape`, or points [N, n]. Labels count where both have them: only what is of one class meets.
+        source: a `Shape`, or points [N, n].
         target: a `Shape`, or points [M, n].
-        scale: whether the objects may differ in size; then `target ~ scale * matrix @ source + translation`.
-        polish: refine on the points (3-space only); without it the moments have the last word.
-        allow_reflection: whether determinant -1 is an answer.
-        tolerance: largest miss that still counts as agreement, as in `detect`: decides between rivals, and symmetry.
-        seed: of the random choices (samples of meshes, subsets of clouds).
+        scale: and what follows as of `symrefine.align`.
+        tolerance: as a fraction of the diagonal: it decides between rivals, and about symmetry.
 
     Raises:
         InputError: points that cannot be used, of different dimensions, or options out of range.
         DegenerateShapeError: the points do not spread.
     """
-    a, b = (_shape(s, name) for s, name in ((source, "source"), (target, "target")))
+    a, b = (
+        given if isinstance(given, Shape) else Shape(points=np.asarray(given), source=name)
+        for given, name in ((source, "source"), (target, "target"))
+    )
     _check(a, b, tolerance)
     a, b = with_one_set_of_classes(a, b)
     clock = Clock()
@@ -95,10 +86,6 @@ def align(
         source=sides[0], target=sides[1], scale=scale or differ_in_size(*sides), tolerance=tolerance, seed=seed
     )
     return _align_solid(evidence, scale, polish, allow_reflection, clock)
-
-
-def _shape(values: Shape | ArrayLike, name: str) -> Shape:
-    return values if isinstance(values, Shape) else Shape(points=np.asarray(values), source=name)
 
 
 def _check(source: Shape, target: Shape, tolerance: float) -> None:

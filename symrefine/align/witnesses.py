@@ -11,15 +11,14 @@ from typing import Protocol
 import numpy as np
 
 from symrefine.align.contact import distances
+from symrefine.align.judge import Judge
 from symrefine.align.kinds import nearest_both_ways, with_one_set_of_classes
 from symrefine.align.pair import Side, few
 from symrefine.align.shown import MOST_PLANES, Shown
 from symrefine.detection.measure import SAMPLES
-from symrefine.geometry import Array, Isometry, tight_diagonal
+from symrefine.geometry import Array, Isometry
 from symrefine.moments.moments import shape_moments
 from symrefine.shape import Index, Shape
-from symrefine.surface.misses import LIMITS, disc_distances
-from symrefine.surface.surface import HOPELESS
 from symrefine.surface.tree import Tree
 
 Misses = tuple[Array, Array]
@@ -42,64 +41,55 @@ class Witnesses(Protocol):
         """The place that is nearest to points [K, n] of the source (0) or the target (1), and how far away it is."""
 
 
-def witnesses(source: Shape, target: Shape, *, scale: float = 1.0, tolerance: float, seed: int = 0) -> Witnesses:
+def witnesses(source: Shape, target: Shape, *, scale: float = 1.0, tolerance: float) -> Witnesses:
     """The two objects, ready to be asked about any map of this scale, in the units of the input."""
     source, target = with_one_set_of_classes(source, target)
     if source.dim == 3 and not few(source, target) and {source.measure, target.measure} != {"solid", "points"}:
-        sides = [_side(shape) for shape in (source, target)]
+        sides = [Side(shape=s, moments=shape_moments(s, 2, parts=0), weights=np.zeros(0)) for s in (source, target)]
         unit = sides[1].moments.scale
-        one, other = (Shown.of(s, u, seed, MOST_PLANES) for s, u in zip(sides, (unit / scale, unit), strict=True))
-        if one is not None and other is not None:
-            finest = min(one.cloud.spacing, other.cloud.spacing)
-            shown = one.as_fine_as(finest), other.as_fine_as(finest)
+        if (judge := Judge.of(sides, (unit / scale, unit), tolerance, seed=0, planes=MOST_PLANES)) is not None:
             centers = sides[0].moments.center, sides[1].moments.center
-            return _Surfaces(shown=shown, centers=centers, unit=unit, scale=scale, tolerance=tolerance)
+            return _Surfaces(judge=judge, centers=centers, unit=unit, scale=scale)
     points, labels = [], []
     for shape in (source, target):
         some = slice(None, None, max(1, -(-len(shape.points) // SAMPLES)))
         points.append(shape.points[some])
         labels.append(None if shape.labels is None else shape.labels[some])
     size = target.diagonal
-    return _Points(*points, labels=(labels[0], labels[1]), scale=scale, tolerance=tolerance, diagonal=size)
-
-
-def _side(shape: Shape) -> Side:
-    return Side(shape=shape, moments=shape_moments(shape, 2, parts=0), weights=np.zeros(0))
+    return _Points(*points, labels=(labels[0], labels[1]), scale=scale, far=tolerance, diagonal=size)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Surfaces:
     """Local planes of both, each about its own centre, in units of the target."""
 
-    shown: tuple[Shown, Shown]
+    judge: Judge
     centers: tuple[Array, Array]
     unit: float
     scale: float
-    tolerance: float
 
     @property
     def far(self) -> float:
-        return LIMITS[1] * self.tolerance
+        return self.judge.far
 
     def misses(self, matrix: Array, translation: Array) -> Misses:
         shift = (self.scale * (matrix @ self.centers[0]) + translation - self.centers[1]) / self.unit
         motion = Isometry(matrix=matrix, shift=shift)
         back = Isometry(matrix=matrix.T, shift=-matrix.T @ shift)
-        source, target = self.shown
-        diagonal = min(tight_diagonal(shown.cloud.points) for shown in self.shown)
-        return self._asked(source, target, motion, diagonal), self._asked(target, source, back, diagonal)
+        source, target = self.judge.source, self.judge.target
+        return self._asked(source, target, motion), self._asked(target, source, back)
 
-    def _asked(self, here: Shown, there: Shown, motion: Isometry, diagonal: float) -> Array:
-        moved = motion.apply(here.cloud.points)
-        classes, bound = here.cloud.labels, HOPELESS * self.far * diagonal
-        found = disc_distances(there.cloud, moved, classes, bound=bound) / diagonal
+    def _asked(self, here: Shown, there: Shown, motion: Isometry) -> Array:
+        moved, classes, diagonal = motion.apply(here.cloud.points), here.cloud.labels, self.judge.diagonal
         # Where a wall is too thin for the local planes its points still tell that there is something.
-        found = np.minimum(found, distances(there.skin, moved, classes) / diagonal)
+        beside = distances(there.skin, moved, classes) / diagonal
+        found = np.minimum(self.judge.misses(there, moved, classes), beside)
         return np.where(here.unseen(there, moved, found > self.far, self.far * diagonal), np.nan, found)
 
     def nearest(self, side: int, points: Array) -> tuple[Array, Index]:
         unit = (self.unit / self.scale, self.unit)[side]
-        away, owner = Tree(self.shown[side].cloud.points).nearest((points - self.centers[side]) / unit)
+        shown = (self.judge.source, self.judge.target)[side]
+        away, owner = Tree(shown.cloud.points).nearest((points - self.centers[side]) / unit)
         return unit * away, owner
 
 
@@ -111,12 +101,8 @@ class _Points:
     target: Array
     labels: tuple[Index | None, Index | None] = field(kw_only=True)
     scale: float = field(kw_only=True)
-    tolerance: float = field(kw_only=True)
+    far: float = field(kw_only=True)
     diagonal: float = field(kw_only=True)
-
-    @property
-    def far(self) -> float:
-        return self.tolerance
 
     def misses(self, matrix: Array, translation: Array) -> Misses:
         moved = self.scale * (self.source @ matrix.T) + translation

@@ -10,30 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from symrefine.cli.fleet import add_fleet_options, executor, write_rows
-from symrefine.cli.outputs import (
-    check_bop,
-    check_outputs,
-    complain,
-    is_quiet,
-    note,
-    print_lines,
-    write_all,
-)
+from symrefine.cli.outputs import check_bop, check_outputs, complain, is_quiet, note, print_lines, write_all
 from symrefine.cli.signs import counting
-from symrefine.cli.values import (
-    add_class_options,
-    add_detection_options,
-    add_frame_option,
-    add_scan_options,
-    detection_options,
-    millimetres,
-)
+from symrefine.cli.values import add_object_options, detection_options, millimetres
 from symrefine.errors import InputError
 from symrefine.files import text_writer
 
 if TYPE_CHECKING:
     from symrefine.cli.objects import Job
-    from symrefine.cli.sources import Source, Sources
+    from symrefine.cli.sources import Sources
     from symrefine.fleet.journal import Journal
     from symrefine.fleet.rows import Row
 
@@ -68,10 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--recursive", action="store_true", help="directories inside directories too")
     add_fleet_options(parser, "file")
-    add_class_options(parser)
-    add_frame_option(parser, otherwise="each of them; with --bop there has to be one")
-    add_scan_options(parser)
-    add_detection_options(parser)
+    add_object_options(parser, otherwise="each of them; with --bop there has to be one")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -125,32 +107,29 @@ def _show(row: "Row") -> None:
     print_lines([row_line(row["file"], row)])
 
 
-def _jobs(args: argparse.Namespace, found: Sequence["Source"]) -> tuple[list["Job"], dict[str, int]]:
+def _jobs(args: argparse.Namespace, found: Sequence["Job"]) -> tuple[list["Job"], dict[str, int]]:
     """The jobs of this shard, and the numbers of all objects of BOP by their names.
 
     Raises:
         InputError: nothing to do, or outputs that cannot be written.
     """
-    from symrefine.cli.objects import Job
     from symrefine.fleet.shard import Whole
     from symrefine.fleet.tasks import our_version
 
     outputs = _written(args)
     manifests = () if args.manifest is None else (args.manifest,)
-    check_outputs(outputs, (Path(name) for name in chain(manifests, (source.path for source in found))))
+    check_outputs(outputs, (Path(name) for name in chain(manifests, (job.path for job in found))))
     check_bop(args.bop, {"--bop-scale": args.bop_scale})
     numbers = {} if args.bop is None else _numbered(args, found)
     options = detection_options(args)
     scale = None if args.bop is None else args.bop_scale or 1.0
     jobs = [
-        Job(
-            name=source.name,
-            path=source.path,
-            options=options | dict(source.options) if source.options else options,  # of many one copy is held
-            told=source.told,
-            scale=scale and source.told.get("scale", scale),
+        replace(
+            job,
+            options=options | dict(job.options) if job.options else options,  # of many one copy is held
+            scale=scale and job.told.get("scale", scale),
         )
-        for source in found
+        for job in found
     ]
     if args.shard is None:
         return jobs, numbers
@@ -177,7 +156,7 @@ def _sources(args: argparse.Namespace) -> "Sources":
     return Sources(ours=manifest(Path(args.manifest)))
 
 
-def _numbered(args: argparse.Namespace, found: Sequence["Source"]) -> dict[str, int]:
+def _numbered(args: argparse.Namespace, found: Sequence["Job"]) -> dict[str, int]:
     """The number of each object of BOP.
 
     Raises:
@@ -188,16 +167,16 @@ def _numbered(args: argparse.Namespace, found: Sequence["Source"]) -> dict[str, 
 
     read_models_info(Path(args.bop))
     owners: dict[int, str] = {}
-    for source in found:
-        told = source.told.get("id")
+    for job in found:
+        told = job.told.get("id")
         by_id = int(told) if told and _BOP_ID.fullmatch(told) else None
-        number = by_id if told else number_of(stem_of(Path(source.path)))
+        number = by_id if told else number_of(stem_of(Path(job.path)))
         if number is None:
             right = f"ids, and {told!r} is no number" if told else "names: obj_000001.ply"
-            raise InputError(f"{source.place}: --bop takes the number of an object from {right}")
-        other = owners.setdefault(number, source.name)
-        if other != source.name:
-            raise InputError(f"{source.place}: is object {number}, and so is {other}; --bop takes one")
+            raise InputError(f"{job.place}: --bop takes the number of an object from {right}")
+        other = owners.setdefault(number, job.name)
+        if other != job.name:
+            raise InputError(f"{job.place}: is object {number}, and so is {other}; --bop takes one")
     return {name: number for number, name in owners.items()}
 
 

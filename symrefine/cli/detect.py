@@ -26,19 +26,7 @@ from symrefine.cli.outputs import (
 from symrefine.cli.rows import ROW_HEAD, row_line
 from symrefine.cli.several import UNDETERMINED, Many, check_alone
 from symrefine.cli.signs import counting
-from symrefine.cli.values import (
-    NUMBERED,
-    add_class_options,
-    add_depth_options,
-    add_detection_options,
-    add_frame_option,
-    add_path,
-    add_scan_options,
-    detection_options,
-    grey,
-    millimetres,
-    natural,
-)
+from symrefine.cli.values import NUMBERED, add_object_options, add_path, detection_options, grey, millimetres, natural
 from symrefine.errors import InputError
 from symrefine.files import Writer, asked_for, text_writer
 
@@ -77,9 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="millimetres in one unit of PATH: 1000 if it is in metres (default: 1)",
     )
     add_outputs(
-        parser,
-        recording="write the iterations, for `symrefine view`",
-        report="write a page with pictures and tables",
+        parser, recording="write the iterations, for `symrefine view`", report="write a page with pictures and tables"
     )
     parser.add_argument(
         "--threshold",
@@ -99,11 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="all: move all points of a cloud, one by one, by every element that was found, and tell what they miss "
         "by; microseconds for each point and element (default: a sample of a cloud of more than 100,000 points tells)",
     )
-    add_class_options(parser)
-    add_frame_option(parser, otherwise="each of them")
-    add_scan_options(parser)
-    add_depth_options(parser)
-    add_detection_options(parser)
+    add_object_options(parser, otherwise="each of them", depth=True)
 
 
 def run(args: argparse.Namespace) -> int:

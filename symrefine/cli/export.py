@@ -7,18 +7,7 @@ from typing import TYPE_CHECKING, Any
 from symrefine.cli.inputs import loaded, read_scan
 from symrefine.cli.outputs import check_outputs, note, tell
 from symrefine.cli.signs import waiting
-from symrefine.cli.values import (
-    NUMBERED,
-    add_class_options,
-    add_detection_options,
-    add_frame_option,
-    add_path,
-    add_scan_options,
-    count,
-    detection_options,
-    millimetres,
-    natural,
-)
+from symrefine.cli.values import NUMBERED, add_object_options, add_path, count, detection_options, millimetres, natural
 from symrefine.errors import InputError, about
 from symrefine.export.formats import TAKES, takers
 from symrefine.files import check_folder, path_of
@@ -56,10 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="canonical: where the 4 x 4 transform goes, .json or .npz (default: OUT_transform.json)",
     )
-    add_class_options(parser, textured="write the symmetries of the shape with its texture")
-    add_frame_option(parser)
-    add_scan_options(parser)
-    add_detection_options(parser)
+    add_object_options(parser, textured="write the symmetries of the shape with its texture")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -8,14 +8,7 @@ from typing import TYPE_CHECKING, Any
 from symrefine.cli.inputs import loaded, read_scan
 from symrefine.cli.outputs import check_outputs, json_writer, tell, write_all
 from symrefine.cli.signs import waiting
-from symrefine.cli.values import (
-    add_class_options,
-    add_depth_options,
-    add_frame_option,
-    add_path,
-    add_viewpoint,
-    reading_options,
-)
+from symrefine.cli.values import add_depth_options, add_path, add_reading_options, add_viewpoint, reading_options
 from symrefine.clock import Clock
 from symrefine.units import EVERYDAY_M, unit_of_size
 
@@ -39,8 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_path(parser, "mesh, point cloud or picture")
     parser.add_argument("--json", metavar="FILE|-", help="write all of it as JSON; - is stdout, with no table")
-    add_class_options(parser)
-    add_frame_option(parser)
+    add_reading_options(parser)
     add_viewpoint(parser)
     add_depth_options(parser)
 

@@ -9,16 +9,7 @@ from symrefine.cli.fleet import add_executor_options, executor
 from symrefine.cli.inputs import failure
 from symrefine.cli.outputs import complain, is_quiet, note, print_lines, write_all
 from symrefine.cli.signs import progress
-from symrefine.cli.values import (
-    add_class_options,
-    add_detection_options,
-    add_frame_option,
-    add_loudness,
-    add_scan_options,
-    detection_options,
-    millimetres,
-    probability,
-)
+from symrefine.cli.values import add_loudness, add_object_options, detection_options, millimetres, probability
 from symrefine.errors import InputError, about, one_line
 from symrefine.files import pieces_writer, text_writer, whole
 
@@ -68,10 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scale", type=millimetres, metavar="X", help="millimetres in one unit of the files (default: 1)"
     )
     add_executor_options(parser, "file")
-    add_class_options(parser)
-    add_frame_option(parser, otherwise="there has to be one; files that hold one are taken as they are")
-    add_scan_options(parser)
-    add_detection_options(parser)
+    add_object_options(parser, otherwise="there has to be one; files that hold one are taken as they are")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -40,8 +40,9 @@ class Job:
     Attributes:
         name: what its row calls it.
         path: of its file, or the address.
+        place: where it was named, for messages.
         options: of `detect`.
-        told: what else its row says of it.
+        told: what else its row says of it: `id`, `scale`.
         scale: millimetres in a unit, if its entry of BOP is wanted; then a file holds one object.
         mark: its place in a fleet of several shards.
         frame: its number, where its file holds several.
@@ -50,7 +51,8 @@ class Job:
 
     name: str
     path: str
-    options: Mapping[str, Any]
+    place: str = ""
+    options: Mapping[str, Any] = field(default_factory=dict)
     told: Mapping[str, Any] = field(default_factory=dict)
     scale: float | None = None
     mark: Row = field(default_factory=dict)

@@ -3,41 +3,23 @@
 import csv
 import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from symrefine.cli import values
 from symrefine.cli.inputs import expanded
+from symrefine.cli.objects import Job
 from symrefine.errors import InputError, meant
 from symrefine.fleet.remote import is_remote, listed
 from symrefine.units import METRES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Source:
-    """An object to look at.
-
-    Attributes:
-        name: what its row calls it.
-        path: of its file, or the address.
-        place: where it was named, for messages.
-        told: what the manifest says of it, for its row: `id`, `scale`.
-        options: of `detect`, for this one.
-    """
-
-    name: str
-    path: str
-    place: str
-    told: Mapping[str, Any] = field(default_factory=dict)
-    options: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Sources:
     """The objects that paths stand for, each once, in order, and the files of directories that are of other kinds."""
 
-    ours: Sequence[Source]
+    ours: Sequence[Job]
     others: Sequence[Path] = ()
 
     def passed_over(self, besides: Iterable[str | None]) -> str:
@@ -58,7 +40,7 @@ def sources(paths: Sequence[str], *, recursive: bool) -> Sources:
     Raises:
         InputError: one that stands for nothing.
     """
-    found: dict[str, Source] = {}
+    found: dict[str, Job] = {}
     others: list[Path] = []
     for path in paths:
         if is_remote(path):
@@ -71,7 +53,7 @@ def sources(paths: Sequence[str], *, recursive: bool) -> Sources:
 
             raise InputError(f"{path}: no mesh and no cloud in it; known are {' '.join(READERS)}, and .gz of each")
         for inside, file in files.items():
-            found.setdefault(file, Source(name=inside if len(paths) == 1 else file, path=file, place=file))
+            found.setdefault(file, Job(name=inside if len(paths) == 1 else file, path=file, place=file))
     return Sources(ours=list(found.values()), others=others)
 
 
@@ -129,13 +111,13 @@ _OPTIONS: Mapping[str, Callable[[str], Any]] = {
 _LARGEST = 64 * 2**20
 
 
-def manifest(path: Path) -> list[Source]:
+def manifest(path: Path) -> list[Job]:
     """The objects of a manifest: CSV with a column `path`, relative to it, and any of `id`, `scale` and the options.
 
     Raises:
         InputError: with the line and the column.
     """
-    found: list[Source] = []
+    found: list[Job] = []
     seen: dict[str, dict[str, int]] = {"path": {}, "id": {}}
     for line, row in _lines(path):
         place = f"{path}:{line}"
@@ -151,7 +133,7 @@ def manifest(path: Path) -> list[Source]:
             {name: _value(place, name, row[name], read) for name, read in kind.items() if row.get(name)}
             for kind in (_TOLD, _OPTIONS)
         )
-        found.append(Source(name=row["path"], path=file, place=place, told=told, options=options))
+        found.append(Job(name=row["path"], path=file, place=place, told=told, options=options))
     if not found:
         raise InputError(f"{path}: names no objects; expected a line for each below the titles")
     return found

@@ -6,14 +6,7 @@ from pathlib import Path
 from symrefine.cli.export import detected
 from symrefine.cli.outputs import add_outputs, check_outputs, json_writer, note, shown, shown_writers, tell, write_all
 from symrefine.cli.signs import waiting
-from symrefine.cli.values import (
-    add_class_options,
-    add_detection_options,
-    add_frame_option,
-    add_path,
-    add_scan_options,
-    detection_options,
-)
+from symrefine.cli.values import add_object_options, add_path, detection_options
 
 HELP = "write the nearest exactly symmetric mesh or cloud"
 DESCRIPTION = (
@@ -40,10 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         picture="write a picture of the exact shape",
         report="write a page with a model that turns: the shape as it was, and what was found in it",
     )
-    add_class_options(parser, textured="make exact what the shape has with its texture")
-    add_frame_option(parser)
-    add_scan_options(parser)
-    add_detection_options(parser)
+    add_object_options(parser, textured="make exact what the shape has with its texture")
 
 
 def run(args: argparse.Namespace) -> int:

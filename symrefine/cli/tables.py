@@ -297,7 +297,9 @@ def _spatial(record: Record) -> Iterator[Table]:
     axes = [(_axis(a), a) for a in record["axes"]]
     yield _elements(("axes: direction", "kind"), "confidence", axes, marks[len(planes) :])
     inversion = [(("about the centre",), found) for found in inversions(record)]
-    yield _elements(("inversion",), "confidence", inversion, marks and [_inverted(record["textured"])])
+    yield _elements(
+        ("inversion",), "confidence", inversion, marks and ["kept" if record["textured"]["inversion"] else ""]
+    )
     if record.get("textured"):
         yield from _only_textured(record)
     near = [(_near(m, record), m) for m in record["near_misses"]]
@@ -317,10 +319,6 @@ def _kept(record: Record) -> list[str]:
         return []
     textured = _said(told)
     return [kept(one, textured) for one in _said(record)]
-
-
-def _inverted(told: Record) -> str:
-    return "kept" if told["inversion"] else ""
 
 
 def _only_textured(record: Record) -> Iterator[Table]:

@@ -11,6 +11,26 @@ from symrefine.units import METRES, SCALES_MM, read_length
 
 # Of options that number an object.
 NUMBERED = "(default: 7 of obj_000007.ply, 1 of any other name)"
+# What is done where a texture is read, and where no frame is chosen, unless a command says otherwise.
+_BESIDE = "tell the group of the shape with its texture beside that of the shape"
+_ONE = "there has to be one"
+
+
+def add_object_options(
+    parser: argparse.ArgumentParser, *, textured: str = _BESIDE, otherwise: str = _ONE, depth: bool = False
+) -> None:
+    """All options that decide what is found in an object: what of its file counts, how it was seen, how it is judged.
+
+    Args:
+        textured: what is done where a texture is read.
+        otherwise: what happens where no frame is chosen.
+        depth: whether the file may be a depth image.
+    """
+    add_reading_options(parser, textured=textured, otherwise=otherwise)
+    add_scan_options(parser)
+    if depth:
+        add_depth_options(parser)
+    add_detection_options(parser)
 
 
 def add_detection_options(parser: argparse.ArgumentParser, counts_as: str = "symmetric") -> None:
@@ -48,13 +68,7 @@ def add_path(parser: argparse.ArgumentParser, what: str, *, several: bool = Fals
 
 
 def add_scan_options(parser: argparse.ArgumentParser) -> None:
-    """The options that say how points were taken."""
-    add_outliers(parser)
-    add_viewpoint(parser)
-
-
-def add_outliers(parser: argparse.ArgumentParser) -> None:
-    """The option that says which points are no part of the object."""
+    """The options that say which points are no part of the object, and where they were seen from."""
     parser.add_argument(
         "--outliers",
         choices=("auto", "floor", "none"),
@@ -62,6 +76,7 @@ def add_outliers(parser: argparse.ArgumentParser) -> None:
         help="auto: points of a cloud that belong to no surface, single or in clumps, are set apart and told; floor: "
         "so is the plane that the object stands on; none: all points count (default: %(default)s)",
     )
+    add_viewpoint(parser)
 
 
 def add_viewpoint(parser: argparse.ArgumentParser) -> None:
@@ -101,27 +116,12 @@ def detection_options(args: argparse.Namespace) -> dict[str, Any]:
 
 def reading_options(args: argparse.Namespace) -> dict[str, Any]:
     """What was chosen of the options that say how points were taken and what of the file counts, where given."""
-    how = (
-        "frame",
-        "outliers",
-        "viewpoint",
-        "intrinsics",
-        "depth_scale",
-        "mask",
-        "units",
-        "labels",
-        "weights",
-        "verify",
-        "texture",
-    )
-    return {name: given for name in how if (given := getattr(args, name, None)) is not None}
+    how = "frame outliers viewpoint intrinsics depth_scale mask units labels weights verify texture"
+    return {name: given for name in how.split() if (given := getattr(args, name, None)) is not None}
 
 
-_BESIDE = "tell the group of the shape with its texture beside that of the shape"
-
-
-def add_class_options(parser: argparse.ArgumentParser, *, textured: str = _BESIDE) -> None:
-    """The options that name what tells the points of a file apart, and what is done where a texture is read."""
+def add_reading_options(parser: argparse.ArgumentParser, *, textured: str = _BESIDE, otherwise: str = _ONE) -> None:
+    """The options that name what tells the points of a file apart, and which of several objects in it counts."""
     parser.add_argument(
         "--labels",
         metavar="NAME",
@@ -144,10 +144,6 @@ def add_class_options(parser: argparse.ArgumentParser, *, textured: str = _BESID
         help="masses of the points of a cloud: a property, titled column or array of numbers (default: equal, or the "
         "array `weights` of .npz)",
     )
-
-
-def add_frame_option(parser: argparse.ArgumentParser, *, otherwise: str = "there has to be one") -> None:
-    """The option that chooses one of several objects in a file, and what happens without it."""
     parser.add_argument(
         "--frame",
         type=natural,

@@ -33,9 +33,7 @@ def symmetrized_record(
         found: the symmetry that it rests on.
         source: the shape as it was.
         outliers: points of it that were left out.
-        options: what the caller chose, for the record.
-        timings: seconds by stage.
-        load_s: seconds that reading took.
+        options: and what follows as of every record.
     """
     return {
         **opening_of(SYMMETRIZED_SCHEMA, options, source),
@@ -65,15 +63,7 @@ def completed_record(
     timings: Mapping[str, float],
     load_s: float | None = None,
 ) -> Record:
-    """How many points were seen and inferred, under which group.
-
-    Args:
-        made: the completed scan.
-        source: the scan.
-        options: what the caller chose, for the record.
-        timings: seconds by stage.
-        load_s: seconds that reading took.
-    """
+    """How many points of a scan, the source, were seen and inferred, under which group."""
     d = made.detection
     return {
         **opening_of(COMPLETED_SCHEMA, options, source),

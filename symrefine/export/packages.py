@@ -53,11 +53,7 @@ def package_of(
 
     Args:
         out: the file, or the folder of a consumer.
-        number: of the object in `models_info.json`; if None that of the name of the input, 7 of obj_000007.ply, or 1.
-        scale: millimetres in one unit of the shape.
-        improper: npz: whether mirrors and the like belong to the matrices.
-        steps: npz: turns that stand for a continuous axis; 72 if None.
-        transform: canonical: where the transform goes; `place_of_transform` if None.
+        number: and what follows as of `symrefine.export`.
 
     Raises:
         InputError: another format, an option of another one, nothing decided, or a file that would take the place of

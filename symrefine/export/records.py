@@ -71,11 +71,7 @@ def detection_record(
         "iterations": int(d.iterations),
         "verified": None
         if d.verified is None
-        else {
-            "points": d.verified.points,
-            "residual": _residual(d.verified.residual),
-            "beyond": d.verified.beyond,
-        },
+        else {"points": d.verified.points, "residual": _residual(d.verified.residual), "beyond": d.verified.beyond},
         "undetermined": d.undetermined or None,
         "textured": None if d.textured is None else _textured(d.textured),
         "ntuples": {"kind": d.tuples.kind} | _sizes(d.tuples),

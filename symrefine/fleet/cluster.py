@@ -6,7 +6,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, closing, contextmanager, nullcontext, suppress
+from contextlib import closing, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,7 +53,7 @@ class Dask:
         """
         check_address(self.address)
         waiting, deaths, patience = set(range(len(parcels))), Counter[int](), _ANSWER_S
-        with _cluster(self.address, self.workers) if parcels else nullcontext(self.address) as address:
+        with _local(self.workers) if parcels and self.address == LOCAL else nullcontext(self.address) as address:
             while waiting:
                 with closing(_client(address, patience)) as client:
                     for index, outcome in self._answers(client, work, parcels, sorted(waiting)):
@@ -145,11 +145,6 @@ def check_address(address: str) -> None:
 
     if find_spec("distributed") is None:
         raise InputError('a Dask cluster needs distributed: pip install "symrefine[dask]"')
-
-
-def _cluster(address: str, workers: int) -> AbstractContextManager[str]:
-    """The address to connect to, for as long as this lasts."""
-    return _local(workers) if address == LOCAL else nullcontext(address)
 
 
 @contextmanager

@@ -31,7 +31,8 @@ def finish(
         Exception: what `work` raised.
     """
     for index, outcome in executor.do(work, parcels):
-        row = mourned(lost(parcels[index], outcome), outcome) if isinstance(outcome, Lost) else outcome
+        # A task that was lost tells the limit that it met.
+        row = lost(parcels[index], outcome) | {"lost": outcome.under} if isinstance(outcome, Lost) else outcome
         if journal is not None:
             journal.append(row)
         yield row
@@ -43,11 +44,6 @@ def our_version() -> str:
     from importlib.metadata import version
 
     return version("symrefine")
-
-
-def mourned(row: Row, lost: Lost) -> Row:
-    """The row of a task that was lost, with the limit that it met."""
-    return row | {"lost": lost.under}
 
 
 def is_final(row: Row, limits: Limits) -> bool:

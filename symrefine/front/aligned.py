@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from symrefine.align.alignment import Alignment as BareAlignment
@@ -64,9 +64,9 @@ class Alignment(Pictured, BareAlignment):
             InputError: points of more than three coordinates, or of one.
             SymrefineError: there is no display; `save("x.rrd")` and `symrefine view x.rrd --web` do without one.
         """
-        from symrefine.viewer import show_pair
+        from symrefine.viewer import recorded_pair
 
-        return show_pair(self, self._pair)
+        return recorded_pair(self, self._pair).show("alignment")
 
     @property
     def _is_shown(self) -> bool:
@@ -83,6 +83,6 @@ class Alignment(Pictured, BareAlignment):
         return text_writer(pair_html(self, self._pair, self.options))
 
     def _recording(self) -> Writer:
-        from symrefine.viewer import record_pair
+        from symrefine.viewer import recorded_pair
 
-        return partial(record_pair, self, self._pair)
+        return lambda path: recorded_pair(self, self._pair).write(path)

@@ -2,7 +2,7 @@
 
 import base64
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
 
@@ -147,10 +147,17 @@ class Pictured(Answer):
         return super().kinds() | {".png": lambda: bytes_writer(self._picture(*SIZE))}
 
 
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Found(Pictured):
-    """What every detection can do."""
+    """What every detection can do.
+
+    Attributes:
+        shape: what it was found in.
+        options: what it was asked with.
+    """
 
     shape: Shape
+    options: Options
 
     def operations(self) -> Operations:
         """Operations, or what generates them, as homogeneous matrices in the units and the frame of the input."""

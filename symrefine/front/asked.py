@@ -1,4 +1,4 @@
-"""What may be asked: tolerances, seeds, and what was found before."""
+"""What may be asked: tolerances, and what was found before."""
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symrefine.errors import InputError
-from symrefine.options import whole_of
 from symrefine.rounding import SINGLE
 
 if TYPE_CHECKING:
@@ -18,15 +17,6 @@ def told(tolerance: float | str, units: str | None) -> dict[str, Any]:
     """A tolerance as it was asked for, for the record: a fraction, or a length with what it is in if that was said."""
     asked: dict[str, Any] = {"tolerance": tolerance if isinstance(tolerance, str) else float(tolerance)}
     return asked if units is None else asked | {"units": units}
-
-
-def seed_of(seed: Any) -> int:
-    """A seed that numpy takes and JSON can hold.
-
-    Raises:
-        InputError: no whole number from 0.
-    """
-    return whole_of("seed", seed)
 
 
 def ladder_of(tolerances: Any) -> tuple[float, ...]:

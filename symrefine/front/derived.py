@@ -13,11 +13,21 @@ from symrefine.shape import Shape
 from symrefine.symmetrize import Symmetrized as BareSymmetrized
 
 
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Derived(Pictured):
-    """What every object can do that was made of another one: its page is that of what was found in that one."""
+    """What every object can do that was made of another one: its page is that of what was found in that one.
+
+    Attributes:
+        source: the object as it was.
+        detection: the symmetry that was found in it.
+        options: what it was asked with.
+        timings: seconds by stage, those of the detection among them.
+    """
 
     source: Shape
     detection: Detection
+    options: Options
+    timings: Mapping[str, float]
 
     def _read(self) -> tuple[str, ...]:
         return (self.source.source,)
@@ -56,18 +66,10 @@ class Symmetrized(Derived, BareSymmetrized):
     It has all that `symrefine.symmetrize.nearest.Symmetrized` has.
 
     Attributes:
-        source: the shape as it was.
-        detection: the symmetry that was found in it.
-        outliers: points of it that are no part of the object, and not in the result.
-        options: what it was asked with.
-        timings: seconds by stage, those of the detection among them.
+        outliers: points of the source that are no part of the object, and not in the result.
     """
 
-    source: Shape
-    detection: Detection
     outliers: int
-    options: Options
-    timings: Mapping[str, float]
 
     def _record(self, options: Options, load_s: float | None) -> dict[str, Any]:
         from symrefine.export.made import symmetrized_record
@@ -101,16 +103,7 @@ class Completion(Derived, BareCompletion):
     """What `complete` made, with a voice; `save("full.ply")` writes the points, those inferred marked.
 
     It has all that `symrefine.complete.Completion` has.
-
-    Attributes:
-        source: the scan.
-        options: what it was asked with.
-        timings: seconds by stage, those of the detection among them.
     """
-
-    source: Shape
-    options: Options
-    timings: Mapping[str, float]
 
     def _record(self, options: Options, load_s: float | None) -> dict[str, Any]:
         from symrefine.export.made import completed_record

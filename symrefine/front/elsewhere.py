@@ -10,7 +10,6 @@ from symrefine.front.answers import Found, Operations, Options
 from symrefine.geometry import householder
 from symrefine.ndim import SubspaceDetection as BareSubspaceDetection
 from symrefine.plane import PlanarDetection as BarePlanarDetection
-from symrefine.shape import Shape
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -18,14 +17,7 @@ class PlanarDetection(Found, BarePlanarDetection):
     """What `detect` found in a picture, or in points in the plane, with a voice.
 
     It has all that `symrefine.plane.detection.PlanarDetection` has.
-
-    Attributes:
-        shape: what it was found in.
-        options: what it was asked with.
     """
-
-    shape: Shape
-    options: Options
 
     def _record(self, options: Options, load_s: float | None) -> dict[str, Any]:
         from symrefine.export.records import planar_record
@@ -47,14 +39,7 @@ class SubspaceDetection(Found, BareSubspaceDetection):
     """What `detect` found in points of four to eight coordinates, with a voice.
 
     It has all that `symrefine.ndim.detection.SubspaceDetection` has.
-
-    Attributes:
-        shape: what it was found in.
-        options: what it was asked with.
     """
-
-    shape: Shape
-    options: Options
 
     def _record(self, options: Options, load_s: float | None) -> dict[str, Any]:
         from symrefine.export.records import subspace_record

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from symrefine.clock import Clock
 from symrefine.errors import InputError
 from symrefine.files import path_of
-from symrefine.front.asked import found_in, in_space, seed_of, told
+from symrefine.front.asked import found_in, in_space, told
 from symrefine.front.verbs import detect_in_space
 from symrefine.lengths import relative_tolerance
 from symrefine.load.objects import shape_of
@@ -62,7 +62,7 @@ def symmetrize(
     # Of a continuous group what the vertices have of it was told already.
     wanted = found.exact.point_group if group is None and found.exact is not None else group
     chosen = found.group if wanted is None else placed_subgroup(found.group, wanted)
-    used, clock, seed = relative_tolerance(tolerance, shape, units=units), Clock(), seed_of(seed)
+    used, clock, seed = relative_tolerance(tolerance, shape, units=units), Clock(), whole_of("seed", seed)
     # Of what a sample alone was looked at, no others are known.
     out = found.outliers if shape.faces is None and len(found.shape.points) == len(shape.points) else found.outliers[:0]
     own = shape.without(out) if len(out) else shape
@@ -113,7 +113,7 @@ def complete(
     found = in_space(detect(shape, **asked)) if found is None else found_in(found, shape)
     with clock("complete"):
         made = complete(shape, found)
-    options = told(tolerance, units) | {"seed": seed_of(seed), "outliers": outliers}
+    options = told(tolerance, units) | {"seed": whole_of("seed", seed), "outliers": outliers}
     return Completion.of(made, source=shape, options=options, timings={**found.timings, **clock.seconds})
 
 

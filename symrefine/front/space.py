@@ -11,7 +11,6 @@ from symrefine.front.answers import Found, Operations, Options
 from symrefine.geometry import Array
 from symrefine.groups import PointGroup
 from symrefine.options import flag_of, whole_of
-from symrefine.shape import Shape
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -19,14 +18,7 @@ class Detection(Found, BareDetection):
     """What `detect` found in an object in space, with a voice.
 
     It has all that `symrefine.detection.result.Detection` has.
-
-    Attributes:
-        shape: what it was found in.
-        options: what it was asked with.
     """
-
-    shape: Shape
-    options: Options
 
     def _record(self, options: Options, load_s: float | None) -> dict[str, Any]:
         from symrefine.export.records import detection_record
@@ -88,9 +80,9 @@ class Detection(Found, BareDetection):
         Raises:
             SymrefineError: there is no display; `save("x.rrd")` and `symrefine view x.rrd --web` do without one.
         """
-        from symrefine.viewer import show
+        from symrefine.viewer import recorded
 
-        return show(self, self.shape)
+        return recorded(self, self.shape).show("detection")
 
     def kinds(self) -> dict[str, Callable[[], Writer]]:
         return Found.kinds(self) | {".rrd": self._recording}

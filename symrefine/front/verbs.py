@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 from symrefine.errors import InputError
 from symrefine.files import path_of
 from symrefine.front.answers import Found, check_kind
-from symrefine.front.asked import ladder_of, seed_of, told
+from symrefine.front.asked import ladder_of, told
 from symrefine.lengths import relative_tolerance
 from symrefine.load.objects import objects_of, shape_of, stream_of
-from symrefine.options import flag_of
+from symrefine.options import flag_of, whole_of
 from symrefine.shape import Shape
 from symrefine.stream import Stream
 from symrefine.surface.misses import TOLERANCE
@@ -85,7 +85,8 @@ def detect(
     large = stream_of(shape) if frame is None and all(given is None for given in beside.values()) else None
     shape = shape_of(shape, frame=frame, **beside) if large is None else large
     used = relative_tolerance(tolerance, shape, units=units, outliers=outliers)
-    options = told(tolerance, units) | {"seed": (seed := seed_of(seed))} | ({} if frame is None else {"frame": frame})
+    seed = whole_of("seed", seed)
+    options = told(tolerance, units) | {"seed": seed} | ({} if frame is None else {"frame": frame})
     if not isinstance(shape, Shape) or shape.dim == 3:
         from symrefine.detection import story
 
@@ -249,7 +250,7 @@ def align(
 
     def onto(given: Any, name: str) -> Alignment:
         met = shape_of(given, name=name)
-        used, whole = relative_tolerance(tolerance, met, units=units), seed_of(seed)
+        used, whole = relative_tolerance(tolerance, met, units=units), whole_of("seed", seed)
         found = story.align(moved, met, **chosen, tolerance=used, seed=whole)
         options = told(tolerance, units) | {"scale": chosen["scale"], "seed": whole}
         options |= {"relative_tolerance": used} if isinstance(tolerance, str) else {}

@@ -185,7 +185,7 @@ def load(
     file, wanted = path_of(path), _wanted(measure, labels, weights, threshold, invert, texture)
     with about(str(path)):
         content = _contents(file, wanted, is_chosen=frame is not None).chosen(frame)
-    return _shape(content, file, wanted, labels, weights, source=str(path))
+    return _shape(content, file, wanted, source=str(path))
 
 
 def load_frames(
@@ -219,7 +219,7 @@ def load_frames(
         name = source if len(contents) == 1 else f"{source}#{number}"
         with about(name):
             content = contents[number]
-        return _shape(content, file, wanted, labels, weights, source=name)
+        return _shape(content, file, wanted, source=name)
 
     return Frames(contents.what, len(contents), shape)
 
@@ -241,9 +241,8 @@ def _wanted(
     for option, name in said.items():
         if not isinstance(name, str | None):
             raise InputError(f"{option}: is of type {type(name).__name__}; expected a name that the file has")
-    named = [name for name in (labels, weights) if name is not None]
     flags = {"invert": flag_of("invert", invert), "texture": flag_of("texture", texture)}
-    return Wanted(fields=named, measure=measure, threshold=threshold, **flags)
+    return Wanted(labels=labels, weights=weights, measure=measure, threshold=threshold, **flags)
 
 
 def _contents(file: Path, wanted: Wanted, *, is_chosen: bool = False) -> Frames[Content]:
@@ -272,9 +271,7 @@ def _contents(file: Path, wanted: Wanted, *, is_chosen: bool = False) -> Frames[
     return found if isinstance(found, Frames) else one(found, "objects")
 
 
-def _shape(
-    content: Content, file: Path, wanted: Wanted, labels: str | None, weights: str | None, *, source: str
-) -> Shape:
+def _shape(content: Content, file: Path, wanted: Wanted, *, source: str) -> Shape:
     """The shape that a content of a file is."""
     kind = _FORMATS[suffix_of(file)]
     with about(source):
@@ -283,9 +280,9 @@ def _shape(
         if wanted.texture and content.paint is None:
             raise InputError("has no faces, so no texture; leave it out for clouds")
         passed(len(content.points), len(content.points))
-        arrays = _arrays(content, None if "measure" in kind.takes else wanted.measure, labels, weights, source)
+        arrays = _arrays(content, wanted, None if "measure" in kind.takes else wanted.measure, source)
     # Labels that count unasked are elements, and lengths between them angstroms.
-    elements = labels is None and content.labels is not None
+    elements = wanted.labels is None and content.labels is not None
     return Shape(
         source=source, unit=content.unit or kind.unit or ("A" if elements else None), elements=elements, **arrays
     )
@@ -305,21 +302,19 @@ def _check_options(kind: _Format, wanted: Wanted, *, is_chosen: bool) -> None:
             raise InputError(_OPTIONS[group] + (f": {' '.join(users)}" if group != "fields" else ""))
 
 
-def _arrays(
-    content: Content, measure: str | None, labels: str | None, weights: str | None, source: str
-) -> dict[str, Any]:
+def _arrays(content: Content, wanted: Wanted, measure: str | None, source: str) -> dict[str, Any]:
     """What becomes of a content, by the names that `Shape` has for it."""
     if content.faces is not None:
-        if weights is not None:
+        if wanted.weights is not None:
             raise InputError("has faces, which weigh what their areas do; weights are for clouds")
-        return {"measure": measure or "surface"} | mesh_arrays(content, content.faces, labels, source)
+        return {"measure": measure or "surface"} | mesh_arrays(content, content.faces, wanted.labels, source)
     if measure is not None:
         raise InputError(f"has no faces, so measure {measure!r} does not apply; leave it out for clouds")
-    classes, kinds = (content.labels, None) if labels is None else point_classes(content, labels)
+    classes, kinds = (content.labels, None) if wanted.labels is None else point_classes(content, wanted.labels)
     return {
         "points": content.points,
         "normals": content.normals,
-        "weights": content.weights if weights is None else point_weights(content, weights),
+        "weights": content.weights if wanted.weights is None else point_weights(content, wanted.weights),
         "labels": classes,
         "kinds": kinds,
         "viewpoint": content.viewpoint,

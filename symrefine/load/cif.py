@@ -13,7 +13,7 @@ import numpy as np
 from symrefine.errors import InputError
 from symrefine.load.content import Content, Values
 from symrefine.load.elements import atoms, element
-from symrefine.load.extras import library
+from symrefine.load.extras import library, reading
 from symrefine.load.frames import Frames
 from symrefine.load.pdb import check_single
 from symrefine.load.text import is_number, shorten
@@ -43,10 +43,8 @@ def read_cif(data: bytes, named: Collection[str]) -> Frames[Content]:
             coordinates or elements, atoms with alternative places.
     """
     gemmi = library("gemmi", "chem")
-    try:
+    with reading("CIF file"):
         document = gemmi.cif.read_string(data.decode("utf-8", errors="replace"))
-    except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
-        raise InputError(f"not a whole CIF file: {shorten(str(error), 80)}") from None
     models = [model for block in document for model in _models(block, gemmi)]
     if not models:
         raise InputError("holds no coordinates of atoms (_atom_site)")

@@ -1,6 +1,6 @@
 """Content: what a file holds, exactly as written; the readers make it, `mesh` and `load` judge it."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -27,18 +27,25 @@ class Wanted:
     """What a caller wants of a file beyond its coordinates.
 
     Args:
-        fields: names of labels and weights, for formats in which what nobody names is refused.
+        labels: name of a field that becomes labels.
+        weights: name of a field that becomes weights.
         measure: "solid" for the voxels of a volume, else its surface.
         threshold: grey value that makes a picture or a volume binary, or how to find it; None leaves it as it is.
         invert: exchange object and background of a picture or a volume.
         texture: what the faces show, which images beside the file may hold.
     """
 
-    fields: Collection[str] = ()
+    labels: str | None = None
+    weights: str | None = None
     measure: Literal["surface", "solid"] | None = None
     threshold: Threshold | None = None
     invert: bool = False
     texture: bool = False
+
+    @property
+    def fields(self) -> list[str]:
+        """Names of labels and weights, for formats in which what nobody names is refused."""
+        return [name for name in (self.labels, self.weights) if name is not None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -31,7 +31,8 @@ def _molecule(lines: list[Line]) -> Content:
     """Atoms of one record."""
     if len(lines) < _HEADER:
         raise InputError(f"cut off after line {lines[-1][0]}; expected three lines of a header and one of counts")
-    _check_end(lines)
+    if not any(text == "M  END" for _, text in lines):
+        raise InputError(f"cut off: the molecule that begins in line {lines[0][0]} has no line 'M  END'")
     number, counts = lines[_HEADER - 1]
     version = counts[33:].strip()
     if version not in ("V2000", "V3000"):
@@ -62,11 +63,6 @@ def _records(lines: list[Line]) -> list[list[Line]]:
     if len(records) > 1 and not any(text for _, text in records[-1]):
         records.pop()
     return records
-
-
-def _check_end(lines: list[Line]) -> None:
-    if not any(text == "M  END" for _, text in lines):
-        raise InputError(f"cut off: the molecule that begins in line {lines[0][0]} has no line 'M  END'")
 
 
 def _rows_v2000(lines: list[Line]) -> list[_Row]:

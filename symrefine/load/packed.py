@@ -10,6 +10,7 @@ from gzip import BadGzipFile, GzipFile
 from pathlib import Path
 
 from symrefine.errors import InputError
+from symrefine.load.extras import reading
 from symrefine.load.text import shorten
 
 GZIP = ".gz"
@@ -79,20 +80,13 @@ def archive(data: bytes, kind: str, check: Callable[[Collection[str]], object] |
     Raises:
         InputError: no whole archive, or more in it than it may hold.
     """
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as opened:
-            sizes = {member.filename: member.file_size for member in opened.infolist()}
-            if check is not None:
-                check(sizes)
-            if sum(sizes.values()) <= allowance(len(data)):
-                return {name: _member(opened, name, size) for name, size in sizes.items()}
-    except InputError:
-        raise
-    except Exception as error:  # noqa: BLE001 (zipfile leaks many types on damaged files; nothing else in the block)
-        raise InputError(f"not a whole {kind} archive: {shorten(str(error), 80)}") from None
-    raise InputError(
-        f"{len(data):,} bytes unpack to {sum(sizes.values()):,}, at most {allowance(len(data)):,}; save it unpacked"
-    )
+    with reading(f"{kind} archive"), zipfile.ZipFile(io.BytesIO(data)) as opened:
+        sizes = {member.filename: member.file_size for member in opened.infolist()}
+        if check is not None:
+            check(sizes)
+        if (size := sum(sizes.values())) > (most := allowance(len(data))):
+            raise InputError(f"{len(data):,} bytes unpack to {size:,}, at most {most:,}; save it unpacked")
+        return {name: _member(opened, name, size) for name, size in sizes.items()}
 
 
 def _member(opened: zipfile.ZipFile, name: str, size: int) -> bytes:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from symrefine.errors import InputError, about
 from symrefine.geometry import Array
 from symrefine.load.content import Content, Polygons, Values, as_float64
+from symrefine.load.extras import reading
 from symrefine.load.frames import Frames, one
 from symrefine.load.molecule import is_bare_molecule, is_molecule, read_bare_molecule, read_molecule
 from symrefine.load.packed import allowance, archive
@@ -221,13 +222,9 @@ def read_array(stream: io.BytesIO, most: int | None = None) -> NDArray[Any]:
     Args:
         most: bytes that it may take as float64; any, as many as the file has for it, if None.
     """
-    try:
+    with reading(".npy array of numbers"):  # whose header NumPy evaluates
         _check_header(stream, most)
         array: NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)
-    except InputError:
-        raise
-    except Exception as error:  # noqa: BLE001 (NumPy evaluates the header: many types; nothing else in the block)
-        raise InputError(f"not a whole .npy array of numbers: {shorten(str(error), 80)}") from None
     rest = len(stream.read())
     if rest:
         raise InputError(f"{count(rest, 'byte')} behind the array of shape {array.shape}; save it again")

@@ -89,13 +89,7 @@ def with_points(lines: Sequence[Line]) -> list[Line]:
     return [(number, text.replace(",", ".")) for number, text in lines] if comma is not None else list(lines)
 
 
-def parse_table(
-    lines: Sequence[Line],
-    *,
-    columns: Collection[int],
-    layout: str,
-    delimiter: str | None = None,
-) -> Array:
+def parse_table(lines: Sequence[Line], *, columns: Collection[int], layout: str, delimiter: str | None = None) -> Array:
     """Rows of numbers as [N, n] float64, each as precise as it is written.
 
     Args:

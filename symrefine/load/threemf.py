@@ -79,9 +79,7 @@ def read_3mf(data: bytes) -> Content:
         raise InputError("builds no triangles")
     joined = np.concatenate(corners)
     return Content(
-        points=np.concatenate([points for points, _ in meshes]),
-        faces=Polygons.alike(joined),
-        unit=_UNITS[unit],
+        points=np.concatenate([points for points, _ in meshes]), faces=Polygons.alike(joined), unit=_UNITS[unit]
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.load.content import Content, Wanted
-from symrefine.load.extras import library
+from symrefine.load.extras import library, reading
 from symrefine.load.frames import Frames, one
 from symrefine.load.text import count, shorten
 from symrefine.load.volume import Volume, check_size, volume_content
@@ -47,17 +47,14 @@ def read_nifti(data: bytes, wanted: Wanted) -> Frames[Content]:
     """
     nibabel = library("nibabel", "volumes")
     kind = nibabel.Nifti2Image if 540 in _heads(data) else nibabel.Nifti1Image
-    try:
-        with nibabel.imageglobals.LoggingOutputSuppressor(), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            image = kind.from_bytes(data)
-            shape, dtype = image.shape, np.dtype(image.get_data_dtype())
-            start = int(image.dataobj.offset)
-            slope, shift = np.asanyarray(image.dataobj.slope), np.asanyarray(image.dataobj.inter)
-            affine = np.array(image.affine, dtype=np.float64)
-            unit = _NIFTI_UNITS.get(image.header.get_xyzt_units()[0])
-    except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
-        raise InputError(f"not a whole NIfTI file: {shorten(str(error), 80)}") from None
+    with reading("NIfTI file"), nibabel.imageglobals.LoggingOutputSuppressor(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        image = kind.from_bytes(data)
+        shape, dtype = image.shape, np.dtype(image.get_data_dtype())
+        start = int(image.dataobj.offset)
+        slope, shift = np.asanyarray(image.dataobj.slope), np.asanyarray(image.dataobj.inter)
+        affine = np.array(image.affine, dtype=np.float64)
+        unit = _NIFTI_UNITS.get(image.header.get_xyzt_units()[0])
     if dtype.kind not in "iuf":
         raise InputError(f"holds values of type {dtype}; expected real numbers, integer or floating")
     _check_length(shape, dtype, len(data) - start)
@@ -65,11 +62,8 @@ def read_nifti(data: bytes, wanted: Wanted) -> Frames[Content]:
     series = [(0,) * (len(shape) - 3)] if len(shape) == 3 else list(np.ndindex(*shape[3:]))
 
     def scaled(values: Any) -> Any:
-        try:
-            with np.errstate(all="ignore"):
-                return nibabel.volumeutils.apply_read_scaling(values, slope, shift)
-        except Exception as error:  # noqa: BLE001 (as above)
-            raise InputError(f"not a whole NIfTI file: {shorten(str(error), 80)}") from None
+        with reading("NIfTI file"), np.errstate(all="ignore"):
+            return nibabel.volumeutils.apply_read_scaling(values, slope, shift)
 
     def made(k: int) -> Content:
         values = np.frombuffer(data, dtype, offset=start).reshape(shape, order="F")[(..., *series[k])]
@@ -117,13 +111,10 @@ def read_mrc(data: bytes, wanted: Wanted) -> Frames[Content]:
             f"has an extended header of {min(extended)} bytes, which {len(data)} cannot hold; not a MRC file?"
         )
     head = data[: 1024 + max(size for size in extended if size <= len(data))]  # of all it would make a copy
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            header = interpreter.MrcInterpreter(iostream=io.BytesIO(head), header_only=True).header.copy()
-            dtype, shape = known.data_dtype_from_header(header), known.data_shape_from_header(header)
-    except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
-        raise InputError(f"not a whole MRC file: {shorten(str(error), 80)}") from None
+    with reading("MRC file"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        header = interpreter.MrcInterpreter(iostream=io.BytesIO(head), header_only=True).header.copy()
+        dtype, shape = known.data_dtype_from_header(header), known.data_shape_from_header(header)
     if dtype.kind not in "iuf":
         raise InputError(f"holds values of {dtype}; expected real numbers")
     start = 1024 + int(header.nsymbt)
@@ -164,12 +155,9 @@ def read_nrrd(data: bytes, wanted: Wanted) -> Frames[Content]:
     """
     nrrd = library("nrrd", "volumes")
     stream = io.BytesIO(data)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            header = nrrd.read_header(stream)
-    except Exception as error:  # noqa: BLE001 (a third party's reader, and nothing else, in the block)
-        raise InputError(f"not a whole NRRD file: {shorten(str(error), 80)}") from None
+    with reading("NRRD file"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        header = nrrd.read_header(stream)
     detached = {"data file", "datafile", "line skip", "lineskip", "byte skip", "byteskip"} & set(header)
     if detached:
         raise InputError(f"has {min(detached)!r}: expected header and data in one file, one behind the other")

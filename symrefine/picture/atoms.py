@@ -7,7 +7,7 @@ import numpy as np
 
 from symrefine.geometry import Array, ReadOnly, frame_with_z
 from symrefine.picture.chemistry import colour, is_element, radius
-from symrefine.picture.palette import OBJECT, PALETTE
+from symrefine.picture.palette import OBJECT, PALETTE, shade
 from symrefine.shape import Index, Shape
 
 # Two atoms are bonded that are no farther apart than so many sums of their radii, in units in which most atoms touch
@@ -68,7 +68,7 @@ def _looks(shape: Shape) -> tuple[Array | None, Array]:
     """Radii [N] in the units of the shape, where elements are known, and colours [N, 3], 0 to 1."""
     labels = shape.labels
     if labels is None:
-        return None, np.tile(np.array(OBJECT) / 255.0, (len(shape.points), 1))
+        return None, np.tile(shade(OBJECT), (len(shape.points), 1))
     if shape.elements and all(is_element(int(k)) for k in np.unique(labels)):
         radii = np.array([radius(int(k)) for k in labels])
         return radii * _unit_of_length(shape.points, radii), np.array([colour(int(k)) for k in labels]) / 255.0

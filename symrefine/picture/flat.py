@@ -6,7 +6,7 @@ import numpy as np
 
 from symrefine.geometry import Array, Plane, ReadOnly
 from symrefine.picture.canvas import TITLE, Canvas
-from symrefine.picture.palette import AXIS, MISS, OBJECT, Colour, plane_colour
+from symrefine.picture.palette import AXIS, MISS, OBJECT, Colour, plane_colour, shade
 from symrefine.picture.words import order_name, planar_headline
 from symrefine.plane.detection import PlanarDetection
 from symrefine.plane.raster import Raster, coarser, raster_of
@@ -36,7 +36,7 @@ class FlatScene:
         center: [2] what the turns leave in place.
         diagonal: of the smallest box around the object.
         raster: its pixels, or None for points.
-        points: [N, 2] of it; some, where they are many.
+        points: [N, 2] of it; some, where they are many; of pixels, how far they reach.
         lines: mirror lines that were found.
         missed: those of the near misses, None for turns.
         order: of the turns; 1 where there are none.
@@ -62,7 +62,7 @@ def flat_scene(detection: PlanarDetection, shape: Shape) -> FlatScene:
     """What there is to draw."""
     points = shape.points - detection.center
     raster = raster_of(shape.points, shape.weights)
-    missed = [None if m.line is None else m.line for m in detection.near_misses]
+    some = points[:: max(1, -(-len(points) // MOST_POINTS))]
 
     def stroke(line: Plane, name: str, colour: Colour) -> Stroke:
         foot = (line.offset - float(line.normal @ detection.center)) * line.normal
@@ -76,9 +76,12 @@ def flat_scene(detection: PlanarDetection, shape: Shape) -> FlatScene:
         center=detection.center,
         diagonal=detection.diagonal,
         raster=None if raster is None else coarser(raster, MOST_CELLS),
-        points=points[:: max(1, -(-len(points) // MOST_POINTS))] if raster is None else _corners(points),
+        points=some if raster is None else np.stack([points.min(axis=0), points.max(axis=0)]),
         lines=tuple(stroke(found.line, str(k + 1), plane_colour(k)) for k, found in enumerate(detection.lines)),
-        missed=tuple(None if m is None else stroke(m, f"near miss {k}", MISS) for k, m in enumerate(missed, start=1)),
+        missed=tuple(
+            None if m.line is None else stroke(m.line, f"near miss {k}", MISS)
+            for k, m in enumerate(detection.near_misses, start=1)
+        ),
         order=1.0 if detection.rotation is None else detection.rotation.order,
     )
 
@@ -96,9 +99,9 @@ def flat_png(detection: PlanarDetection, shape: Shape, *, width: int, height: in
     _draw_object(axes, scene)
     strokes = scene.lines or tuple(m for m in scene.missed if m is not None)[:1]
     for stroke in strokes:
-        axes.plot(*stroke.ends.T, color=_rgb(stroke.colour), linewidth=2.6, dashes=() if scene.lines else (5, 3))
+        axes.plot(*stroke.ends.T, color=shade(stroke.colour), linewidth=2.6, dashes=() if scene.lines else (5, 3))
     if scene.order > 1:
-        axes.plot([0.0], [0.0], marker="o", markersize=9, color=_rgb(AXIS), markeredgecolor="white")
+        axes.plot([0.0], [0.0], marker="o", markersize=9, color=shade(AXIS), markeredgecolor="white")
 
     def name(text: str, at: Array, colour: Colour) -> None:
         x, y = 0.5 + 0.5 * at / radius
@@ -121,13 +124,13 @@ def placed_cells(raster: Raster, center: Array) -> Array:
 def _draw_object(axes, scene: FlatScene) -> None:  # type: ignore[no-untyped-def]
     if scene.raster is None:
         size = np.clip(4000.0 / len(scene.points), 1.5, 90.0)
-        axes.scatter(*scene.points.T, s=size, color=_rgb(OBJECT), linewidths=0)
+        axes.scatter(*scene.points.T, s=size, color=shade(OBJECT), linewidths=0)
         return
     from matplotlib.transforms import Affine2D
 
     (a, c, e), (b, d, f) = placed_cells(scene.raster, scene.center).tolist()
     share = shares(scene.raster)
-    tint = np.broadcast_to(np.array(OBJECT) / 255.0, (*share.shape, 3))
+    tint = np.broadcast_to(shade(OBJECT), (*share.shape, 3))
     picture = axes.imshow(np.dstack([tint, share]), origin="lower", interpolation="antialiased", aspect="auto")
     picture.set_transform(Affine2D.from_values(a, b, c, d, e, f) + axes.transData)
     radius = scene.radius
@@ -137,15 +140,3 @@ def _draw_object(axes, scene: FlatScene) -> None:  # type: ignore[no-untyped-def
 def shares(raster: Raster) -> Array:
     """How much [H, W] of each cell is object, 0 to 1."""
     return np.asarray(np.clip(raster.values / max(float(np.quantile(raster.values, 0.99)), 1e-300), 0.0, 1.0))
-
-
-def _corners(points: Array) -> Array:
-    """The outermost of many points, which say how far they reach."""
-    angles = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
-    reach = points @ np.stack([np.cos(angles), np.sin(angles)])
-    return np.asarray(points[np.unique(reach.argmax(axis=0))])
-
-
-def _rgb(colour: Colour) -> tuple[float, float, float]:
-    r, g, b = colour
-    return r / 255, g / 255, b / 255

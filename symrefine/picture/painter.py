@@ -9,7 +9,7 @@ import numpy as np
 
 from symrefine.geometry import Array, unit
 from symrefine.picture.camera import Camera
-from symrefine.picture.palette import Colour
+from symrefine.picture.palette import shade
 from symrefine.picture.raster import Raster
 from symrefine.picture.scene import Line, Quad, Scene
 from symrefine.picture.surface import Surface
@@ -157,7 +157,7 @@ def _trace(picture: Array, depth: Array, quad: Quad, pixels: Pixels) -> None:
     y, x, slope = y[smooth], x[smooth], slope[smooth]
     away = np.abs(distance[y, x]) / (pixel[y, x] * slope)
     cover = 0.85 * np.clip(0.5 * TRACE * FINER + 0.5 - away, 0.0, 1.0)[:, None]
-    picture[y, x] += cover * (_rgb(quad.colour) - picture[y, x])
+    picture[y, x] += cover * (shade(quad.colour) - picture[y, x])
 
 
 def _strokes(planes: tuple[Quad, ...], axes: tuple[Line, ...], camera: Camera, raster: Raster) -> Strokes:
@@ -171,7 +171,7 @@ def _strokes(planes: tuple[Quad, ...], axes: tuple[Line, ...], camera: Camera, r
     return Strokes(
         depth=raster.depth(),
         number=raster.numbers(),
-        colours=np.array([_rgb(colour) for _, _, colour, _ in drawn]).reshape(-1, 3),
+        colours=np.array([shade(colour) for _, _, colour, _ in drawn]).reshape(-1, 3),
         ghosts=np.array([ghost for _, _, _, ghost in drawn]),
     )
 
@@ -199,7 +199,7 @@ def _blend(
     stack, number = stack[:, there], strokes.number[rows][there]
     line_opacity = np.where(hidden[there], strokes.ghosts[number], 1.0) if len(strokes.ghosts) else 0.0
     line_colour = strokes.colours[number] if len(strokes.ghosts) else np.zeros((1, 3))
-    colours = np.array([*(_rgb(quad.colour) for quad in planes), np.zeros(3)])
+    colours = np.array([*(shade(quad.colour) for quad in planes), np.zeros(3)])
     opacity = float(np.clip(0.9 / max(1, len(planes)), 0.09, 0.26))
     mixed = picture[rows][there]
     for k in np.argsort(-stack, axis=0, kind="stable"):
@@ -208,7 +208,3 @@ def _blend(
         share = np.where(np.isfinite(np.take_along_axis(stack, k[None], axis=0)[0]), share, 0.0)
         mixed += share[:, None] * (np.where(is_line[:, None], line_colour, colours[k]) - mixed)
     picture[rows][there] = mixed
-
-
-def _rgb(colour: Colour) -> Array:
-    return np.array(colour) / 255.0

@@ -17,7 +17,7 @@ from symrefine.geometry import Array, ReadOnly, rotation
 from symrefine.groups.orthogonal import axes_and_angles
 from symrefine.moments.quadrature import sample_surface
 from symrefine.picture.atoms import balls
-from symrefine.picture.palette import CONTRADICTED, INFERRED, OBJECT, OUTLIER, SOURCE, Colour
+from symrefine.picture.palette import CONTRADICTED, INFERRED, OBJECT, OUTLIER, SOURCE, Colour, shade
 from symrefine.picture.scene import Scene, Stage, main_part
 from symrefine.picture.surface import MOST_POINTS, Surface, make_surface
 from symrefine.picture.words import percent
@@ -144,7 +144,7 @@ class Side(ReadOnly):
             made = replace(made, radius=CLOSED * made.radius)
         if self.atoms and self.shape.elements:
             return made
-        return replace(made, colours=np.tile(np.array(self.colour) / 255.0, (len(made.colours), 1)))
+        return replace(made, colours=np.tile(shade(self.colour), (len(made.colours), 1)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -196,7 +196,7 @@ class Pair:
         colours, told = own.copy(), np.nan_to_num(misses)
         verdicts = ((np.isnan(misses), INFERRED), (told > self.far, CONTRADICTED), (told < 0.0, OUTLIER))
         for which, colour in verdicts:
-            colours[which] = np.array(colour) / 255.0
+            colours[which] = shade(colour)
         return colours
 
     def beside(self, direction: Array) -> Array:

@@ -22,10 +22,15 @@ CONTRADICTED: Colour = (200, 30, 70)
 OUTLIER: Colour = (190, 70, 110)
 
 
+def shade(colour: Colour) -> Array:
+    """A colour as three numbers from 0 to 1."""
+    return np.array(colour) / 255.0
+
+
 def class_colours(labels: Index | None, count: int) -> Array:
     """Colours [count, 3], 0 to 1, by class: grey what most are of, or all where there are no classes."""
     if labels is None:
-        return np.tile(np.array(OBJECT) / 255.0, (count, 1))
+        return np.tile(shade(OBJECT), (count, 1))
     _, which, sizes = np.unique(labels, return_inverse=True, return_counts=True)
     colours = np.array([PALETTE[k % len(PALETTE)] for k in range(len(sizes))])
     colours[sizes.argmax()] = OBJECT

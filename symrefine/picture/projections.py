@@ -7,7 +7,7 @@ import numpy as np
 from symrefine.geometry import Array, ReadOnly, toward_positive, unit
 from symrefine.ndim.detection import Hyperplane, SubspaceDetection
 from symrefine.picture.canvas import TITLE, Canvas
-from symrefine.picture.palette import MISS, OBJECT, Colour, plane_colour
+from symrefine.picture.palette import MISS, OBJECT, Colour, plane_colour, shade
 from symrefine.picture.words import subspace_headline
 from symrefine.shape import Shape
 
@@ -78,11 +78,11 @@ def projections_png(detection: SubspaceDetection, shape: Shape, *, width: int, h
 def _draw(axes, projection: Projection, radius: float) -> None:  # type: ignore[no-untyped-def]
     axes.set(xlim=(-radius, radius), ylim=(-radius, radius))
     size = float(np.clip(4000.0 / len(projection.points), 4.0, 60.0))
-    axes.scatter(*projection.points.T, s=size, color=[c / 255 for c in OBJECT], linewidths=0)
+    axes.scatter(*projection.points.T, s=size, color=shade(OBJECT), linewidths=0)
     axes.plot(
         [0, 0],
         [-0.93 * radius, 0.84 * radius],
-        color=[c / 255 for c in projection.colour],
+        color=shade(projection.colour),
         linewidth=2.4,
         dashes=(5, 3) if projection.missed else (),
     )

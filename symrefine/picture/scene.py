@@ -12,7 +12,7 @@ from symrefine.complete import Verdicts, verdicts
 from symrefine.detection.result import Detection, FoundAxis
 from symrefine.geometry import Array, Mask, Plane, ReadOnly, unit
 from symrefine.picture.atoms import Balls, balls
-from symrefine.picture.palette import AXIS, CONTRADICTED, INFERRED, MISS, Colour, class_colours, plane_colour
+from symrefine.picture.palette import AXIS, CONTRADICTED, INFERRED, MISS, Colour, class_colours, plane_colour, shade
 from symrefine.picture.rows import SAME_LINE_RAD
 from symrefine.picture.upright import sign, upright
 from symrefine.picture.words import order_name
@@ -142,8 +142,8 @@ class Scan(ReadOnly):
     @property
     def colours(self) -> Array:
         """[N + K, 3] of these points, 0 to 1."""
-        seen = np.where(self.contradicted[:, None], np.array(CONTRADICTED) / 255.0, self.plain)
-        return np.concatenate([seen, np.tile(np.array(INFERRED) / 255.0, (len(self.inferred), 1))])
+        seen = np.where(self.contradicted[:, None], shade(CONTRADICTED), self.plain)
+        return np.concatenate([seen, np.tile(shade(INFERRED), (len(self.inferred), 1))])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -180,7 +180,7 @@ class Scene:
 def make_scene(detection: Detection, shape: Shape) -> Scene:
     """The scene of a detection; planes are named 1, 2, ... in their order there, axes by their symbol."""
     stage, solid = make_stage(detection, shape), None
-    if are_atoms(detection, shape):
+    if shape.faces is None and detection.surface.cloud.body == "atoms":  # points that stand for themselves
         solid = balls(replace(shape, points=shape.points - detection.center))
         stage = replace(stage, points=solid.points)
     missed_planes, missed_axes = _missed(detection, stage)
@@ -194,11 +194,6 @@ def make_scene(detection: Detection, shape: Shape) -> Scene:
         balls=solid,
         outliers=detection.outliers,
     )
-
-
-def are_atoms(detection: Detection, shape: Shape) -> bool:
-    """Whether the points of a shape stand for themselves."""
-    return shape.faces is None and detection.surface.cloud.body == "atoms"
 
 
 def _scan(detection: Detection, shape: Shape) -> Scan:

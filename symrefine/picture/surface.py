@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from symrefine.geometry import Array, ReadOnly
 from symrefine.moments.quadrature import triangle_areas_and_normals
-from symrefine.picture.palette import OUTLIER, class_colours
+from symrefine.picture.palette import OUTLIER, class_colours, shade
 from symrefine.picture.scene import Quad, Scene
 from symrefine.shape import Index, Shape
 from symrefine.texture import Texture
@@ -79,7 +79,7 @@ def make_surface(shape: Shape, scene: Scene) -> Surface:
     radius = COVER * stage.diagonal * _spacing(points / stage.diagonal)
     colours = class_colours(shape.labels, len(every)) if scene.scan is None else scene.scan.colours.copy()
     if scene.scan is None:
-        colours[scene.outliers] = np.array(OUTLIER) / 255.0
+        colours[scene.outliers] = shade(OUTLIER)
     plain = colours[::step]
     known = None if scene.scan is not None else shape.normals
     return Surface(
@@ -98,7 +98,7 @@ def _tinted(plain: Array, points: Array, planes: tuple[Quad, ...], width: float)
     for quad in planes:
         near = np.abs((points - quad.corners[0]) @ quad.normal) < width
         if near.mean() < FLAT:
-            colours[near] += 0.75 * (np.array(quad.colour) / 255.0 - colours[near])
+            colours[near] += 0.75 * (shade(quad.colour) - colours[near])
     return colours
 
 

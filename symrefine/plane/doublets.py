@@ -82,10 +82,7 @@ def classify_doublets(moments: Moments, tolerance: float, pixel_noise: float) ->
         angle_rad=float(np.arctan2(along[1], along[0]) % np.pi),
         vectors=tuple(
             VectorDoublets(
-                orders=orders,
-                doublets=tuples.vectors,
-                singular_values=own.singular_values,
-                vanish=own.rank == 0,
+                orders=orders, doublets=tuples.vectors, singular_values=own.singular_values, vanish=own.rank == 0
             )
             for (orders, tuples), own in zip(each, owns, strict=True)
         ),

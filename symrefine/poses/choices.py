@@ -24,7 +24,12 @@ from symrefine.rounding import DOUBLE
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """What the operations of a symmetry offer, and what sees the vertices: a camera [3, 3], or None in space."""
+    """What the operations of a symmetry offer, and what sees the vertices: a camera [3, 3], or None in space.
+
+    All of finitely many operations are tried, and all turns about an axis, for Dinf also those after a half turn across
+    it. Of a sphere there is nothing to choose: with the nearest rotation only the centre is out of place. In space that
+    is the best of all, since the centre lies among the vertices: no other turn brings all of them closer.
+    """
 
     symmetry: Symmetry
     camera: Array | None
@@ -32,11 +37,25 @@ class Choices:
     @property
     def count(self) -> int:
         """Operations that are tried at once; none where the nearest turn is taken."""
-        return 0
+        group = self.symmetry.group
+        if group.is_finite:
+            return int(group.order)
+        return 0 if group.symbol.family == "K" else MAX_FOLD
 
     def best(self, a: Array, b: Array, vertices: Array) -> tuple[Array, Array]:
         """The least largest distance [n] of vertices [n, m, 3] in poses a and b S [n, 4, 4], and those b S."""
-        raise NotImplementedError
+        group = self.symmetry.group
+        if group.is_finite:
+            poses = self.symmetry.turned(b[:, None], group.operations())
+            low, best = self._least(a, poses, vertices)
+            return low, poses[np.arange(len(a)), best]
+        about_axis = self._by_waves if self.camera is None else self._by_search
+        bases = [b, self._about_axis(b, np.zeros(len(b)), -1.0)] if group.symbol.family == "D" else [b]
+        found = [about_axis(a, base, vertices) for base in bases]
+        low = np.array([value for value, _ in found])
+        chosen = low.argmin(axis=0), np.arange(len(a))
+        turned = np.array([self._about_axis(base, angles) for base, (_, angles) in zip(bases, found, strict=True)])
+        return low[chosen], turned[chosen]
 
     def _least(self, a: Array, poses: Array, vertices: Array) -> tuple[Array, Index]:
         """Of poses [n, k, 4, 4] those [n] with the least largest distance, and it [n]."""
@@ -47,66 +66,14 @@ class Choices:
             low[batch], best[batch] = misses.min(axis=1), misses.argmin(axis=1)
         return low, best
 
-
-class Sphere(Choices):
-    """All rotations: with the nearest, only the centre is out of place.
-
-    In space that is the best of all, since the centre lies among the vertices: no other turn brings all of them closer.
-    """
-
-    __slots__ = ()
-
-
-class Finite(Choices):
-    """Finitely many operations: all are tried."""
-
-    __slots__ = ()
-
-    @property
-    def count(self) -> int:
-        return int(self.symmetry.group.order)
-
-    def best(self, a: Array, b: Array, vertices: Array) -> tuple[Array, Array]:
-        poses = self.symmetry.turned(b[:, None], self.symmetry.group.operations())
-        low, best = self._least(a, poses, vertices)
-        return low, poses[np.arange(len(a)), best]
-
-
-class Revolution(Choices):
-    """All turns about an axis, and for Dinf those after a half turn across it."""
-
-    __slots__ = ()
-
-    @property
-    def count(self) -> int:
-        return MAX_FOLD
-
-    def about(self, poses: Array, angles_rad: Array, over: float = 1.0) -> Array:
+    def _about_axis(self, poses: Array, angles_rad: Array, over: float = 1.0) -> Array:
         """Poses [..., 4, 4] turned by angles [...] about the axis, after a half turn across it where `over` is -1."""
         frame = self.symmetry.group.frame
         turns = about_z(over, over, angles_rad.ravel()).reshape(*angles_rad.shape, 3, 3)
         return self.symmetry.turned(poses, frame.T @ turns @ frame)
 
-    def best(self, a: Array, b: Array, vertices: Array) -> tuple[Array, Array]:
-        sides = (1.0, -1.0) if self.symmetry.group.symbol.family == "D" else (1.0,)
-        bases = [b if over > 0.0 else self.about(b, np.zeros(len(b)), over) for over in sides]
-        found = [self._about_axis(a, base, vertices) for base in bases]
-        low = np.array([value for value, _ in found])
-        best = low.argmin(axis=0), np.arange(len(a))
-        turned = np.array([self.about(base, angles) for base, (_, angles) in zip(bases, found, strict=True)])
-        return low[best], turned[best]
-
-    def _about_axis(self, a: Array, b: Array, vertices: Array) -> tuple[Array, Array]:
-        """The least largest distance [n] over turns of b about the axis, and their angles [n]."""
-        raise NotImplementedError
-
-
-class Waves(Revolution):
-    """Turns about an axis, as distances in space tell them: in closed form."""
-
-    __slots__ = ()
-
-    def _about_axis(self, a: Array, b: Array, vertices: Array) -> tuple[Array, Array]:
+    def _by_waves(self, a: Array, b: Array, vertices: Array) -> tuple[Array, Array]:
+        """The least largest distance [n] over turns of b about the axis, and their angles [n]: in closed form."""
         low, angles = np.empty(len(a)), np.empty(len(a))
         for batch in batches(len(a), 4 * vertices.shape[1] ** 3):
             low[batch], angles[batch] = _lowest(*self._waves(a[batch], b[batch], vertices[batch]))
@@ -122,22 +89,17 @@ class Waves(Revolution):
         q = x[..., 0] * apart[..., 1] - x[..., 1] * apart[..., 0]
         return (apart**2).sum(axis=-1), p, q
 
-
-class Search(Revolution):
-    """Turns about an axis, as images tell them: the best of many, then the bottom beside it by a golden section."""
-
-    __slots__ = ()
-
-    def _about_axis(self, a: Array, b: Array, vertices: Array) -> tuple[Array, Array]:
+    def _by_search(self, a: Array, b: Array, vertices: Array) -> tuple[Array, Array]:
+        """The same of images: the best of many turns, then the bottom beside it by a golden section."""
         # Turns that a search looks at before it goes closer: nobody tells them from all (BOP evaluates 315).
         step = 2.0 * np.pi / MAX_FOLD
         turns = step * np.arange(MAX_FOLD)
         seen = image(a, vertices, self.camera)
 
         def at(angles: Array) -> Array:
-            return largest(seen, self.about(b, angles), vertices, self.camera)
+            return largest(seen, self._about_axis(b, angles), vertices, self.camera)
 
-        first, best = self._least(a, self.about(b[:, None], np.tile(turns, (len(b), 1))), vertices)
+        first, best = self._least(a, self._about_axis(b[:, None], np.tile(turns, (len(b), 1))), vertices)
         angles = _golden(at, turns[best] - step, turns[best] + step)
         last = at(angles)
         return np.minimum(first, last), np.where(last < first, angles, turns[best])
@@ -168,15 +130,6 @@ def _golden(at: Callable[[Array], Array], low: Array, high: Array) -> Array:
         inner, outer = high - (high - low) / GOLDEN, low + (high - low) / GOLDEN
         left, right = at(inner), at(outer)
     return 0.5 * (low + high)
-
-
-def choices_of(symmetry: Symmetry, camera: Array | None) -> Choices:
-    """Those of a symmetry."""
-    if symmetry.group.is_finite:
-        return Finite(symmetry, camera)
-    if symmetry.group.symbol.family == "K":
-        return Sphere(symmetry, camera)
-    return Waves(symmetry, camera) if camera is None else Search(symmetry, camera)
 
 
 def image(poses: Array, vertices: Array, camera: Array | None) -> Array:

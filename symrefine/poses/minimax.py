@@ -9,7 +9,7 @@ at all vertices for one operation only.
 import numpy as np
 
 from symrefine.geometry import Array, batches
-from symrefine.poses.choices import Choices, choices_of, image
+from symrefine.poses.choices import Choices, image
 from symrefine.poses.symmetry import Symmetry
 from symrefine.rounding import DOUBLE
 
@@ -17,7 +17,7 @@ from symrefine.rounding import DOUBLE
 def least_largest(symmetry: Symmetry, a: Array, b: Array, vertices: Array, camera: Array | None = None) -> Array:
     """The least largest distances [...] of vertices [V, 3] in poses a and b [..., 4, 4], in space or in pixels."""
     shape, a, b = a.shape[:-2], a.reshape(-1, 4, 4), b.reshape(-1, 4, 4)
-    choices = choices_of(symmetry, camera)
+    choices = Choices(symmetry, camera)
     found = np.empty(len(a))
     for batch in batches(len(a), 12 * max(len(vertices), choices.count)):
         found[batch] = _bounded(choices, a[batch], symmetry.toward(b[batch], a[batch, :3, :3]), vertices)

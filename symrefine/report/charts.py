@@ -42,7 +42,8 @@ def line_chart(title: str, values: Sequence[float], *, first: int, unit: str, na
     for (x, y), (k, v) in zip(points, kept, strict=True):
         hint = f"<title>iteration {k}: {_short(v)}{unit}</title>"
         parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.2" class="{name}">{hint}</circle>')
-    return _svg(title, WIDTH, HEIGHT, parts)
+    shown = f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(title, quote=True)}">'
+    return f"{shown}{''.join(parts)}</svg>"
 
 
 def bar_chart(title: str, rows: Sequence[tuple[str, float, str, bool]], threshold: float, threshold_name: str) -> str:
@@ -114,14 +115,6 @@ def _decided(
 def _asked(is_asked: bool) -> str:
     """The mark of the column of the tolerance that was asked for."""
     return ' class="asked"' if is_asked else ""
-
-
-def _svg(title: str, width: int, height: int, parts: Sequence[str]) -> str:
-    return (
-        f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{escape(title, quote=True)}">'
-        + "".join(parts)
-        + "</svg>"
-    )
 
 
 def _text(x: float, y: float, text: str, anchor: str) -> str:

@@ -89,15 +89,7 @@ def space_elements(detection: Detection, scene: Scene) -> list[Element]:
     ]
     axes = [_axis(d, scene, row, found) for row, found in zip(rows[len(d.planes) :], d.axes, strict=False)]
     central = [
-        Element(
-            row=row,
-            kind="inversion",
-            missed=False,
-            direction=np.zeros(3),
-            point=d.center,
-            place="",
-            order=2.0,
-        )
+        Element(row=row, kind="inversion", missed=False, direction=np.zeros(3), point=d.center, place="", order=2.0)
         for row in rows[len(d.planes) + len(d.axes) :]
     ]
     return [*planes, *axes, *central, *_missed(d, scene)]

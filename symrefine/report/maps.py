@@ -13,7 +13,7 @@ from symrefine.picture.camera import FOV_RAD, look_at
 from symrefine.picture.pair import MOST_WAYS, Pair, Shares, Side, Way
 from symrefine.picture.pair_png import pair_png
 from symrefine.picture.pair_words import answer, headline, named, summary
-from symrefine.picture.palette import OUTLIER, plane_colour
+from symrefine.picture.palette import OUTLIER, plane_colour, shade
 from symrefine.picture.words import coordinates, percent
 from symrefine.report.listing import HEIGHT, WIDTH, chooser, stage, still
 from symrefine.report.markup import Page, copy_button, facts, head, plain, prose, rounded, section
@@ -116,13 +116,9 @@ def _facts(found: Alignment, pair: Pair) -> str:
         ("Scale", f"{found.scale:.6g}"),
         ("RMS distance", percent(found.rms)),
         ("Rotation known to", known),
-        *((f"{name} as drawn: {side.name}", str(shares)) for name, side, shares in _told(pair)),
     ]
-    return facts(pairs)
-
-
-def _told(pair: Pair) -> list[tuple[str, Side, Shares]]:
-    return [(n, s, t) for n, s, t in zip(("Source", "Target"), pair.sides, pair.shares(0), strict=True)]
+    drawn = zip(("Source", "Target"), pair.sides, pair.shares(0), strict=True)
+    return facts([*pairs, *((f"{name} as drawn: {side.name}", str(shares)) for name, side, shares in drawn)])
 
 
 def _matrix(found: Alignment, pair: Pair) -> str:
@@ -163,15 +159,11 @@ def _body(pair: Pair, side: Side) -> dict[str, Any]:
     surface, most = side.surface(), MOST_MISSES // (2 * len(pair.ways))
     if surface.faces is None:
         stray = pair.misses(side.index, surface.points)[0] < 0.0
-        colours = np.where(stray[:, None], np.array(OUTLIER) / 255.0, surface.colours)
+        colours = np.where(stray[:, None], shade(OUTLIER), surface.colours)
         surface = replace(surface, colours=colours)
     parts = packed(surface, side.scene(pair.diagonal), most)
     misses = np.maximum(pair.misses(side.index, parts.pop("places")), 0.0)
-    return {
-        **parts,
-        "outline": outline(side.outline / pair.diagonal),
-        **heat(misses, pair.tolerance),
-    }
+    return {**parts, "outline": outline(side.outline / pair.diagonal), **heat(misses, pair.tolerance)}
 
 
 def _element(index: int, way: Way, pair: Pair, beside: Array) -> dict[str, Any]:

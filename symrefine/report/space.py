@@ -132,7 +132,7 @@ def _list(d: Detection, elements: Sequence[Element]) -> str:
             colour=e.row.colour,
             kind=_kind(e, d),
             vector="" if e.kind == "inversion" else direction(e.direction),
-            place=_place(e),
+            place="about the centre" if e.kind == "inversion" else e.place,
             misses=e.row.residual,
             share=e.row.residual.p95 / (LIMITS[1] * d.tolerance),
             score=e.row.score,
@@ -182,10 +182,6 @@ def _only_textured(d: Detection, textured: Detection) -> str:
     alone = [one for one in _said(textured) if not kept(one, own)]
     told = [f"{kind_name(kind, order)} {direction(np.array(along))}" for kind, along, order in alone]
     return "; ".join(["", *told[:_TOLD]]) + "; ..." * (len(told) > _TOLD)
-
-
-def _place(element: Element) -> str:
-    return "about the centre" if element.kind == "inversion" else element.place
 
 
 def _axes_title(elements: Sequence[Element]) -> str:

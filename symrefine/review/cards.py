@@ -17,7 +17,7 @@ from symrefine.errors import one_line
 from symrefine.picture.words import percent, symbol
 from symrefine.report.markup import Page, plain, prose
 from symrefine.report.page import filled
-from symrefine.review.decisions import SCHEMA, Decision, Decisions
+from symrefine.review.decisions import SCHEMA, Decisions
 from symrefine.review.labels import Label, Labels
 from symrefine.review.objects import Choice, Row, choice_of
 from symrefine.review.store import place_of_picture
@@ -54,7 +54,7 @@ def page_text(
     shown = [*waiting, *(number for number in order if number in labels)][:MOST]
     cards = {number: rows[number] for number in shown}
     states = {number: _state(labels.get(number)) for number in shown}
-    decided = {number: _as_saved(decisions.get(number)) for number in shown}
+    decided = {number: asdict(decisions[number]) if number in decisions else None for number in shown}
     used = set(order)
     failed = [number for number in rows if number not in used]
     told = f"{len(waiting)} {'object' if len(waiting) == 1 else 'objects'} to look at"
@@ -82,11 +82,6 @@ def _state(label: Label | None) -> State:
     if label is None:
         return "open"
     return "decided" if label.by == "person" else "accepted"
-
-
-def _as_saved(decision: Decision | None) -> dict[str, Any] | None:
-    """What a person decided before, as the page saves it."""
-    return None if decision is None else asdict(decision)
 
 
 def _head(told: str, folder: str, again: Sequence[str]) -> str:

@@ -143,13 +143,7 @@ def _make(folder: Path) -> None:
 
 
 def _write(
-    plan: Plan,
-    folder: Path,
-    stamp: Stamp,
-    found: Latest,
-    measures: Sequence[Measure],
-    before: int,
-    progress: Progress,
+    plan: Plan, folder: Path, stamp: Stamp, found: Latest, measures: Sequence[Measure], before: int, progress: Progress
 ) -> Outcome:
     """Write rows first, then what is made of them."""
     order = sorted(found)

@@ -102,12 +102,12 @@ def symmetrize(
         raise InputError(f"{shape.source}: C1 has no operation but the identity: there is nothing to make symmetric")
     work = _start(shape, center, group, copied=shape.faces is None, seed=seed)
     work, action = _counterparts(work, REACH * tolerance)
-    few = len(work.rows) <= FEW and shape.faces is None
-    if _corresponds(work.points, action, few):
+    few = len(work.own.rows) <= FEW and shape.faces is None
+    if _corresponds(work.own.points, action, few):
         return work.by_vertices(action)
     if few:
         raise DegenerateShapeError(
-            f"{shape.source}: {int((~action.closed).sum())} of {len(work.rows)} points have no counterpart under "
+            f"{shape.source}: {int((~action.closed).sum())} of {len(work.own.rows)} points have no counterpart under "
             f"{work.place.group.name}; so few points stand for themselves, not for a surface: choose a subgroup "
             "(--group)"
         )
@@ -137,28 +137,22 @@ def _corresponds(points: Array, action: Action, few: bool) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Work:
-    """What every method starts from: distinct points in units of the diagonal about the given centre.
-
-    `rows` are those of the distinct points (and labels), `back` [N] tells which of them each point is.
-    """
+    """What every method starts from: its own distinct points, in units of the diagonal about the given centre."""
 
     shape: Shape
     center: Array
     diagonal: float
-    points: Array
-    rows: Index
-    back: Index
-    labels: Index | None
+    own: Distinct
     place: Placed
     rng: np.random.Generator
 
     def by_vertices(self, action: Action) -> Symmetrized:
         """Points that correspond: means over orbits, about the place that moves them least."""
-        place = settled(self.points, action.images, self.place)
+        place = settled(self.own.points, action.images, self.place)
         wanted = self._means(action, place)
         made = replace(
             self.shape,
-            points=wanted[self.back],
+            points=wanted[self.own.back],
             weights=self._even_weights(action),
             normals=self._mean_normals(action, place),
         )
@@ -168,7 +162,7 @@ class _Work:
         """A cloud of a surface: its points on the symmetric surface, of which one sector is copied to the others."""
         place, wanted = self._onto_surface()
         rows = _sector(wanted - place.center, place.group)
-        operations, owners = place.group.operations(), self.rows[rows]
+        operations, owners = place.group.operations(), self.own.rows[rows]
         copies = _turned(operations, wanted[rows] - place.center)
         weights, normals, labels = self.shape.weights, self.shape.normals, self.shape.labels
         keep = _once(copies, np.tile(owners, len(operations)) if labels is not None else None)
@@ -184,19 +178,19 @@ class _Work:
     def by_surface(self, action: Action) -> Symmetrized:
         """A mesh: vertices with counterparts go to their means, the others onto the symmetric surface."""
         place, wanted = self._onto_surface()
-        own = action.miss < OWN * cKDTree(self.points).query(self.points, k=2)[0][:, 1]
+        own = action.miss < OWN * cKDTree(self.own.points).query(self.own.points, k=2)[0][:, 1]
         paired = action.closed & own & own[action.images].all(axis=0)
         wanted[paired] = self._means(action, place)[paired]
-        made = replace(self.shape, points=wanted[self.back])
+        made = replace(self.shape, points=wanted[self.own.back])
         residual = _miss(wanted, place, closest_on(made, self.rng))
-        share = float(paired[self.back].mean())
+        share = float(paired[self.own.back].mean())
         return self._made(made, place, "surface", wanted, paired=share, residual=residual)
 
     def _made(
         self, shape: Shape, place: Placed, method: Method, wanted: Array, *, paired: float, residual: float
     ) -> Symmetrized:
         """The result in the units of the input; `wanted` [M, 3] is where the distinct points belong."""
-        moved = np.linalg.norm(wanted - self.points, axis=1)
+        moved = np.linalg.norm(wanted - self.own.points, axis=1)
         return Symmetrized(
             shape=replace(shape, points=self.center + self.diagonal * shape.points),
             group=place.group,
@@ -210,35 +204,35 @@ class _Work:
         )
 
     def _means(self, action: Action, place: Placed) -> Array:
-        return place.center + action.mean(self.points - place.center, place.group.operations())
+        return place.center + action.mean(self.own.points - place.center, place.group.operations())
 
     def _onto_surface(self) -> tuple[Placed, Array]:
         """The group's place, fitted to where some of the points belong, and where all of them do."""
-        closest = closest_on(replace(self.shape, points=self.points[self.back]), self.rng)
+        closest = closest_on(replace(self.shape, points=self.own.points[self.own.back]), self.rng)
         place = self.place
-        some = self.points[:: max(1, len(self.points) // FITTED)]
+        some = self.own.points[:: max(1, len(self.own.points) // FITTED)]
         for _ in range(4):
             # Where a group stands some of its operations tell as well as all.
             told = np.stack(fitted_matrices(place.group))
             place, _ = towards(place, some, _on_symmetric_surface(some, place, told, closest))
-        return place, _on_symmetric_surface(self.points, place, place.group.operations(), closest)
+        return place, _on_symmetric_surface(self.own.points, place, place.group.operations(), closest)
 
     def _even_weights(self, action: Action) -> Array | None:
         """Weights that are equal over each orbit, their sum kept; copies of one point share its mean."""
         if self.shape.weights is None:
             return None
-        mass = np.bincount(self.back, weights=self.shape.weights, minlength=len(self.rows))
+        mass = np.bincount(self.own.back, weights=self.shape.weights, minlength=len(self.own.rows))
         even = np.mean([mass[image] for image in action.images], axis=0)
-        return np.asarray((even / np.bincount(self.back))[self.back])
+        return np.asarray((even / np.bincount(self.own.back))[self.own.back])
 
     def _mean_normals(self, action: Action, place: Placed) -> Array | None:
         """Normals averaged like the points, each with the sign of the normal that it joins."""
         if self.shape.normals is None:
             return None
-        own = self.shape.normals[self.rows]
+        own = self.shape.normals[self.own.rows]
         joined = [own[image] @ g for g, image in zip(place.group.operations(), action.images, strict=True)]
         total = sum(n * np.where(np.sum(n * own, axis=1) < 0.0, -1.0, 1.0)[:, None] for n in joined)
-        return unit(total)[self.back]
+        return unit(total)[self.own.back]
 
 
 def _start(shape: Shape, center: Array, group: PointGroup, *, copied: bool, seed: int) -> _Work:
@@ -252,10 +246,7 @@ def _start(shape: Shape, center: Array, group: PointGroup, *, copied: bool, seed
         shape=shape,
         center=center,
         diagonal=diagonal,
-        points=own.points,
-        rows=own.rows,
-        back=own.back,
-        labels=own.labels,
+        own=own,
         place=Placed(group=finite_group(group, own.points, turns), center=np.zeros(3)),
         rng=np.random.default_rng(seed),
     )
@@ -263,15 +254,15 @@ def _start(shape: Shape, center: Array, group: PointGroup, *, copied: bool, seed
 
 def _counterparts(work: _Work, reach: float) -> tuple[_Work, Action]:
     """Counterparts about the place that those found so far point to, since a misplaced group pairs fewer points."""
-    points, place = work.points, work.place
+    points, place = work.own.points, work.place
     for _ in range(MATCHINGS):
         operations = place.group.operations()
-        action = act(points - place.center, operations, work.labels, reach)
+        action = act(points - place.center, operations, work.own.labels, reach)
         if action.closed.all() or action.closed.sum() < FEWEST:
             break
         wanted = place.center + action.mean(points - place.center, operations)
         place, _ = towards(place, points[action.closed], wanted[action.closed])
-    action = with_leftovers(points - place.center, place.group.operations(), action, work.labels, reach)
+    action = with_leftovers(points - place.center, place.group.operations(), action, work.own.labels, reach)
     return replace(work, place=place), action
 
 

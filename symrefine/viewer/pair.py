@@ -17,7 +17,7 @@ from symrefine.geometry import Array
 from symrefine.picture.camera import Camera, look_at, seen_from
 from symrefine.picture.pair import Pair, Side
 from symrefine.picture.pair_words import headline, named, summary
-from symrefine.picture.palette import CONTRADICTED, INFERRED, Colour
+from symrefine.picture.palette import CONTRADICTED, INFERRED, Colour, shade
 from symrefine.picture.words import percent
 from symrefine.viewer.layout import FILL, FOV_RAD, framed, view3d
 from symrefine.viewer.marks import bright
@@ -120,7 +120,7 @@ def _judge(stream: Any, pair: Pair, index: int, places: list[Array]) -> None:
     """What either side says of a map: by colour, as shares, and in a line."""
     for side, points, shares in zip(pair.sides, places, pair.shares(index), strict=True):
         name = _NAMES[side.index]
-        own = np.tile(np.array(bright(side.colour)) / 255.0, (len(points), 1))
+        own = np.tile(shade(bright(side.colour)), (len(points), 1))
         colours = pair.coloured(own, pair.misses(side.index, points)[index])
         stream.log(f"object/{name}/points", rr.Points3D.from_fields(colors=np.round(255 * colours).astype(np.uint8)))
         for entity in SERIES:

@@ -8,6 +8,8 @@ import hashlib
 import math
 import os
 import re
+import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -28,6 +30,7 @@ from symrefine.picture.scene import Scene, make_scene
 from symrefine.shape import Index, Shape
 from symrefine.viewer.layout import blueprint
 from symrefine.viewer.marks import AXIS, bright, pixels
+from symrefine.viewer.opening import open_recording
 from symrefine.viewer.story import POINT, log_story
 from symrefine.viewer.text import markdown
 
@@ -57,6 +60,21 @@ class Recording:
                 self.stream.disconnect()
             if not draft.exists():
                 raise InputError(f"{path}: rerun wrote nothing; is the environment variable RERUN set to off?")
+
+    def show(self, name: str) -> None:
+        """Show it: inline in a notebook, else in a window of its own, as a file of that name.
+
+        Raises:
+            SymrefineError: the viewer does not start, or a notebook lacks its half of rerun.
+        """
+        shell = sys.modules.get("IPython")
+        if shell is not None and getattr(shell.get_ipython(), "kernel", None) is not None:
+            self.embed()
+            return
+        # The viewer reads the file after this returns; the system clears its folder of temporary files.
+        path = Path(tempfile.mkdtemp(prefix="symrefine-")) / f"{name}.rrd"
+        self.write(path)
+        open_recording(path)
 
     def embed(self) -> None:
         """Show it in the notebook that runs this.
