@@ -308,7 +308,7 @@ def _examined(
     shape = given.sample if isinstance(given, Sketch) else given
     with clock("moments", len(shape.points)):
         whole = sketch.moments if sketch is not None and sketch.seen else None
-        measured = measure(shape, outliers=outliers, apart=apart, foreign=foreign, floor=floor, whole=whole)
+        measured = measure(shape, outliers=outliers, apart=apart, foreign=foreign, floor=floor, whole=whole, seed=seed)
         out, share = set_apart(measured, sketch, outliers=outliers)
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed), tolerance)

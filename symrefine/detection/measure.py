@@ -56,7 +56,8 @@ class Measured:
         blobs: the same of each group of points still in it that fills a volume beside the body.
         solid: whether some of its points show no surface at any width, so that all may fill a volume.
         classes: of its points or faces, that must match.
-        density: how much surface an area of each face stands for; None where all do for as much.
+        samples: of a mesh: points of its surface, their normals and faces.
+        density: how much surface an area of each face stands for; None where that makes no odds.
         moments: to order 8.
         vectors: the n-tuples of them.
     """
@@ -70,6 +71,7 @@ class Measured:
     blobs: tuple[tuple[Index, Array], ...]
     solid: bool
     classes: Index | None
+    samples: tuple[Array, Array, Index] | None
     density: Array | None
     moments: Moments
     vectors: NTuples
@@ -111,6 +113,7 @@ def measure(
     foreign: Sequence[Index] = (),
     floor: Floor | None = None,
     whole: Moments | None = None,
+    seed: int = 0,
 ) -> Measured:
     """Moments to order 8 and the n-tuples of them, of the points that belong to the object.
 
@@ -121,6 +124,7 @@ def measure(
         foreign: indices of each group of points that is known to be no part of the object.
         floor: what it stands on, where that was set apart.
         whole: moments of all the points that `shape` is a sample of; they count where no point is set apart.
+        seed: of the samples of a mesh.
     """
     strays: Index = np.empty(0, dtype=np.int64)
     clumps: tuple[tuple[Index, Array], ...] = ()
@@ -153,8 +157,10 @@ def measure(
         elif len(seen.kept) < len(shape.points):
             shape = shape.chosen(seen.kept)
     classes = classes_of(shape)
-    of_area = shape.faces is not None and shape.measure == "surface"
-    density = face_densities(shape, SAMPLES, START_ERROR, np.random.default_rng(0)) if of_area else None
+    samples = density = None
+    if shape.faces is not None:
+        samples = sample_surface(shape, 2 * SAMPLES, np.random.default_rng(seed))
+        density = face_densities(shape, samples[0], samples[2], START_ERROR) if shape.measure == "surface" else None
     if whole is not None and shape is every:
         moments = whole
     else:
@@ -171,6 +177,7 @@ def measure(
         blobs=blobs,
         solid=solid,
         classes=classes,
+        samples=samples,
         density=density,
         moments=moments,
         vectors=vectors,
@@ -261,7 +268,7 @@ def _above(value: float) -> str:
 def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLERANCE) -> tuple[Evidence, Surface]:
     """What proposals are made of, and the surface that judges them."""
     shape, moments = measured.shape, measured.moments
-    points, normals, weights, labels = _cloud(measured, rng)
+    points, normals, weights, labels = _cloud(measured)
     local = (points - moments.center) / moments.scale
     evidence = Evidence(
         moments=moments,
@@ -346,11 +353,11 @@ def _volume(points: Array, labels: Index | None, tolerance: float, rng: np.rando
     return Surface(cloud=cloud, diagonal=diagonal, noise=noise / diagonal, drift=drift, tolerance=tolerance)
 
 
-def _cloud(measured: Measured, rng: np.random.Generator) -> tuple[Array, Array | None, Array, Index | None]:
+def _cloud(measured: Measured) -> tuple[Array, Array | None, Array, Index | None]:
     """Points, normals, weights and classes: samples with exact normals for a mesh, else the points themselves."""
     shape, classes, density = measured.shape, measured.classes, measured.density
-    if shape.faces is not None:
-        points, normals, face = sample_surface(shape, 2 * SAMPLES, rng)
-        weights = np.ones(len(points)) if density is None else density[face]
-        return points, normals, weights, None if classes is None else classes[face]
-    return shape.points, shape.normals, mass_of(shape), classes
+    if measured.samples is None:
+        return shape.points, shape.normals, mass_of(shape), classes
+    points, normals, face = measured.samples
+    weights = np.ones(len(points)) if density is None else density[face]
+    return points, normals, weights, None if classes is None else classes[face]

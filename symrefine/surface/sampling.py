@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, Mask, hull_volume
-from symrefine.moments.quadrature import sample_surface
 from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import clumps, filled
 from symrefine.surface.misses import SHARES
@@ -220,23 +219,26 @@ def _is_uneven(around: Surroundings, points: Array) -> bool:
     return len(around.points) < len(points) and _is_uneven(Surroundings.of(points), points)
 
 
-def face_densities(mesh: Shape, count: int, off: float, rng: np.random.Generator) -> Array | None:
+def face_densities(mesh: Shape, samples: Array, face: Index, off: float) -> Array | None:
     """How much surface an area of each face stands for [F], up to a factor; None where that makes no odds.
 
-    Where one side is rougher than the other, or has an inner wall, it has more area, which draws the centroid to it. So
-    many samples of the mesh tell it as points of a cloud do. Faces that none lies on take what the nearest tells.
+    Where one side is rougher than the other, or has an inner wall, it has more area, which draws the centroid to it.
+    Samples of the mesh tell it as points of a cloud do. Faces that none lies on take what the nearest tells.
 
     Args:
         mesh: whose areas are masses.
-        count: samples.
+        samples: [N, 3] even samples of its area.
+        face: [N] which faces they lie on.
         off: how far off the centroid may be (RMS radii).
-        rng: of the samples.
     """
     assert mesh.faces is not None
-    samples, _, face = sample_surface(mesh, count, rng)
-    points = (samples - samples.mean(axis=0)) / math.sqrt(samples.var(axis=0).sum())
-    some = around_some(points, rng)
-    if np.linalg.norm(np.average(some.points, axis=0, weights=_evenness(some)) - some.points.mean(axis=0)) <= off:
+    spread = math.sqrt(samples.var(axis=0).sum())
+    points = (samples - samples.mean(axis=0)) / (spread or 1.0)
+    some = around_some(points, np.random.default_rng(0))
+    evenness = _evenness(some)
+    if not evenness.any():
+        return None  # points are repeated
+    if np.linalg.norm((evenness / evenness.mean() - 1.0) @ some.points) <= off * len(some.points):
         return None
     told = _evenness(Surroundings.of(points))
     held = np.bincount(face, minlength=len(mesh.faces))
