@@ -95,9 +95,11 @@ def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float
         pool = pool if exact is None else _with_vertices(surface, pool, exact, proven=exact is evidence.proven)
     starts = [*beside(pool.largest.placed), *starts] if evidence.vertices is not None else starts
     pool = _with(surface, pool, starts)
+    vain = 0  # of what is nearly a ball every axis seems possible
     for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
-        if glance < hopeless(start_error(surface)) and pool.wants(axis):
-            pool = _with(surface, pool, about(evidence, axis.group.frame[2]))
+        if vain < FOLLOWED and glance < hopeless(start_error(surface)) and pool.wants(axis):
+            before, pool = pool.largest, _with(surface, pool, about(evidence, axis.group.frame[2]))
+            vain = vain + 1 if pool.largest is before else 0
     # Turns that hold better than the largest group may have half turns across them which that has not.
     better = [h for h in pool.small if ALIKE * h.need < pool.largest.need]
     for known in {h.group.name: h for h in (*better, pool.largest)}.values():
