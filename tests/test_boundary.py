@@ -18,6 +18,7 @@ from experiments.objects.shapes import sample
 from experiments.studies import boundary
 from experiments.studies.answers import answer_confidence, fitted, ladder_faults, ladder_outcome, outcome, within
 from experiments.studies.boundary import VIEWS, Case, plan, run
+from symrefine.detection.measure import measure
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.geometry import householder, random_orthogonal, rotation
@@ -139,6 +140,7 @@ def test_uneven_meshes_are_symmetric_but_for_their_areas(name):
 def test_more_area_on_one_side_breaks_no_symmetry(name):
     """It draws the centroid to it by more than starts may be off."""
     made = instance("uneven", name)
+    assert measure(made.shape).density is not None
     assert detect(made.shape).point_group == made.truth.group.name
 
 

@@ -212,6 +212,28 @@ def test_groups_are_joined_in_the_order_of_what_they_need():
     assert [h.need for h in links] == sorted(h.need for h in links)
 
 
+def test_of_mirrors_that_need_as_much_each_may_be_meant():
+    """As of those that a hole leaves possible, one by what is there and one by what may be missing."""
+    one, other = (
+        replace(of("Cs"), placed=Placed(group=point_group("Cs", rotation([1, 0, 0], a)), center=ORIGIN))
+        for a in (0.0, np.pi / 3)
+    )
+    one = replace(one, need=0.011)
+    for need, rivals in ((0.013, 1), (0.025, 0)):
+        best = _best([replace(other, need=need), one], 0.001, 0.001)
+        assert best.placed is one.placed
+        assert best.share == pytest.approx(1.0 / (1.0 + rivals))
+
+
+def test_a_mirror_shows_its_image_where_all_was_seen_and_itself_anywhere():
+    turned = [Placed(group=point_group("Cs", rotation([1, 0, 0], a)), center=ORIGIN) for a in (0.0, 0.7, -0.7)]
+    largest, seen, image = turned
+    pool = Pool(largest=replace(of("Cs"), placed=largest), looked=((seen, 0.05),))
+    assert pool.shows(image, 0.05)
+    assert not pool.shows(image, 0.05, whole=False)
+    assert pool.shows(seen, 0.05, whole=False)
+
+
 def test_what_needs_more_than_the_limit_is_left_out():
     parts = (replace(of("C3"), need=0.001), replace(of("C2"), need=2 * LIMIT))
     links = chain(ring()[1], Pool(small=parts), LIMIT)

@@ -91,8 +91,8 @@ def walled(corners: Array, side: Side, _rng: Rng) -> Array:
 
 
 def rough(corners: Array, side: Side, rng: Rng) -> Array:
-    """One side in triangles a few percent of the diagonal long, with vertices 0.2 % out of place each way."""
-    small = fine(corners, 0.25 * EDGE_REL * _diagonal(corners))
+    """One side in triangles less than 1 % of the diagonal long, with vertices 0.2 % out of place each way."""
+    small = fine(corners, 0.1 * EDGE_REL * _diagonal(corners))
     places, own = np.unique(small.reshape(-1, 3).round(9), axis=0, return_inverse=True)
     moved = places + 0.002 * _diagonal(corners) * rng.normal(size=places.shape)
     return np.where(side(small)[:, None, None], moved[own].reshape(-1, 3, 3), small)
@@ -125,7 +125,7 @@ def uneven(build: Callable[[], list[Part]], way: Callable[[Array, Side, Rng], Ar
 
 
 WAYS = (doubled, patched, finer, shelled)
-# These carry half as much area again and more, which moves the centroid farther than the moments may be off.
+# These carry a seventh to half as much area again, which moves the centroid farther than the moments may be off.
 LARGE = (walled, rough)
 BASES: dict[str, Callable[[], list[Part]]] = {
     "table": made.table,

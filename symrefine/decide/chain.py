@@ -92,7 +92,7 @@ def _best(tried: Sequence[Hypothesis], hidden: float, noise: float) -> Hypothesi
 
     best = min((h for h in tried if h.elements), key=rank, default=None)
     if best is None:
-        return best
+        return None
     apart, most = [best.placed], max(ALIKE * best.need, noise)
     for other in sorted((h for h in tried if h.elements and h.need <= most), key=rank):
         apart += [] if any(has_all(p, other.placed) or has_all(other.placed, p) for p in apart) else [other.placed]
