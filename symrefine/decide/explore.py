@@ -207,9 +207,11 @@ def _holding(surface: Surface, placed: Placed, most: float) -> list[Placed]:
 def _joined_at_once(surface: Surface, pool: Pool, start: Placed) -> Pool:
     """The pool where a candidate and the largest group hold together as far as noise tells: no need to part them.
 
-    Where the largest has it already and holds worse, that is the largest of those in it that need nothing; of what is
-    round any two mirrors through its axis make some fold, which says nothing.
+    Where the largest has it already and holds worse, that is the largest of those in it that need nothing. Of what is
+    round and open any two mirrors through its axis make some fold, which says nothing and takes a whole fit to tell.
     """
+    if surface.is_open and not pool.largest.group.is_finite and pool.largest.holds(start):
+        return pool
     exact = [h for h in pool.small if h.need <= pool.nothing and h.elements] if pool.largest.holds(start) else []
     known = max(exact or [pool.largest], key=lambda h: size_of(h.placed))
     if known.holds(start) or has_all(start, known.placed):
