@@ -444,7 +444,7 @@ def test_noise_is_measured_by_both_halves_and_grows_with_the_noise():
         points = rng.standard_normal((2001, 3))
         points = points / np.linalg.norm(points, axis=1, keepdims=True) + noise * rng.standard_normal((2001, 3))
         distances = noise_distances(2001, half_of(points, 1001, rng), rng)
-        assert distances.shape == (2 * 2001,)  # twice, as it is less than a count
+        assert distances.shape == (2001,)  # halved twice, as it is less than a count, and no more are independent
         assert distances.min() >= 0.0
         shown.append(np.quantile(distances, 0.95))
     assert shown == sorted(shown)

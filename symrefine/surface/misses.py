@@ -207,11 +207,12 @@ def noise_distances(
     planes: Callable[[Index], LocalPlanes],
     rng: np.random.Generator,
 ) -> Array:
-    """Distances [M] by which noise alone puts the surface of a cloud off its image, as its halves tell.
+    """Distances [M] by which noise alone puts the surface of a cloud off its image, as its halves tell, falling.
 
     An object with an exact symmetry differs from its image by no more: both are made of points of their own. Those of a
     half have neighbourhoods as wide, so that edges and bends are blurred alike, and half as many points in each, whose
-    means are off by as much more. In a volume all is spacing. A small cloud is halved until there are enough.
+    means are off by as much more. In a volume all is spacing. A small cloud is halved until there are enough. No more
+    of them are independent than it has points: every so-many-th is told, from the largest on.
 
     Args:
         count: points of the cloud.
@@ -223,7 +224,8 @@ def noise_distances(
         for here, there in ((one, other), (other, one)):
             some = slice(None, None, max(1, len(there.points) // COUNT))
             across.append(disc_distances(here, there.points[some], there.classes(some)))
-    return of_the_whole(np.concatenate(across), one.body)
+    every = -np.sort(-np.concatenate(across))
+    return of_the_whole(every[:: max(1, len(every) // count)], one.body)
 
 
 def of_the_whole(noise: Array, body: Body) -> Array:
