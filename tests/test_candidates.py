@@ -18,7 +18,6 @@ from symrefine.moments.moments import central_moments
 from symrefine.ntuples.contract import ntuples
 from symrefine.ntuples.rank import fixed_subspace
 from symrefine.propose.candidates import (
-    START_ERROR,
     Evidence,
     about,
     apart,
@@ -28,6 +27,7 @@ from symrefine.propose.candidates import (
     proposals,
     turned_over,
 )
+from symrefine.rounding import START_ERROR
 
 # Half of what order 8 resolves: a start may be off by so much.
 NEAR_RAD = np.radians(5.5)

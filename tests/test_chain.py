@@ -27,7 +27,8 @@ from symrefine.detection.story import detect
 from symrefine.fit.placed import Placed, joined
 from symrefine.geometry import frame_with_z, line_angle_rad, random_orthogonal, rotation
 from symrefine.groups import is_subgroup, point_group
-from symrefine.propose.candidates import START_ERROR, proposals
+from symrefine.propose.candidates import proposals
+from symrefine.rounding import START_ERROR
 from symrefine.shape import Shape
 from symrefine.surface.misses import LIMITS
 

@@ -16,7 +16,7 @@ from symrefine.fit.placed import Placed, elements, joined
 from symrefine.geometry import frame_with_z, line_angle_rad, random_orthogonal, rotation, tight_diagonal, unit
 from symrefine.groups import PointGroup, close, is_subgroup, point_group
 from symrefine.moments.moments import shape_moments
-from symrefine.propose.candidates import START_ERROR
+from symrefine.rounding import START_ERROR
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE, Deviation, noise_distances
 from symrefine.surface.skin import isolated_points, local_planes

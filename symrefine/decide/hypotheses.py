@@ -18,8 +18,8 @@ from symrefine.fit.placed import FITTED, Operations, Placed, elements
 from symrefine.fit.refine import SHORT, Iterate, refine
 from symrefine.geometry import Array, Axis, Isometry, frame_with_z, rotation
 from symrefine.groups import PointGroup, is_subgroup
-from symrefine.propose.candidates import START_ERROR
 from symrefine.propose.folds import fold_candidates
+from symrefine.rounding import START_ERROR
 from symrefine.samples import COUNT, GLANCE
 from symrefine.surface.misses import Deviation
 from symrefine.surface.skin import Skin

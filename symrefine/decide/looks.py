@@ -15,9 +15,8 @@ from symrefine.fit.refine import SHORT, Iterate, refine
 from symrefine.fit.vertices import ROUNDED
 from symrefine.geometry import Array, Isometry, rotation
 from symrefine.groups.names import far_steps
-from symrefine.propose.candidates import START_ERROR
 from symrefine.propose.votes import AGREE_RAD
-from symrefine.rounding import DOUBLE
+from symrefine.rounding import DOUBLE, START_ERROR
 from symrefine.samples import COUNT, GLANCE, LOOK
 from symrefine.surface.misses import LIMITS, RIM, SURE
 from symrefine.surface.surface import Surface

@@ -11,7 +11,7 @@ from symrefine.decide.posterior import ALIKE
 from symrefine.fit.placed import Placed
 from symrefine.groups import PointGroup, is_subgroup
 from symrefine.groups.elements import DIRECTION_ERROR_RAD
-from symrefine.propose.candidates import START_ERROR
+from symrefine.rounding import START_ERROR
 
 # Groups of points that no other one but that of a ball contains.
 MAXIMAL = ("Oh", "Ih")

@@ -17,7 +17,7 @@ from symrefine.moments.moments import PARTS, Moments
 from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import FixedSubspace, fixed_subspace
-from symrefine.propose.candidates import START_ERROR, Evidence
+from symrefine.propose.candidates import Evidence
 from symrefine.samples import COUNT
 from symrefine.shape import Index, Shape
 from symrefine.surface.cameras import Camera, cameras, outwards
@@ -160,7 +160,7 @@ def measure(
     samples = density = None
     if shape.faces is not None:
         samples = sample_surface(shape, 2 * SAMPLES, np.random.default_rng(seed))
-        density = face_densities(shape, samples[0], samples[2], START_ERROR) if shape.measure == "surface" else None
+        density = face_densities(shape, samples[0], samples[2]) if shape.measure == "surface" else None
     if whole is not None and shape is every:
         moments = whole
     else:

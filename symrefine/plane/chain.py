@@ -15,7 +15,7 @@ from symrefine.groups import MAX_FOLD
 from symrefine.groups.elements import DIRECTION_ERROR_RAD
 from symrefine.plane.outline import NOISES, Outlines
 from symrefine.plane.placed import Placed, fitted
-from symrefine.propose.candidates import START_ERROR
+from symrefine.rounding import START_ERROR
 from symrefine.samples import LOOK
 from symrefine.surface.misses import NO_MISS, Deviation
 

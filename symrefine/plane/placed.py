@@ -14,7 +14,7 @@ from symrefine.fit.refine import MAX_OUTER, SETTLED
 from symrefine.geometry import Array, Isometry, Plane, ReadOnly
 from symrefine.groups.plane import PointGroup2D
 from symrefine.plane.outline import Outlines
-from symrefine.propose.candidates import START_ERROR
+from symrefine.rounding import START_ERROR
 from symrefine.surface.misses import RIM
 
 

@@ -24,13 +24,10 @@ from symrefine.propose.folds import azimuthal_spectrum, folds_of, frames_across,
 from symrefine.propose.maps import WITHIN, maps_onto_itself
 from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candidates, whitened
 from symrefine.propose.votes import AGREE_RAD, meeting, mirror_votes, revolution
-from symrefine.rounding import DOUBLE
+from symrefine.rounding import DOUBLE, START_ERROR
 from symrefine.samples import FOLLOWED
 from symrefine.surface.skin import LocalPlanes
 
-# How far the moments may put a start wrong (radians, RMS radii; 0.04 was the most of 698 true ones): directions nearer
-# than this to an earlier one are the same start.
-START_ERROR = 0.05
 # Primes whose axes the moments tell.
 PRIMES = (2, 3, 5, 7)
 # Atoms nearer to an axis than these (RMS radii) may stand on it.

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, Mask, hull_volume
+from symrefine.rounding import START_ERROR
 from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import clumps, filled
 from symrefine.surface.misses import SHARES
@@ -25,9 +26,6 @@ from symrefine.surface.tree import Tree
 FAR = 2.5
 # A round that finds fewer strays than this share is the last: what remains lies within the spacing of the surface.
 LAST = 0.001
-# Standard deviation of the logarithm of the density along some direction from which on points are no even sample: half
-# that of a fall-off of 3:1. Objects with thin parts at one end have it too; that does them no harm.
-UNEVEN = 0.1
 # Density over the least up to which weights make up for it: there neighbourhoods are one step of sizes narrower.
 DENSER = 2.0
 
@@ -201,25 +199,24 @@ def _scattered(points: Array, body: Array) -> bool:
 
 
 def _is_uneven(around: Surroundings, points: Array) -> bool:
-    """Whether the density of points [N, 3] falls off along some direction, as a scanner's does: that shifts moments.
+    """Whether the density of points [N, 3] falls off to one side, as a scanner's does, and puts starts off by it.
 
     Flat neighbourhoods must show it as well: on thin parts it is a matter of shape how far away others are. Where those
     of some of the points, which `around` tells of, are wide enough for that everywhere, all are asked.
     """
-    area = _area(around)
-    if not area.all():
+    if not around.away[:, -1].all():
         return False  # points are repeated
-    if _trend(around.points, np.log(area)) <= UNEVEN:
+    evenness, flat = _evenness(around), around.thickness < FLAT
+    if not _drawn_aside(around.points, evenness):
         return False
-    flat = around.thickness < FLAT
-    if flat.sum() > AROUND and _trend(around.points[flat], np.log(area[flat])) <= UNEVEN:
+    if flat.sum() > AROUND and not _drawn_aside(around.points[flat], evenness[flat]):
         return False
     if np.median(around.away[:, -1]) <= WIDEST:
         return True
     return len(around.points) < len(points) and _is_uneven(Surroundings.of(points), points)
 
 
-def face_densities(mesh: Shape, samples: Array, face: Index, off: float) -> Array | None:
+def face_densities(mesh: Shape, samples: Array, face: Index) -> Array | None:
     """How much surface an area of each face stands for [F], up to a factor; None where that makes no odds.
 
     Where one side is rougher than the other, or has an inner wall, it has more area, which draws the centroid to it.
@@ -229,18 +226,12 @@ def face_densities(mesh: Shape, samples: Array, face: Index, off: float) -> Arra
         mesh: whose areas are masses.
         samples: [N, 3] even samples of its area.
         face: [N] which faces they lie on.
-        off: how far off the centroid may be (RMS radii).
     """
     assert mesh.faces is not None
-    spread = math.sqrt(samples.var(axis=0).sum())
-    points = (samples - samples.mean(axis=0)) / (spread or 1.0)
-    some = around_some(points, np.random.default_rng(0))
-    evenness = _evenness(some)
-    if not evenness.any():
-        return None  # points are repeated
-    if np.linalg.norm((evenness / evenness.mean() - 1.0) @ some.points) <= off * len(some.points):
+    some = around_some(samples, np.random.default_rng(0))
+    if not _drawn_aside(some.points, _evenness(some)):
         return None
-    told = _evenness(Surroundings.of(points))
+    told = _evenness(Surroundings.of(samples))
     held = np.bincount(face, minlength=len(mesh.faces))
     density = np.bincount(face, told, len(mesh.faces)) / np.maximum(held, 1)
     middles = mesh.points[mesh.faces[held == 0]].mean(axis=1)
@@ -248,10 +239,13 @@ def face_densities(mesh: Shape, samples: Array, face: Index, off: float) -> Arra
     return np.asarray(density / density.mean())
 
 
-def _trend(points: Array, values: Array) -> float:
-    """Standard deviation of the linear function of points [N, 3] that comes closest to values [N]."""
-    place = np.column_stack([np.ones(len(values)), points - points.mean(axis=0)])
-    return float((place @ np.linalg.lstsq(place, values, rcond=None)[0]).std())
+def _drawn_aside(points: Array, evenness: Array) -> bool:
+    """Whether the centroid of points [N, 3] moves by more than starts may be off once each stands for as much [N]."""
+    if not evenness.any():
+        return False  # all are one place
+    apart = points - points.mean(axis=0)
+    moved = np.linalg.norm((evenness / evenness.mean() - 1.0) @ apart) / len(points)
+    return bool(moved > START_ERROR * math.sqrt((apart**2).sum() / len(points)))
 
 
 def _evened(points: Array, rng: np.random.Generator) -> tuple[Index, Array]:
