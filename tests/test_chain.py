@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from experiments.objects import household
 from experiments.objects.boundary import instance
+from experiments.objects.parts import hull
 from experiments.objects.shapes import box, join, revolve, sample
 from experiments.studies import groups
 from experiments.studies.boundary import Case, look
@@ -358,12 +359,25 @@ def test_exploring_ends_with_a_group_whose_neighbours_fail():
         assert not is_subgroup(placed.group, point_group("C6v"), 0.5 * SAME_RAD)
 
 
-def test_of_what_has_no_symmetry_the_nearest_misses_are_fitted():
+def test_of_what_has_no_symmetry_the_nearest_misses_are_looked_at_and_told():
     points, _ = molecule("C2", 0.04, 4)
     links, pool, _ = linked(points, 0.005, 0.005)
     assert links == (NOTHING,)
-    assert pool.small
-    assert all(h.need > 0.005 for h in pool.small)
+    assert pool.looked
+    assert not pool.small
+    needs = sorted(need for _, need in pool.looked)
+    assert needs[0] > 0.005
+    told = detect(points, tolerance=0.005).near_misses
+    assert told
+    assert told[0].excess == pytest.approx(needs[0] / 0.005, rel=0.5)
+
+
+def test_where_nothing_comes_near_the_tolerance_what_a_larger_one_makes_of_it_is_fitted():
+    """A look at a hull of twelve random points says 5.0 times the tolerance of its best mirror, a fit 4.2."""
+    part = hull(np.random.default_rng(0).normal(size=(12, 3)))
+    alone, told = (detect(Shape(part.vertices, part.faces), ladder=ladder) for ladder in ((), (0.02, 0.08)))
+    assert alone.point_group == told.point_group == "C1"
+    assert [step.point_group for step in told.staircase] == ["C1", "Cs"]
 
 
 @pytest.mark.slow

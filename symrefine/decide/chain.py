@@ -10,7 +10,7 @@ from functools import partial
 from operator import attrgetter
 
 from symrefine.decide.broken import unbroken
-from symrefine.decide.hypotheses import NOTHING, Hypothesis, has_all, hidden_need
+from symrefine.decide.hypotheses import NOTHING, Hypothesis, fitted, has_all, hidden_need
 from symrefine.decide.joins import better_parts, is_loose, join, size_of
 from symrefine.decide.looks import COARSE, by_chance
 from symrefine.decide.place import least_elsewhere
@@ -26,9 +26,13 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     """Groups from C1 upwards, each inside the next, by what they need; the last one may be beyond the limit.
 
     Those that no fit brings within the limit of the pool are only looked at: what larger tolerances would make of them.
+    Where nothing comes near it, what comes nearest is fitted, if that may be within the limit here.
     """
     seen, surface = surface, surface.closed if pool.whole else surface
-    near = [h for h in pool.turned_down() if h.need <= COARSE * pool.limit]
+    turned_down = sorted(pool.turned_down(), key=_need)
+    near = [h for h in turned_down if h.need <= COARSE * pool.limit]
+    if not (near or pool.small):
+        near = [fitted(surface, h.placed) for h in turned_down[:FOLLOWED] if h.need <= limit]
     # What is hidden by noise, or by the least tolerance that is asked for, tells no two groups apart.
     hidden = max(hidden_need(surface), pool.nothing / ALIKE)
     worst = partial(_worst, hidden=hidden)

@@ -104,10 +104,12 @@ def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float
     better = [h for h in pool.small if ALIKE * h.need < pool.largest.need]
     for known in {h.group.name: h for h in (*better, pool.largest)}.values():
         pool = _with(surface, pool, turned_over(evidence, known.placed))
-    # Where nothing comes near, what comes nearest is told of.
-    seen = sorted((*pool.looked, *pool.hopeless), key=lambda k: k[1])
-    nearest = seen[:FOLLOWED] if not pool.small and seen and seen[0][1] > COARSE * limit else []
-    return replace(pool, small=(*pool.small, *(fitted(surface, start) for start, _ in nearest)))
+    # Where nothing comes near, what comes nearest is told of, and looked at for that.
+    if pool.small or min((needs for _, needs in pool.looked), default=math.inf) <= COARSE * limit:
+        return pool
+    nearest = sorted(pool.hopeless, key=lambda k: k[1])[:FOLLOWED]
+    looks = (looked_at(surface, start, COARSE * limit) for start, _ in nearest)
+    return replace(pool, looked=(*pool.looked, *((look.placed, look.needs) for look in looks)))
 
 
 def _with_vertices(surface: Surface, pool: Pool, known: Placed, *, proven: bool) -> Pool:

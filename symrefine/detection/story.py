@@ -21,6 +21,7 @@ from symrefine.fit.placed import Placed
 from symrefine.fit.refine import answered
 from symrefine.fit.vertices import OnVertices
 from symrefine.geometry import Array, Axis, Plane, cross_matrix, positive
+from symrefine.samples import FOLLOWED
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.surface import Surface
@@ -279,10 +280,15 @@ def _confidence(element: Element, links: Sequence[Hypothesis], decision: Decisio
 
 
 def _turned_down(found: Examined, chosen: Hypothesis, most: float) -> list[Element]:
-    """Elements that were judged and are not in the group, and those that seem to need no more than some, best first."""
+    """Elements that were judged and are not in the group, and those that seem to need no more than some, best first.
+
+    Where nothing comes so near, what comes nearest.
+    """
     beyond = [e for h in (*found.links, *found.pool.small) for e in h.elements]
-    for start in sorted(found.pool.turned_down(), key=lambda h: h.need):
-        if len(beyond) >= NEAR or start.need > most:
+    starts = sorted(found.pool.turned_down(), key=lambda h: h.need)
+    near = [start for start in starts if start.need <= most]
+    for start in near if near or beyond else starts[:FOLLOWED]:
+        if len(beyond) >= NEAR:
             break
         if not chosen.holds(start.placed):
             beyond += judged(found.surface, start.placed).elements
