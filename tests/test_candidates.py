@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
 
 from experiments.objects.constructions import gear, rotor
 from experiments.objects.parts import assembled
@@ -22,6 +23,7 @@ from symrefine.propose.candidates import (
     about,
     apart,
     beside,
+    beside_details,
     placed,
     prime_axes,
     proposals,
@@ -254,3 +256,19 @@ def test_turns_are_turned_over_at_the_phases_that_their_fold_allows(fold):
     )
     assert best < 1e-4 * np.linalg.norm(points, axis=1).max()
     assert turned_over(evidence, placed(f"D{fold}", turn.T)) == []
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_details_of_what_is_round_tell_the_mirrors_through_its_axis(count):
+    """Clumps at its side, alike and evenly apart, about an axis that passes beside the centroid."""
+    rng = np.random.default_rng(count)
+    frame, center = random_orthogonal(rng, det=1), rng.normal(size=3)
+    azimuths = 0.3 + 2 * np.pi * np.arange(count) / count
+    middles = np.column_stack([np.cos(azimuths), np.sin(azimuths), np.full(count, 0.4)]) @ frame
+    details = (middles[:, None] + 0.1 * rng.normal(size=(count, 200, 3))).reshape(-1, 3) + center
+    found = beside_details(placed("Cinfv", frame, center), details)
+    assert [p.group.name for p in found] == ["Cs", *[f"C{count}v"] * (count > 1)]
+    for p in found:
+        np.testing.assert_array_equal(p.center, center)
+        for operation in p.group.operations():
+            assert cKDTree(middles).query(middles @ operation.T)[0].max() < 0.15

@@ -1309,3 +1309,11 @@ def test_one_view_of_an_object_is_judged():
     assert row.asked == 4
     assert 0.2 < row.occlusion < 0.9
     assert "1 objects" in single_views.line([row])
+
+
+def test_the_handle_tells_the_mirror_of_a_mug_that_is_missing_a_part():
+    """What is left of the round body votes for any mirror through its axis: it was C1, and sure of it."""
+    rng = np.random.default_rng(721)
+    made = damage.hole(mug(), 0.15, rng)
+    found = detect(Pose.random(rng).of(made.points))
+    assert (found.point_group, found.at_least) == ("Cs", True)

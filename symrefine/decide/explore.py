@@ -24,22 +24,24 @@ from symrefine.decide.hypotheses import (
     judged,
 )
 from symrefine.decide.joins import better_parts, endless, generated, is_loose, join, size_of
-from symrefine.decide.looks import COARSE, exact_need, glances, hopeless, looked_at, start_error
+from symrefine.decide.looks import COARSE, exact_need, glances, hopeless, looked_at, start_error, unmet_by
 from symrefine.decide.place import SUPPORTED
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import ALIKE, LEAST, Link, certain, meant
 from symrefine.fit.placed import Placed, elements
+from symrefine.geometry import Array
 from symrefine.propose.candidates import (
     Evidence,
     about,
     beside,
+    beside_details,
     prime_axes,
     proposals,
     repeated,
     turned_over,
     voted_mirrors,
 )
-from symrefine.samples import FOLLOWED
+from symrefine.samples import COUNT, FOLLOWED
 from symrefine.surface.surface import Surface
 
 # Candidates of an open surface that are looked at: where little was seen many seem possible at a glance.
@@ -140,9 +142,17 @@ def _of_part(surface: Surface, whole: Pool) -> Pool:
         pool = _grown(surface, pool, h)
     # Votes find most of what was found of the whole, and better, as nothing that is missing biases them.
     pool = _with(surface, pool, voted)
+    # Of what is round but for a detail they find any mirror through its axis, and the detail its own.
+    for known_round in [p for p, _ in pool.looked if not p.group.is_finite and p.group.symbol.fold > 0][:1]:
+        pool = _with(surface, pool, beside_details(known_round, _details(surface, known_round)))
     for h in known:
         pool = pool if pool.has(h.placed, h.need) else _grown(surface, pool, fitted(surface, h.placed))
     return pool
+
+
+def _details(surface: Surface, placed: Placed) -> Array:
+    """Local planes [N, 3] that a group carries to where nothing is."""
+    return surface.cloud.points[:: surface.stride(COUNT)][unmet_by(surface, placed, COUNT)]
 
 
 def _with(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:

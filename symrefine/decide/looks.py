@@ -13,7 +13,7 @@ import numpy as np
 from symrefine.fit.placed import FREE_TURNS, Placed, elements, evenly
 from symrefine.fit.refine import SHORT, Iterate, refine
 from symrefine.fit.vertices import ROUNDED
-from symrefine.geometry import Array, Isometry, rotation
+from symrefine.geometry import Array, Isometry, Mask, rotation
 from symrefine.groups.names import far_steps
 from symrefine.propose.votes import AGREE_RAD
 from symrefine.rounding import DOUBLE, START_ERROR
@@ -218,6 +218,13 @@ def _sideways(placed: Placed) -> Array:
 def seems(surface: Surface, placed: Placed, sources: int = LOOK) -> float:
     """What a group where it stands needs, as a few operations tell on a few points."""
     return float(surface.needs(few_motions(placed), sources=sources, tests=GLANCED, together=True).max())
+
+
+def unmet_by(surface: Surface, placed: Placed, sources: int) -> Mask:
+    """Which of about so many local planes most of a few operations of a group carry to where nothing is."""
+    motions = few_motions(placed)
+    misses = surface.seen(surface.misses(motions, sources=sources), motions, sources=sources)
+    return np.asarray((np.nan_to_num(misses) > surface.far).mean(axis=0) > 0.5)
 
 
 def by_chance(surface: Surface, placed: Placed) -> bool:

@@ -11,13 +11,13 @@ from symrefine.clock import Clock
 from symrefine.decide.chain import chain
 from symrefine.decide.explore import explore
 from symrefine.decide.hypotheses import SAME_RAD, Hypothesis
-from symrefine.decide.looks import exact_need, few_motions
+from symrefine.decide.looks import exact_need, unmet_by
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import ALIKE, Alternative, Decision, Link, decide, least_told, meant, odd
 from symrefine.detection.measure import Measured, Outliers, doubt, floor_under, gather, measure
 from symrefine.detection.proof import by_vertices
 from symrefine.detection.sketch import Sample, Sketch, is_large, sampled, set_apart, sketched
-from symrefine.fit.placed import SAMPLED, Placed
+from symrefine.fit.placed import SAMPLED
 from symrefine.fit.vertices import OnVertices, on_vertices
 from symrefine.geometry import Array, Mask, check_tolerance
 from symrefine.groups import PointGroup, is_subgroup
@@ -263,24 +263,17 @@ def _strangers(found: Examined, points: Array, tolerance: float) -> tuple[Index,
         return ()
     if not (rivals := found.rivals(tolerance)[:FOLLOWED]):
         return ()
-    few = [r for r in rivals if 0.0 < _unmet(surface, r.placed, LOOK).mean() <= CLUMP]
+    few = [r for r in rivals if 0.0 < unmet_by(surface, r.placed, LOOK).mean() <= CLUMP]
     if not few:
         return ()
     own = np.setdiff1d(np.arange(len(points)), np.concatenate(measured.apart), assume_unique=True)
     local = (points[own] - measured.moments.center) / measured.moments.scale
     nearest = Tree(surface.cloud.points[:: surface.stride(COUNT)]).nearest(local)[1]
     for rival in few:
-        unmet = _unmet(surface, rival.placed, COUNT)
+        unmet = unmet_by(surface, rival.placed, COUNT)
         if (group := clump_among(local, unmet[nearest])).size:
             return (own[group],)
     return ()
-
-
-def _unmet(surface: Surface, placed: Placed, sources: int) -> Mask:
-    """Which of about so many local planes most of a few operations of a group carry to where nothing is."""
-    motions = few_motions(placed)
-    misses = surface.seen(surface.misses(motions, sources=sources), motions, sources=sources)
-    return np.asarray((np.nan_to_num(misses) > surface.far).mean(axis=0) > 0.5)
 
 
 def _told_apart(found: Examined, tolerance: float) -> tuple[list[Index], list[Index]]:

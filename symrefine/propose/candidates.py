@@ -105,6 +105,15 @@ def repeated(cloud: LocalPlanes, diagonal: float) -> list[Placed]:
     return found
 
 
+def beside_details(known: Placed, details: Array) -> list[Placed]:
+    """What may be left of a group about an axis but for details [N, 3], by their azimuths: a mirror, or several."""
+    axis = known.group.frame[2]
+    spectrum = azimuthal_spectrum(details - known.center, np.ones(len(details)), axis)
+    normal = mirror_through(spectrum, axis)
+    found = [] if normal is None else [placed("Cs", frame_with_z(normal), known.center)]
+    return [*found, *(placed(f"C{f.fold}v", f.frame, known.center) for f in folds_of(spectrum, axis)[:1])]
+
+
 def prime_axes(evidence: Evidence) -> list[Placed]:
     """Axes of prime order that the moments propose elsewhere: an axis of any order is one of a prime order too."""
     white, likely = whitened(evidence.moments), _likely(evidence)
