@@ -1317,3 +1317,17 @@ def test_the_handle_tells_the_mirror_of_a_mug_that_is_missing_a_part():
     made = damage.hole(mug(), 0.15, rng)
     found = detect(Pose.random(rng).of(made.points))
     assert (found.point_group, found.at_least) == ("Cs", True)
+
+
+@pytest.mark.parametrize("diagonals", [3.0, 1e2, 1e4])
+@pytest.mark.parametrize("count", [1, 5, 20])
+def test_strays_however_far_are_set_apart_though_some_lie_in_the_plane_of_others(count, diagonals):
+    """From so far the body is a speck, and with a stray or two its points make a plane, which some other one is in."""
+    part = extruded(polygon(5), -0.5, 0.5)
+    prism = Shape(part.vertices, part.faces)
+    rng = np.random.default_rng(int(count * diagonals))
+    points = sample(prism, 6000, 0.0, rng)
+    far = diagonals * prism.diagonal * unit(rng.normal(size=(count, 3)))
+    found = detect(rng.permutation(np.concatenate([points, far])))
+    assert found.point_group == "D5h"
+    assert len(found.outliers) == count
