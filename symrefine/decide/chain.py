@@ -29,7 +29,7 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     Where nothing comes near it, what comes nearest is fitted, if that may be within the limit here.
     """
     seen, surface = surface, surface.closed if pool.whole else surface
-    turned_down = sorted(pool.turned_down(), key=_need)
+    turned_down = pool.turned_down()
     near = [h for h in turned_down if h.need <= COARSE * pool.limit]
     if not (near or pool.small):
         near = [fitted(surface, h.placed) for h in turned_down[:FOLLOWED] if h.need <= limit]

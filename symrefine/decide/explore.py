@@ -29,7 +29,6 @@ from symrefine.decide.place import SUPPORTED
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import ALIKE, LEAST, Link, certain, meant
 from symrefine.fit.placed import Placed, elements
-from symrefine.geometry import Array
 from symrefine.propose.candidates import (
     Evidence,
     about,
@@ -142,17 +141,22 @@ def _of_part(surface: Surface, whole: Pool) -> Pool:
         pool = _grown(surface, pool, h)
     # Votes find most of what was found of the whole, and better, as nothing that is missing biases them.
     pool = _with(surface, pool, voted)
-    # Of what is round but for a detail they find any mirror through its axis, and the detail its own.
-    for known_round in [p for p, _ in pool.looked if not p.group.is_finite and p.group.symbol.fold > 0][:1]:
-        pool = _with(surface, pool, beside_details(known_round, _details(surface, known_round)))
+    pool = _with(surface, pool, _by_details(surface, pool))
     for h in known:
         pool = pool if pool.has(h.placed, h.need) else _grown(surface, pool, fitted(surface, h.placed))
     return pool
 
 
-def _details(surface: Surface, placed: Placed) -> Array:
-    """Local planes [N, 3] that a group carries to where nothing is."""
-    return surface.cloud.points[:: surface.stride(COUNT)][unmet_by(surface, placed, COUNT)]
+def _by_details(surface: Surface, pool: Pool) -> list[Placed]:
+    """What details tell of what is round but for them: votes find any mirror through its axis, and these its own.
+
+    They are what turns about the axis carry to where nothing is.
+    """
+    nearly_round = next((p for p, _ in pool.looked if not p.group.is_finite and p.group.symbol.fold > 0), None)
+    if nearly_round is None:
+        return []
+    details = surface.cloud.points[:: surface.stride(COUNT)][unmet_by(surface, nearly_round, COUNT)]
+    return beside_details(nearly_round, details)
 
 
 def _with(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:

@@ -51,8 +51,9 @@ class Pool:
         return [*((h.placed, h.need) for h in self.small), *self.looked]
 
     def turned_down(self) -> list[Hypothesis]:
-        """Candidates turned down after a look, with nothing known of them but what they seem to need."""
-        return [Hypothesis(placed=placed, elements=(), need=need) for placed, need in self.looked]
+        """Candidates turned down after a look, best first, with nothing known of them but what they seem to need."""
+        found = (Hypothesis(placed=placed, elements=(), need=need) for placed, need in self.looked)
+        return sorted(found, key=lambda h: h.need)
 
     def has(self, placed: Placed, needs: float = 0.0) -> bool:
         """Whether a group is in one that was fitted and needs no more than it does, or as good as nothing."""

@@ -285,7 +285,7 @@ def _turned_down(found: Examined, chosen: Hypothesis, most: float) -> list[Eleme
     Where nothing comes so near, what comes nearest.
     """
     beyond = [e for h in (*found.links, *found.pool.small) for e in h.elements]
-    starts = sorted(found.pool.turned_down(), key=lambda h: h.need)
+    starts = found.pool.turned_down()
     near = [start for start in starts if start.need <= most]
     for start in near if near or beyond else starts[:FOLLOWED]:
         if len(beyond) >= NEAR:

@@ -224,8 +224,8 @@ def noise_distances(
         for here, there in ((one, other), (other, one)):
             some = slice(None, None, max(1, len(there.points) // COUNT))
             across.append(disc_distances(here, there.points[some], there.classes(some)))
-    every = -np.sort(-np.concatenate(across))
-    return of_the_whole(every[:: max(1, len(every) // count)], one.body)
+    every = np.sort(np.concatenate(across))
+    return of_the_whole(every[:: -max(1, len(every) // count)], one.body)
 
 
 def of_the_whole(noise: Array, body: Body) -> Array:

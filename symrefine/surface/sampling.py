@@ -161,7 +161,8 @@ def _alone(around: Surroundings) -> Mask:
         mean, normals, variances = around.planes_at(sparse)
         across = np.abs(np.einsum("ni,ni->n", normals, points[sparse] - mean))
         loose = (thickness_of(variances) > FLAT) | (across > FLAT * around.away[sparse, -1])
-        # Or in the plane of others by chance, most of which are at home elsewhere: a body far away is seen as a speck.
+        # Or in the plane of others by chance, most of which are at home elsewhere: a body far away is seen as a speck,
+        # FAR times as dense as any that a surface thins out from.
         loose |= reach[sparse] > FAR**2 * np.median(reach[around.near[sparse]], axis=1)
         # As random points are among themselves, or far from what is dense around: parts that are sampled sparsely are
         # in planes, most of them, or thin.
