@@ -18,7 +18,7 @@ from experiments.studies import groups
 from experiments.studies.boundary import Case, look
 from symrefine.decide.chain import _best, _excluded, chain
 from symrefine.decide.explore import _holding, _with, explore
-from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted
+from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted, single
 from symrefine.decide.joins import _told_apart, better_parts
 from symrefine.decide.looks import by_chance
 from symrefine.decide.pool import Pool
@@ -185,6 +185,13 @@ def of(name):
     return fitted(ring()[1], Placed(group=point_group(name), center=ORIGIN))
 
 
+def needing(found, need, turns=None):
+    """A group as if it and its elements needed so much, those that are no planes other than that if told."""
+    each = [need if turns is None or e.operations.kind == "plane" else turns for e in found.elements]
+    elements = tuple(replace(e, need=own) for e, own in zip(found.elements, each, strict=True))
+    return replace(found, need=need, elements=elements)
+
+
 def test_of_nothing_the_chain_is_nothing():
     assert chain(ring()[1], Pool(), LIMIT) == (NOTHING,)
 
@@ -196,19 +203,29 @@ def test_parts_of_one_need_are_joined_at_once():
 
 
 def test_the_largest_group_brings_its_exact_elements():
-    whole = of("C6v")
-    spoiled = replace(
-        whole,
-        need=0.025,
-        elements=tuple(replace(e, need=0.025 if e.operations.kind == "plane" else 0.0) for e in whole.elements),
-    )
-    links = chain(ring()[1], Pool(largest=spoiled, small=()), LIMIT)
+    links = chain(ring()[1], Pool(largest=needing(of("C6v"), 0.025, turns=0.0), small=()), LIMIT)
     assert [h.group.name for h in links][:2] == ["C1", "C6"]
     assert links[1].need < 1e-9
 
 
+def test_a_group_that_is_not_the_largest_brings_its_better_elements_as_well():
+    """Turns of a fat screw hold, and its mirrors nearly: it was C1, and sure, as all were joined to what is round."""
+    links = chain(ring()[1], Pool(small=(needing(of("C2v"), 0.02, turns=0.01),)), LIMIT)
+    assert [h.group.name for h in links] == ["C1", "C2", "C2v"]
+    assert links[-1].need == 0.02
+
+
+def test_what_needs_more_together_than_the_best_alone_comes_after_it():
+    """Needs are the same within one factor: not each of the parts within it, and then all of them once more."""
+    whole = needing(of("C2v"), 0.019)
+    mirror = next(single(e).placed for e in whole.elements if e.operations.kind == "plane")
+    parts = (needing(of("C2"), 0.010), needing(fitted(ring()[1], mirror), 0.014), whole)
+    links = chain(ring()[1], Pool(small=parts), LIMIT)
+    assert [(h.group.name, h.need) for h in links] == [("C1", 0.0), ("C2", 0.010), ("C2v", 0.019)]
+
+
 def test_groups_are_joined_in_the_order_of_what_they_need():
-    parts = [replace(of(name), need=need) for name, need in (("C3", 0.001), ("C2", 0.01), ("C2v", 0.02))]
+    parts = [needing(of(name), need) for name, need in (("C3", 0.001), ("C2", 0.01), ("C2v", 0.02))]
     links = chain(ring()[1], Pool(small=tuple(parts[::-1])), LIMIT)
     assert [h.group.name for h in links] == ["C1", "C3", "C6", "C6v"]
     assert [h.need for h in links] == sorted(h.need for h in links)

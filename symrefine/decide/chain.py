@@ -36,7 +36,8 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     # What is hidden by noise, or by the least tolerance that is asked for, tells no two groups apart.
     hidden = max(hidden_need(surface), pool.nothing / ALIKE)
     worst = partial(_worst, hidden=hidden)
-    every = [*pool.small, *better_parts(pool.largest), pool.largest, *near]
+    fitted_ones = (*pool.small, pool.largest)
+    every = [*fitted_ones, *(part for h in fitted_ones for part in better_parts(h)), *near]
     rest = sorted((h for h in every if h.need <= hidden or not by_chance(seen, h.placed)), key=worst)
     known = [pool.largest, *pool.failed, *pool.small]
     links = [NOTHING, *[h for h in every if h.proven][:1]]
@@ -49,7 +50,7 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
         level = max(ALIKE * rest[0].need, here.need, hidden)
         batch = [h for h in rest if h.need <= level]
         found = join(surface, [here, *batch], known, most, pool.limit)
-        if found is None or is_loose(surface, found) or not found.elements or found.need > ALIKE * level:
+        if found is None or is_loose(surface, found) or not found.elements or found.need > level:
             tried = [] if found is None else [found]
             for other in batch[:FOLLOWED]:
                 one = join(surface, [here, other], [*known, *tried], most, pool.limit)
