@@ -236,6 +236,28 @@ def test_report_nearest_shape_and_export_agree_to_the_last_digit(name):
             assert np.linalg.norm(moved[:, None] - shape.points, axis=2).min(axis=1).max() < 1e-12 * size
 
 
+def cells_of_a_cube(count):
+    """A cube each of whose sides is cut into so many squares either way, and these into two triangles."""
+    grid = np.arange(count + 1)
+    across, along = (k.ravel() for k in np.meshgrid(grid, grid, indexing="ij"))
+    corner = np.flatnonzero((across < count) & (along < count))
+    side = np.concatenate([corner[:, None] + [0, 1, count + 2], corner[:, None] + [0, count + 2, count + 1]])
+    sides = [(axis, end) for axis in range(3) for end in (0, count)]
+    points = [np.insert(np.column_stack([across, along]), axis, end, axis=1) for axis, end in sides]
+    faces = [side + k * len(across) for k in range(len(sides))]
+    return np.concatenate(points) / count, np.concatenate(faces)
+
+
+@pytest.mark.parametrize("missing", [[0], [0, 36], [0, 1, 36]])
+def test_a_hole_leaves_the_group_of_all_vertices_exact(missing):
+    """Corners of a square one prove a mirror: less than what the surface seems to have, and all vertices do."""
+    points, faces = cells_of_a_cube(6)
+    shape = Shape(points, np.delete(faces, missing, axis=0))
+    found = symrefine.detect(shape)
+    assert (found.point_group, found.exact.faces) == ("Oh", False)
+    assert found.exact.miss < 1e-13
+
+
 def test_the_centre_is_that_of_the_surface_where_vertices_crowd_at_one_end():
     """A group with one axis leaves free where on it the centre is: next to the centroid."""
     mesh, (group, _) = mesh_of("fan8"), placed_group(DESIGNS["fan8"].parts())

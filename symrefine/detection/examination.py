@@ -88,8 +88,7 @@ class Examined:
             return same
         if known is not None and not group.is_finite:
             return known.rounded(group) if is_subgroup(known.group, group, SAME_RAD) else None
-        if known is not None and not is_subgroup(group, known.group, SAME_RAD):
-            return None
+        # What corners prove may be less than what all vertices have, where a hole makes corners of a few.
         origin, scale = self.measured.moments.center, self.measured.moments.scale
         center = origin + scale * found.placed.center
         return on_vertices(self.measured.shape, group, center, diagonal=scale * self.surface.diagonal)
