@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array
-from symrefine.shape import Shape
+from symrefine.shape import LARGEST, Shape
 
 # Points that are worked on at a time, 3 MiB of coordinates: enough that what a chunk costs by itself does not count.
 CHUNK = 2**17
@@ -26,8 +26,8 @@ class Stream:
         unit: of its lengths, one of `symrefine.units.METRES`, where the source says so.
 
     Raises:
-        InputError: fewer than two points; while it is read: chunks of another form, numbers that are not finite, or
-            more or fewer points than `count`.
+        InputError: `count` is no whole number of two or more; while it is read: chunks of another form, numbers that
+            are not finite or beyond `shape.LARGEST`, or more or fewer points than `count`.
     """
 
     count: int
@@ -36,6 +36,8 @@ class Stream:
     unit: str | None = None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.count, int | np.integer):
+            raise InputError(f"{self.source}: count is {self.count!r}; expected how many points there are")
         if self.count < 2:
             raise InputError(f"{self.source}: {self.count} points; a shape needs at least two distinct points")
 
@@ -58,30 +60,31 @@ class Stream:
     def __iter__(self) -> Iterator[Array]:
         """Chunks of `CHUNK` points each but for the last, however they are read."""
         waiting: list[Array] = []
-        done = 0
+        done = given = 0
         for chunk in self.read():
             waiting.append(self._points(np.asarray(chunk), done))
             done += len(chunk)
-            if sum(map(len, waiting)) < CHUNK:
+            if done - given < CHUNK:
                 continue
             points = waiting[0] if len(waiting) == 1 else np.concatenate(waiting)
             ready = len(points) - len(points) % CHUNK
             yield from np.split(points[:ready], ready // CHUNK)
-            waiting = [points[ready:]]
+            waiting, given = [points[ready:]], given + ready
         if done != self.count:
             raise InputError(f"{self.source}: {self.count:,} points were announced; {done:,} are there")
-        if rest := sum(map(len, waiting)):
-            yield np.concatenate(waiting).reshape(rest, 3)
+        if given < done:
+            yield np.concatenate(waiting)
 
     def _points(self, chunk: NDArray[Any], done: int) -> Array:
         """A chunk behind so many points, as numbers."""
         if chunk.ndim != 2 or chunk.shape[1] != 3 or chunk.dtype.kind not in "iuf":
             raise InputError(f"{self.source}: a chunk has shape {chunk.shape} of {chunk.dtype}; expected [n, 3]")
         points = chunk.astype(np.float64)
-        if not np.isfinite(points).all():
-            bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
+        inside = np.abs(points) <= LARGEST
+        if not inside.all():
+            bad = int(np.flatnonzero(~inside.all(axis=1))[0])
             raise InputError(
-                f"{self.source}: point {done + bad} is {points[bad].tolist()}; coordinates must be finite: remove such "
-                "points"
+                f"{self.source}: point {done + bad} is {points[bad].tolist()}; coordinates must be finite and at most "
+                f"{LARGEST:g}: remove such points"
             )
         return points

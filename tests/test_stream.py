@@ -208,6 +208,7 @@ def test_points_gone_through_are_told():
         ([np.zeros((3, 2))], r"a chunk has shape \(3, 2\)"),
         ([np.full((3, 3), "a")], "expected"),
         ([np.eye(3), np.array([[0.0, np.nan, 1.0]])], r"point 3 is \[0.0, nan, 1.0\]"),
+        ([np.eye(3), np.array([[0.0, 1e61, 1.0]])], r"point 3 is .*; coordinates must be finite and at most 1e\+60"),
         ([np.eye(3)], "4 points were announced; 3 are there"),
         ([np.eye(3), np.eye(3)], "4 points were announced; 6 are there"),
     ],
@@ -215,6 +216,24 @@ def test_points_gone_through_are_told():
 def test_chunks_of_another_form_are_refused(chunks, said):
     with pytest.raises(InputError, match=said):
         list(Stream(count=4, read=lambda: iter(chunks)))
+
+
+@pytest.mark.parametrize("count", [4.0, "4"])
+def test_counts_that_are_none_are_refused(count):
+    with pytest.raises(InputError, match=r"count is .*4.*; expected how many points there are"):
+        Stream(count=count, read=lambda: iter([np.eye(3)]))
+
+
+def test_points_that_come_one_by_one_are_taken_together():
+    points = np.arange(3.0 * (CHUNK + 5)).reshape(-1, 3)
+    found = [*Stream(count=len(points), read=lambda: (p[None] for p in points))]
+    assert [len(chunk) for chunk in found] == [CHUNK, 5]
+    assert np.array_equal(np.concatenate(found), points)
+
+
+def test_a_stream_that_does_not_spread_is_told_by_name():
+    with pytest.raises(DegenerateShapeError, match=r"^scan\.npy: the points do not spread"):
+        symrefine.detect(Stream.of(np.ones((CHUNK, 3)), source="scan.npy"))
 
 
 def test_arrays_of_another_form_are_refused():

@@ -12,6 +12,7 @@ import numpy as np
 from symrefine.clock import passed
 from symrefine.detection.masses import ORDER, masses
 from symrefine.detection.measure import Measured
+from symrefine.errors import DegenerateShapeError
 from symrefine.geometry import Array
 from symrefine.moments.moments import PARTS, Moments
 from symrefine.moments.running import running_moments
@@ -105,7 +106,10 @@ def sketched(given: Shape | Stream, seed: int = 0) -> Sketch:
             yield points, weights
             passed(done, count)
 
-    moments = running_moments(chunks(), ORDER, parts=PARTS)
+    try:
+        moments = running_moments(chunks(), ORDER, parts=PARTS)
+    except DegenerateShapeError as error:
+        raise DegenerateShapeError(f"{given.source}: {error}") from None
     if isinstance(given, Stream):
         sample = Shape(np.concatenate(drawn), source=given.source, unit=given.unit)
     else:

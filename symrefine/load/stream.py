@@ -24,7 +24,7 @@ from symrefine.load.text import count, shorten
 from symrefine.shape import LARGEST
 from symrefine.stream import CHUNK, Stream
 
-# Points from which on a file is read in chunks without being asked to: beyond, memory is what ends first.
+# Points beyond which a file is read in chunks without being asked to: there memory is what ends first.
 STREAMED = 1_000_000
 # Bytes of the least such file, six to a point; what is smaller is not opened to count them.
 _LEAST = 6 * STREAMED
