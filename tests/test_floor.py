@@ -239,7 +239,7 @@ def test_points_of_no_weight_make_no_floor():
     plane = np.column_stack([rng.uniform(-2, 2, (4000, 2)), np.full(4000, -0.25)])
     points = np.concatenate([sample(BRICK, 4000, 0.003, rng), plane])
     weights = np.repeat([1.0, 0.0], 4000)
-    found = detect(points, weights=weights, outliers="floor")
+    found = detect(Shape.of(points, weights=weights), outliers="floor")
     assert found.point_group == "D2h"
     assert found.no_floor
 

@@ -19,6 +19,7 @@ from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.load import load
+from symrefine.shape import Shape
 from symrefine.texture import COLOUR_TOLERANCE, colour_classes
 
 RED, GREEN, BLUE, YELLOW, WHITE, BLACK = (
@@ -549,5 +550,5 @@ def test_the_result_does_not_hang_on_the_pose() -> None:
     """Labels of a cloud travel with its points."""
     symbols, positions = atoms_of("CH2Cl2")
     labels = np.unique(symbols, return_inverse=True)[1]
-    found: list[Detection] = [detect(posed(positions, seed), labels=labels) for seed in range(5)]
+    found: list[Detection] = [detect(Shape.of(posed(positions, seed), labels=labels)) for seed in range(5)]
     assert {d.point_group for d in found} == {"C2v"}

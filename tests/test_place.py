@@ -73,7 +73,7 @@ def test_a_mirror_that_carries_the_handle_to_where_nobody_looked_is_not_told(azi
 
 def test_one_view_of_a_mug_tells_of_all_mirrors_through_its_axis_that_of_the_handle():
     made = damage.view(mug(), np.array(BESIDE_THE_HANDLE), np.random.default_rng(3))
-    found = detect(made.points, viewpoint=made.viewpoint)
+    found = detect(Shape.of(made.points, viewpoint=made.viewpoint))
     through = [p.plane.normal for p in found.planes if abs(p.plane.normal[2]) < 0.5]
     assert [line_angle_rad(normal, [0.0, 1.0, 0.0]) < 0.02 for normal in through] == [True]
     assert found.at_least
@@ -167,7 +167,7 @@ def test_a_group_is_told_by_what_elements_that_were_seen_generate(name, shares, 
 def test_one_side_of_a_slab_tells_nothing_of_the_other(name, direction, seed):
     """Its own plane is no mirror that anybody saw; of the groups that hold with it, its other mirrors are told."""
     made = damage.view(MAKES[name](), np.array(direction), np.random.default_rng(seed))
-    found = detect(made.points, viewpoint=made.viewpoint)
+    found = detect(Shape.of(made.points, viewpoint=made.viewpoint))
     assert found.point_group == "C2v"
     assert found.at_least
 
@@ -184,7 +184,7 @@ def test_the_plane_of_a_slab_moves_what_was_seen_by_no_more_than_is_forgiven(nam
 def test_what_no_camera_saw_may_break_one_of_two_mirrors_and_leave_the_other():
     """Which of them is not known: each is as sure as the two together, and half of what one alone is."""
     made = damage.view(MAKES["slab"](), np.array(ABOVE), np.random.default_rng(3))
-    found = detect(made.points, viewpoint=made.viewpoint)
+    found = detect(Shape.of(made.points, viewpoint=made.viewpoint))
     others = {a.point_group: a.probability for a in found.alternatives}
     assert set(others) == {"Cs", "C1"}
     assert others["C1"] < others["Cs"] < found.confidence
@@ -246,7 +246,7 @@ def test_a_ball_that_one_camera_saw_is_one_turned_as_one_likes(eye):
     x = np.random.default_rng(6).normal(size=(20000, 3))
     ball = 0.2 * x / np.linalg.norm(x, axis=1)[:, None]
     seen = ball[ball @ np.array(eye) > 0.04]
-    found = detect(seen, viewpoint=eye)
+    found = detect(Shape.of(seen, viewpoint=eye))
     assert (found.point_group, found.confidence > 0.9) == ("Kh", True)
     assert np.linalg.norm(found.center) < 0.002
 
@@ -276,7 +276,7 @@ def test_whole_objects_ask_nothing_of_the_sort():
 def test_a_larger_tolerance_takes_no_group_away_that_a_smaller_one_tells(name):
     """Though it holds elsewhere as well at that tolerance: it is known to stand where it does at the one asked for."""
     made = damage.view(MAKES[name](), np.array([0.5, 0.4, 0.7]), np.random.default_rng(3))
-    found = detect(made.points, viewpoint=made.viewpoint, ladder=(0.02, 0.04, 0.08))
+    found = detect(Shape.of(made.points, viewpoint=made.viewpoint), ladder=(0.02, 0.04, 0.08))
     steps = [found.examined.decided(t).index for t in (0.02, 0.04, 0.08)]
     assert steps == sorted(steps)
     assert steps[0] > 0

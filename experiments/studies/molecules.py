@@ -22,6 +22,7 @@ from experiments.studies.jobs import add_jobs, in_order
 from symrefine.detection.story import detect
 from symrefine.errors import InputError
 from symrefine.geometry import Array, random_orthogonal
+from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 
 NOISE_BOND = 0.01
@@ -100,7 +101,7 @@ def _asked(given: Molecule, points: Array, case: Case) -> tuple[str, bool]:
             return point_group_pymatgen(given.symbols, points, case.tolerance), False
         except (ValueError, ArithmeticError, IndexError, np.linalg.LinAlgError) as error:
             return f"error: {error}", False
-    found = detect(points, labels=given.numbers, tolerance=case.tolerance)
+    found = detect(Shape.of(points, labels=given.numbers), tolerance=case.tolerance)
     return found.point_group, bool(found.undetermined)
 
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,10 +36,6 @@ LADDER = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08)
 def detect(
     shape: Shape | Sketch | ArrayLike,
     *,
-    weights: ArrayLike | None = None,
-    normals: ArrayLike | None = None,
-    labels: ArrayLike | None = None,
-    viewpoint: ArrayLike | None = None,
     outliers: Outliers = "auto",
     tolerance: float = TOLERANCE,
     ladder: Sequence[float] = (),
@@ -50,13 +47,8 @@ def detect(
 
     Args:
         shape: a `Shape`, points [N, 3], or the `Sketch` of a cloud too large to hold; of a cloud of more than 100,000
-            points a sketch is made, too.
-        weights: [N] masses of the points; not with a `Shape`, which carries its own. Of up to 250 points those of
-            different mass are different things, which no symmetry exchanges; of more, masses are a sampling density.
-        normals: [N, 3] normals, any sign; estimated where absent. Not with a `Shape`.
-        labels: [N] integers: classes (elements, colours, materials) that every symmetry must keep. Not with a `Shape`.
-        viewpoint: [3] or [N, 3] place of the camera that saw the points, or each of them: what lies in front of them or
-            beside their outline, was seen to be free. Not with a `Shape`.
+            points a sketch is made, too. Of up to 250 points those of different weight are different things, which no
+            symmetry exchanges; of more, weights are a sampling density.
         outliers: "auto": points of a cloud that belong to no surface are set apart and told as `Detection.outliers`;
             "floor": so is the plane that the object stands on, as `Detection.floor`; "none": all points count.
         tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal: 95 % of the
@@ -70,8 +62,12 @@ def detect(
             no cloud of a surface.
         DegenerateShapeError: the points do not spread.
     """
-    data, clock = _given(shape, weights, normals, labels, viewpoint), Clock()
-    found = examined(data, outliers=outliers, tolerance=tolerance, ladder=ladder, seed=seed, clock=clock)
+    if not isinstance(shape, Shape | Sketch):
+        shape = Shape.of(shape)
+    if isinstance(shape, Shape) and shape.dim != 3:
+        raise InputError(f"{shape.source}: detect takes 3-D shapes; {_elsewhere(shape.dim)}")
+    clock = Clock()
+    found = examined(shape, outliers=outliers, tolerance=tolerance, ladder=ladder, seed=seed, clock=clock)
     return told(found, tolerance=tolerance, ladder=ladder, clock=clock)
 
 
@@ -105,25 +101,6 @@ def chosen(detection: Detection, point_group: str) -> Detection:
         found = replace(found, links=(*links[:index], fit, *links[index + 1 :]))
     told = _report(found, decision, index, "", tolerance, detection.staircase, Clock())
     return replace(told, timings=detection.timings)
-
-
-def _given(
-    shape: Shape | Sketch | ArrayLike,
-    weights: ArrayLike | None,
-    normals: ArrayLike | None,
-    labels: ArrayLike | None,
-    viewpoint: ArrayLike | None,
-) -> Shape | Sketch:
-    """The shape in 3-space."""
-    if not isinstance(shape, Shape | Sketch):
-        shape = Shape.of(shape, weights=weights, normals=normals, labels=labels, viewpoint=viewpoint)
-    elif not (weights is None and normals is None and labels is None and viewpoint is None):
-        raise InputError(
-            "weights, normals, labels and viewpoint belong to the Shape; give them there, or give an array of points"
-        )
-    if isinstance(shape, Shape) and shape.dim != 3:
-        raise InputError(f"{shape.source}: detect takes 3-D shapes; {_elsewhere(shape.dim)}")
-    return shape
 
 
 def _elsewhere(dim: int) -> str:
@@ -177,14 +154,7 @@ def _report(
         group=chosen.group,
         center=origin + scale * chosen.placed.center if on is None else on.center,
         planes=tuple(
-            FoundPlane(
-                plane=_plane(e, origin, scale),
-                residual=e.deviation,
-                confidence=sure[id(e)],
-                sigma_rad=(off := _uncertainty(known, e))[0],
-                sigma=off[1] * scale,
-                coverage=e.coverage,
-            )
+            FoundPlane(plane=_plane(e, origin, scale), confidence=sure[id(e)], **_as_told(e, known, scale))
             for e in sorted(planes, key=lambda e: e.need)
         ),
         axes=tuple(
@@ -192,11 +162,8 @@ def _report(
                 axis=Axis(point=origin + scale * e.center, direction=positive(e.operations.direction)),
                 order=e.operations.order,
                 improper=e.operations.kind == "improper",
-                residual=e.deviation,
                 confidence=sure[id(e)],
-                sigma_rad=(off := _uncertainty(known, e))[0],
-                sigma=off[1] * scale,
-                coverage=e.coverage,
+                **_as_told(e, known, scale),
             )
             for e in sorted(turns, key=lambda e: (-e.operations.order, e.need))
         ),
@@ -327,6 +294,12 @@ def _covariance(surface: Surface, chosen: Hypothesis) -> Array | None:
         covariance = answered(surface.cloud, end, start_error(surface), stride=stride)
     axes = np.kron(np.eye(2), end.state.frame)
     return np.asarray(axes.T @ covariance @ axes + loose)
+
+
+def _as_told(element: Element, covariance: Array | None, scale: float) -> dict[str, Any]:
+    """What is told of a plane and of an axis alike."""
+    off_rad, off = _uncertainty(covariance, element)
+    return {"residual": element.deviation, "coverage": element.coverage, "sigma_rad": off_rad, "sigma": scale * off}
 
 
 def _uncertainty(covariance: Array | None, element: Element) -> tuple[float, float]:
