@@ -14,8 +14,7 @@ from symrefine.decide.hypotheses import SAME_RAD, Hypothesis
 from symrefine.decide.looks import exact_need, unmet_by
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import ALIKE, Alternative, Decision, Link, decide, least_told, meant, odd
-from symrefine.detection.measure import Measured, Outliers, doubt, floor_under, gather, measure
-from symrefine.detection.proof import by_vertices
+from symrefine.detection.measure import Measured, Outliers, by_vertices, doubt, floor_under, gather, measure
 from symrefine.detection.sketch import Sample, Sketch, is_large, sampled, set_apart, sketched
 from symrefine.fit.placed import SAMPLED
 from symrefine.fit.vertices import OnVertices, on_vertices

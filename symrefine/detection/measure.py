@@ -12,6 +12,8 @@ from symrefine.decide.doubts import on_a_line, set_by_strays
 from symrefine.decide.posterior import least_told
 from symrefine.detection.masses import class_moments, classes_of, heavy, is_few, mass_of
 from symrefine.errors import InputError
+from symrefine.fit.placed import Placed
+from symrefine.fit.vertices import OnVertices, exact_symmetry
 from symrefine.geometry import Array, tight_diagonal
 from symrefine.moments.moments import PARTS, Moments
 from symrefine.moments.quadrature import sample_surface
@@ -24,10 +26,10 @@ from symrefine.surface.cameras import Camera, cameras, outwards
 from symrefine.surface.clumps import Clump
 from symrefine.surface.drift import Drift
 from symrefine.surface.floor import Floor, floor_of
-from symrefine.surface.misses import TOLERANCE, noise_distances, sampling_distances
+from symrefine.surface.misses import TOLERANCE, disc_distances, noise_distances
 from symrefine.surface.neighbourhoods import fills_volume
 from symrefine.surface.openings import NEIGHBOURS, openings
-from symrefine.surface.sampling import distinct, face_densities, sampling
+from symrefine.surface.sampling import Sampling, distinct, face_densities, sampling
 from symrefine.surface.skin import FEW, LocalPlanes, drawn, isolated_points, make_skin
 from symrefine.surface.surface import Surface
 from symrefine.surface.tree import Tree, morton_order
@@ -126,11 +128,6 @@ def measure(
         whole: moments of all the points that `shape` is a sample of; they count where no point is set apart.
         seed: of the samples of a mesh.
     """
-    strays: Index = np.empty(0, dtype=np.int64)
-    clumps: tuple[tuple[Index, Array], ...] = ()
-    scan: Shape | None = None
-    blobs: tuple[tuple[Index, Array], ...] = ()
-    solid = False
     massive = np.arange(len(shape.points))
     if shape.faces is None and shape.weights is not None and not shape.weights.all():
         massive = np.flatnonzero(shape.weights > 0)
@@ -139,23 +136,22 @@ def measure(
     if shape.faces is None and shape.weights is None and not is_few(shape):
         some, own = distinct(shape.points, shape.labels)
         shape = shape.chosen(some) if len(some) < len(own) else shape
-    count = len(shape.points)
-    if shape.faces is None and not is_few(shape):
+    as_given = shape.faces is not None or is_few(shape)
+    seen = Sampling.as_given(len(shape.points))
+    if not as_given:
         # What stands in front parts what a camera sees, and hides its counterparts.
         groups, rng = shape.viewpoint is None, np.random.default_rng(0)
         known = [np.unique(own[np.isin(massive, group)]) for group in foreign]
         seen = sampling(shape.points, rng, outliers=outliers, groups=groups, apart=apart, foreign=known)
-        strays = massive[np.isin(own, seen.strays)]
-        clumps, blobs = (
-            tuple((massive[np.isin(own, g)], shape.points[g]) for g in parts) for parts in (seen.clumps, seen.blobs)
-        )
-        count, solid = len(seen.kept), seen.solid
-        scan = shape.chosen(seen.kept) if shape.viewpoint is not None else None
-        # So few points as would stand for themselves are no even sample of a surface.
-        if shape.weights is None and seen.shares is not None and len(seen.even) > FEW:
-            shape = replace(shape.chosen(seen.even), weights=seen.shares)
-        elif len(seen.kept) < len(shape.points):
-            shape = shape.chosen(seen.kept)
+    clumps, blobs = (
+        tuple((massive[np.isin(own, g)], shape.points[g]) for g in parts) for parts in (seen.clumps, seen.blobs)
+    )
+    scan = None if as_given or shape.viewpoint is None else shape.chosen(seen.kept)
+    # So few points as would stand for themselves are no even sample of a surface.
+    if shape.weights is None and seen.shares is not None and len(seen.even) > FEW:
+        shape = replace(shape.chosen(seen.even), weights=seen.shares)
+    elif len(seen.kept) < len(shape.points):
+        shape = shape.chosen(seen.kept)
     classes = classes_of(shape)
     samples = density = None
     if shape.faces is not None:
@@ -169,13 +165,13 @@ def measure(
     vectors = ntuples(moments)
     return Measured(
         shape=shape,
-        count=count,
+        count=len(seen.kept),
         scan=scan,
         floor=floor,
-        strays=strays,
+        strays=massive[np.isin(own, seen.strays)],
         clumps=clumps,
         blobs=blobs,
-        solid=solid,
+        solid=seen.solid,
         classes=classes,
         samples=samples,
         density=density,
@@ -314,7 +310,9 @@ def _surface(
     diagonal = tight_diagonal(cloud.points)
     if exact:
         others = np.delete(np.arange(len(local)), pick)
-        noise = sampling_distances(cloud, local[others], None if labels is None else labels[others])
+        others = others[:: max(1, len(others) // (2 * COUNT))]
+        # Samples that are free of noise differ by no more from the surface that the others make than an image does.
+        noise = disc_distances(cloud, local[others], None if labels is None else labels[others])
     else:
         noise = noise_distances(len(local), half, rng)
     skin = None if exact else whole
@@ -361,3 +359,19 @@ def _cloud(measured: Measured) -> tuple[Array, Array | None, Array, Index | None
     points, normals, face = measured.samples
     weights = np.ones(len(points)) if density is None else density[face]
     return points, normals, weights, None if classes is None else classes[face]
+
+
+def by_vertices(
+    measured: Measured, diagonal: float, evidence: Evidence
+) -> tuple[OnVertices | None, OnVertices | None, Evidence]:
+    """The group that vertices of a mesh, or points of a cloud, have, what of it faces prove, and the evidence.
+
+    It is exact, whatever is sampled of the shape.
+    """
+    origin, scale = measured.moments.center, measured.moments.scale
+    exact, proof = exact_symmetry(measured.shape, scale * diagonal)
+    if exact is None or exact.group.name == "C1":
+        return exact, None, evidence
+    found = [None if known is None else known.beside(origin) for known in (exact, proof)]
+    placed = [None if k is None else Placed(group=k.group, center=(k.center - origin) / scale) for k in found]
+    return found[0], found[1], replace(evidence, vertices=placed[0], proven=placed[1])

@@ -193,15 +193,6 @@ def spread_distance(one: Array, other: Array) -> float:
     return float(np.sqrt(max(np.trace(one) + np.trace(other) - 2.0 * common, 0.0)))
 
 
-def sampling_distances(cloud: LocalPlanes, points: Array, classes: Index | None) -> Array:
-    """Distances [M] of samples [N, 3] of a surface, of the classes [N], from the surface that others of them make.
-
-    Where samples are free of noise, an object with an exact symmetry differs from its image by no more.
-    """
-    some = slice(None, None, max(1, len(points) // (2 * COUNT)))
-    return disc_distances(cloud, points[some], None if classes is None else classes[some])
-
-
 def noise_distances(
     count: int,
     planes: Callable[[Index], LocalPlanes],

@@ -52,6 +52,12 @@ class Sampling:
     shares: Array | None = None
     solid: bool = False
 
+    @classmethod
+    def as_given(cls, count: int) -> "Sampling":
+        """So many points that are all kept as they are."""
+        every = np.arange(count)
+        return cls(kept=every, even=every, strays=every[:0])
+
 
 def distinct(points: Array, labels: Index | None) -> tuple[Index, Index]:
     """Indices [M], ascending, of points [N, 3] without those of a label [N] that repeat another, and whose each is [N].
@@ -88,7 +94,7 @@ def sampling(
     taken: list[Index] = []
     lone: list[Index] = []
     if len(points) <= AROUND or points.std() == 0.0:
-        return Sampling(kept=kept, even=kept, strays=kept[:0])
+        return Sampling.as_given(size)
     some = some_of(points, rng)
     spread = points[some].std()
     points = (points - points[some].mean(axis=0)) / spread
@@ -158,9 +164,7 @@ def _alone(around: Surroundings) -> Mask:
     sparse = np.flatnonzero(reach > FAR * np.median(reach)) if np.median(reach) > 0.0 else np.empty(0, dtype=np.int64)
     found = np.zeros(len(points), dtype=bool)
     if sparse.size:
-        mean, normals, variances = around.planes_at(sparse)
-        across = np.abs(np.einsum("ni,ni->n", normals, points[sparse] - mean))
-        loose = (thickness_of(variances) > FLAT) | (across > FLAT * around.away[sparse, -1])
+        loose = _in_no_plane(points[sparse], points, around.near[sparse], around.away[sparse])
         # Or in the plane of others by chance, most of which are at home elsewhere: a body far away is seen as a speck,
         # FAR times as dense as any that a surface thins out from.
         loose |= reach[sparse] > FAR**2 * np.median(reach[around.near[sparse]], axis=1)
@@ -185,10 +189,15 @@ def strays_beside(points: Array, around: Surroundings) -> Mask:
     if not found.any():
         return found
     away, near = around.tree.query(points[found], AROUND)
-    mean, normals, variances = planes_of(around.points, near)
-    across = np.abs(np.einsum("ni,ni->n", normals, points[found] - mean))
-    found[found] = (thickness_of(variances) > FLAT) | (across > FLAT * away[:, -1])
+    found[found] = _in_no_plane(points[found], around.points, near, away)
     return found
+
+
+def _in_no_plane(points: Array, others: Array, near: Index, away: Array) -> Mask:
+    """Which of points [N, 3] lie in no plane with those near them [N, k] among others, which are so far away [N, k]."""
+    mean, normals, variances = planes_of(others, near)
+    across = np.abs(np.einsum("ni,ni->n", normals, points - mean))
+    return np.asarray((thickness_of(variances) > FLAT) | (across > FLAT * away[:, -1]))
 
 
 def _scattered(points: Array, body: Array) -> bool:
