@@ -32,7 +32,7 @@ def wide(points: np.ndarray) -> Skin:
 
 
 def judged(points: np.ndarray, motions: list[Isometry], axis: Axis) -> np.ndarray:
-    (wedge,) = Wedge.of(wide(points), axis, FOLD)
+    wedge = Wedge.of(wide(points), axis, FOLD)
     return wedge.needs(motions, float(np.linalg.norm(np.ptp(points, axis=0))), open_=False)
 
 
@@ -62,7 +62,7 @@ def test_crests_that_lean_deny_the_mirror_and_not_the_turns():
 def test_what_does_not_keep_the_axis_is_not_told_nor_what_turns_an_open_surface_over():
     rng = np.random.default_rng(9)
     points = teeth(0.9, rng)
-    (wedge,) = Wedge.of(wide(points), Axis(direction=np.array([0.0, 0.0, 1.0]), point=np.zeros(3)), FOLD)
+    wedge = Wedge.of(wide(points), Axis(direction=np.array([0.0, 0.0, 1.0]), point=np.zeros(3)), FOLD)
     aside = Isometry.about(np.zeros(3), householder([1.0, 0.0, 1.0]))
     over = Isometry.about(np.array([0.0, 0.0, 0.3]), householder([0.0, 0.0, 1.0]))
     told = wedge.needs([aside, over], 3.0, open_=False)
@@ -75,8 +75,8 @@ def test_a_surface_that_neighbourhoods_resolve_is_not_folded():
     rng = np.random.default_rng(10)
     points = teeth(0.0, rng, count=20000)
     axis = Axis(direction=np.array([0.0, 0.0, 1.0]), point=np.zeros(3))
-    assert not Wedge.of(make_skin(points, rng), axis, 4)
-    assert not Wedge.of(Skin(points=points, normals=points, neighbours=1), axis, FOLD)
+    assert Wedge.is_needless(make_skin(points, rng), axis, 4)
+    assert Wedge.is_needless(Skin(points=points, normals=points, neighbours=1), axis, FOLD)
 
 
 @pytest.mark.parametrize(

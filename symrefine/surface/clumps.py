@@ -16,10 +16,11 @@ from symrefine.surface.neighbourhoods import (
     FLAT,
     NEIGHBOURS,
     VOLUME,
-    blobness,
+    ball_thickness,
     choose_neighbours,
     connected_parts,
     planes_of,
+    thickness_of,
 )
 from symrefine.surface.surroundings import AROUND, Surroundings
 from symrefine.surface.tree import Tree
@@ -105,7 +106,7 @@ def filled(points: Array, around: Surroundings, rng: np.random.Generator) -> lis
     Neighbourhoods there look like points at random in a ball: among some of the points, and among all at any size, up
     to one so large that noise does not make the surface look so too. `around` tells of some of the points.
     """
-    thick = blobness(around.planes[2], AROUND)
+    thick = around.thickness / ball_thickness(AROUND)
     within, least = _smooth(thick, around) > FILLED, SHARES[-1] * len(thick)
     if within.sum() <= least:
         return []
@@ -163,8 +164,8 @@ def _smooth(values: Array, around: Surroundings) -> Array:
 
 
 def _blobness(points: Array, tree: Tree, queries: Array, size: int) -> Array:
-    """`blobness` [Q] of what is around queries [Q, 3] among points [N, 3]."""
-    return blobness(planes_of(points, tree.query(queries, size)[1])[2], size)
+    """Thickness [Q] of what is around queries [Q, 3] among points [N, 3], over that of random points in a ball."""
+    return thickness_of(planes_of(points, tree.query(queries, size)[1])[2]) / ball_thickness(size)
 
 
 def _lone(part: Index, most: float) -> list[Mask]:

@@ -199,24 +199,19 @@ def planes_of(points: Array, near: Index) -> tuple[Array, Array, Array]:
     return fit_planes(_added(sums_of(rows(points, members)), own.ravel(), np.arange(0, near.size + 1, near.shape[1])))
 
 
-def blobness(variances: Array, k: int) -> Array:
-    """Thickness over length [M] from variances [M, 3] of neighbourhoods of k, over that of random points in a ball."""
-    return thickness_of(variances) / _ball_thickness(k)
-
-
 def thickness_of(variances: Array) -> Array:
     """Thickness over length [M] of neighbourhoods from their variances [M, 3] in ascending order."""
     return np.sqrt(variances[:, 0] / np.maximum(variances[:, 2], 1e-300))
 
 
 @lru_cache(maxsize=32)
-def _ball_thickness(k: int) -> float:
+def ball_thickness(k: int) -> float:
     """Median thickness over length of k points at random in a ball."""
     rng = np.random.default_rng(0)
     ball = rng.standard_normal((400, k, 3))
     ball *= rng.random((400, k, 1)) ** (1.0 / 3.0) / np.linalg.norm(ball, axis=2, keepdims=True)
     values = planes_of(ball.reshape(-1, 3), np.arange(400 * k).reshape(400, k))[2]
-    return float(np.median(np.sqrt(values[:, 0] / values[:, 2])))
+    return float(np.median(thickness_of(values)))
 
 
 def flatness_of(values: Array) -> Array:

@@ -89,7 +89,7 @@ class Surface:
     def look_about(self, axis: Axis, fold: int) -> None:
         """Fold it about an axis of so many folds, unless it was, or neighbourhoods are small enough without."""
         if self.skin is not None and fold > 1 and not self.looked_about(axis, fold):
-            self.wedges.extend(Wedge.of(self.skin, axis, fold))
+            self.wedges.append(Wedge.of(self.skin, axis, fold))
 
     def looked_about(self, axis: Axis, fold: int) -> bool:
         """Whether it was folded so often about an axis, as near as neighbourhoods tell, or that would tell no more."""

@@ -53,18 +53,9 @@ class Surroundings:
         return np.asarray(self.away[:, AROUND // 2 - 1])
 
     @cached_property
-    def planes(self) -> tuple[Array, Array, Array]:
-        """Means, normals and variances (across first), all [N, 3], of the neighbours."""
-        return planes_of(self.points, self.near)
-
-    def planes_at(self, some: Index) -> tuple[Array, Array, Array]:
-        """The same of some of the points only."""
-        return planes_of(self.points, self.near[some])
-
-    @property
     def thickness(self) -> Array:
         """Thickness over length [N] of what is around each point."""
-        return thickness_of(self.planes[2])
+        return thickness_of(planes_of(self.points, self.near)[2])
 
 
 def around_some(points: Array, rng: np.random.Generator) -> Surroundings:

@@ -46,14 +46,11 @@ class Wedge:
     noise: Array
 
     @classmethod
-    def of(cls, skin: Skin, axis: Axis, fold: int) -> "list[Wedge]":
-        """The wedge of a skin about an axis of so many folds; none where neighbourhoods are small enough without."""
+    def of(cls, skin: Skin, axis: Axis, fold: int) -> "Wedge":
+        """The wedge of a skin about an axis of so many folds."""
         rng, frame, pitch = np.random.default_rng(0), frame_with_z(axis.direction), 2.0 * np.pi / fold
         local = (skin.points - axis.point) @ frame.T
-        denser = _denser(skin, local, pitch)
-        if denser <= 1.0:
-            return []
-        pick = drawn(len(local), round(min(denser / fold, 1.0) * len(local)), rng)
+        pick = drawn(len(local), round(min(_denser(skin, local, pitch) / fold, 1.0) * len(local)), rng)
         turned, turns = _into(local[pick], pitch)
         whole = Skin(
             points=turned,
@@ -63,16 +60,14 @@ class Wedge:
         )
         one, other = (_planes(whole.half(half), pitch, rng) for half in halves(len(pick), rng))
         noise = [disc_distances(a, _own(b), _own_classes(b)) for a, b in ((one, other), (other, one))]
-        return [
-            cls(
-                frame=frame,
-                center=axis.point,
-                fold=fold,
-                width=skin.width,
-                cloud=_planes(whole, pitch, rng),
-                noise=np.sort(of_the_whole(np.concatenate(noise), "surface")),
-            )
-        ]
+        return cls(
+            frame=frame,
+            center=axis.point,
+            fold=fold,
+            width=skin.width,
+            cloud=_planes(whole, pitch, rng),
+            noise=np.sort(of_the_whole(np.concatenate(noise), "surface")),
+        )
 
     @classmethod
     def is_needless(cls, skin: Skin, axis: Axis, fold: int) -> bool:
