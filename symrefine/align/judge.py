@@ -313,4 +313,4 @@ class Judge:
 def _mirrors(points: Array, normals: Array) -> list[Similarity]:
     """The mirrors that local planes [N, 3] vote for; none where there are too few of them."""
     votes = mirror_votes(points, normals, np.random.default_rng(0), told=MIRRORS)
-    return [Similarity.of(Isometry.about(v.foot, householder(v.direction))) for v in votes]
+    return [Similarity.of(Isometry.about(foot, householder(normal))) for normal, foot in zip(*votes, strict=True)]

@@ -4,7 +4,6 @@ The n-tuples give an axis or a plane where they do not vanish, the directional s
 azimuthal spectrum the folds about an axis with their phases. Everything is in normalised units (RMS radius 1).
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -22,7 +21,7 @@ from symrefine.moments.moments import Moments
 from symrefine.ntuples.rank import FixedSubspace
 from symrefine.propose.folds import azimuthal_spectrum, folds_of, frames_across, mirror_through
 from symrefine.propose.maps import WITHIN, maps_onto_itself
-from symrefine.propose.spectrum import axis_misses, local_minima, mirror_candidates, whitened
+from symrefine.propose.spectrum import apart, axis_misses, local_minima, mirror_candidates, whitened
 from symrefine.propose.votes import AGREE_RAD, meeting, mirror_votes, revolution
 from symrefine.rounding import DOUBLE, START_ERROR
 from symrefine.samples import FOLLOWED
@@ -69,13 +68,12 @@ class Evidence:
 
 def proposals(evidence: Evidence) -> list[Placed]:
     """What the moments propose first: what may stand about the likeliest axes, mirrors and inversion."""
-    spectral = mirror_candidates(evidence.moments).directions
     around = [start for direction in _likely(evidence) for start in about(evidence, direction)]
     # Of what is nearly round nothing but azimuths about the axis of a revolution tells its own mirror from all others.
     axes = [start.group.frame[2] for start in around if start.group.name == "Cinfv"]
     through = (mirror_through(evidence.azimuths(axis), axis) for axis in axes)
     told = [normal for normal in through if normal is not None]
-    normals = [*evidence.tuples.directions[::-1], *_principal(evidence), *spectral, *told]
+    normals = [*evidence.tuples.directions[::-1], *_principal(evidence), *mirror_candidates(evidence.moments), *told]
     return [*around, placed("Ci", np.eye(3)), *(placed("Cs", frame_with_z(n)) for n in apart(normals))]
 
 
@@ -85,7 +83,7 @@ def voted_mirrors(planes: LocalPlanes) -> list[Placed]:
     ball = placed("Kh", np.eye(3), meeting(planes.points, planes.normals))
     mirrors = mirror_votes(planes.points, planes.normals, np.random.default_rng(0), outwards=planes.eyes is not None)
     found = placed("Cinfv", frame_with_z(direction), point)
-    return [ball, found, *(placed("Cs", frame_with_z(v.direction), v.foot) for v in mirrors)]
+    return [ball, found, *(placed("Cs", frame_with_z(n), foot) for n, foot in zip(*mirrors, strict=True))]
 
 
 def repeated(cloud: LocalPlanes, diagonal: float) -> list[Placed]:
@@ -119,7 +117,7 @@ def prime_axes(evidence: Evidence) -> list[Placed]:
     white, likely = whitened(evidence.moments), _likely(evidence)
     found = []
     for k in PRIMES:
-        minima = local_minima(axis_misses(white, k), count=5).directions
+        minima, _ = local_minima(axis_misses(white, k), count=5)
         found += [placed(f"C{k}", frame_with_z(d)) for d in apart([*likely, *minima])[len(likely) :]]
     return found
 
@@ -230,12 +228,3 @@ def placed(name: str, frame: Array, center: Array | None = None) -> Placed:
 
 def _principal(evidence: Evidence) -> Array:
     return np.asarray(np.linalg.eigh(evidence.moments.covariance)[1].T)
-
-
-def apart(directions: Iterable[Array], angle_rad: float = START_ERROR) -> list[Array]:
-    """The directions without those within an angle of an earlier one."""
-    kept: list[Array] = []
-    for d in directions:
-        if all(abs(d @ k) < np.cos(angle_rad) for k in kept):
-            kept.append(d)
-    return kept

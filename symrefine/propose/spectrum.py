@@ -6,30 +6,22 @@ m not 0 mod k for a k-fold axis, l odd for the inversion. Candidates are the loc
 judges them.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from symrefine.geometry import Array, ReadOnly, frame_with_z, read_only, unit
+from symrefine.geometry import Array, frame_with_z, read_only, unit
 from symrefine.moments.harmonics import harmonic_moments, to_polar_axis
 from symrefine.moments.moments import Moments, transformed
+from symrefine.rounding import START_ERROR
 from symrefine.shape import Index
 
 # Directions on the half sphere: 3.7 degrees apart, against 11 degrees that order 8 can resolve.
 DIRECTIONS = 1500
 # Eigenvalues of the covariance are bounded from below by this fraction of the largest before whitening.
 THIN = 1e-3
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Candidates(ReadOnly):
-    """Directions [C, 3] in the order of their miss [C], the fraction of the energy that the operation would flip."""
-
-    directions: Array
-    misses: Array
 
 
 @lru_cache(maxsize=1)
@@ -82,11 +74,14 @@ def axis_misses(moments: Moments, order: int) -> Array:
     return moved / total
 
 
-def local_minima(misses: Array, *, count: int) -> Candidates:
-    """The deepest local minima over the sphere, `count` at most, each moved to the vertex of a fitted paraboloid."""
+def local_minima(misses: Array, *, count: int) -> tuple[Array, Array]:
+    """Directions [C, 3] of the deepest local minima over the sphere, `count` at most, and what is missed there [C].
+
+    Each is moved to the vertex of a fitted paraboloid.
+    """
     lowest = np.flatnonzero(misses <= misses[_neighbours()].min(axis=1))
     lowest = lowest[np.argsort(misses[lowest], kind="stable")][:count]
-    return Candidates(directions=_vertices(misses, lowest), misses=misses[lowest])
+    return _vertices(misses, lowest), misses[lowest]
 
 
 def _vertices(misses: Array, lowest: Index) -> Array:
@@ -115,14 +110,17 @@ def whitened(moments: Moments) -> Moments:
     return transformed(moments, (vectors / np.sqrt(3.0 * values)) @ vectors.T)
 
 
-def mirror_candidates(moments: Moments, *, count: int = 16) -> Candidates:
+def mirror_candidates(moments: Moments, *, count: int = 16) -> list[Array]:
     """Normals of candidate mirror planes through the centre, raw and whitened spectrum together, least miss first."""
     found = [local_minima(mirror_misses(m), count=count) for m in (whitened(moments), moments)]
-    directions = np.concatenate([f.directions for f in found])
-    misses = np.concatenate([f.misses for f in found])
-    kept: list[int] = []
-    for i in np.argsort(misses, kind="stable"):
-        if all(abs(directions[i] @ directions[j]) < np.cos(np.radians(5.0)) for j in kept):
-            kept.append(int(i))
-    kept = kept[:count]
-    return Candidates(directions=directions[kept], misses=misses[kept])
+    directions, misses = (np.concatenate(part) for part in zip(*found, strict=True))
+    return apart(directions[np.argsort(misses, kind="stable")], np.radians(5.0))[:count]
+
+
+def apart(directions: Iterable[Array], angle_rad: float = START_ERROR) -> list[Array]:
+    """The directions without those within an angle of an earlier one."""
+    kept: list[Array] = []
+    for d in directions:
+        if all(abs(d @ k) < np.cos(angle_rad) for k in kept):
+            kept.append(d)
+    return kept

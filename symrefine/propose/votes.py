@@ -5,8 +5,6 @@ them; what decides is whether it turns the one normal into the other (Mitra, Gui
 a revolution meets all normals, which is linear in its Pluecker coordinates (Pottmann, Randrup, 1998).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from symrefine.geometry import Array, rows
@@ -21,23 +19,12 @@ VOTERS, AGREE_RAD, TOLD = 1000, np.radians(8.0), 60
 DIRECTIONS, FEET = 24, 10
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Vote:
-    """A place where votes are dense.
-
-    Attributes:
-        direction: [3] normal of a mirror, without a sign.
-        foot: [3] point of the plane nearest to the origin.
-    """
-
-    direction: Array
-    foot: Array
-
-
 def mirror_votes(
     points: Array, normals: Array, rng: np.random.Generator, *, told: int = TOLD, outwards: bool = False
-) -> list[Vote]:
-    """Planes that many pairs of local planes [N, 3] are mirror images in, most votes first; normalised units.
+) -> Array:
+    """Planes that many pairs of local planes [N, 3] are mirror images in, most votes first: normals and feet [2, V, 3].
+
+    A foot is the point of a plane nearest to the origin, normalised units.
 
     Pairs within one flat part agree under any mirror across it and say nothing: a pair counts by how much its normals
     turn. Where all are known to point `outwards` a mirror keeps their signs, too.
@@ -69,12 +56,12 @@ def unit_rows(vectors: Array) -> Array:
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None])
 
 
-def _densest(directions: Array, feet: Array, worth: Array, told: int = TOLD) -> list[Vote]:
-    """The densest spots of votes for planes: unit vectors [K, 3] without a sign, with their feet [K, 3]."""
+def _densest(directions: Array, feet: Array, worth: Array, told: int) -> Array:
+    """The densest spots of votes for planes [2, V, 3]: unit vectors [K, 3] without a sign, with their feet [K, 3]."""
     some = worth > 0.0
     directions, feet, worth = rows(directions, some), rows(feet, some), worth[some]
     if not some.any():
-        return []
+        return np.zeros((2, 0, 3))
     cells, volume = _cells(directions, feet)
     owner = cells @ [1, 7, 7 * 64, 7 * 64**2, 7 * 64**3, 7 * 64**4]
     order = np.argsort(owner, kind="stable")
@@ -101,7 +88,7 @@ def _densest(directions: Array, feet: Array, worth: Array, told: int = TOLD) -> 
             count += 1
         if count == told:
             break
-    return [Vote(direction=d, foot=f) for d, f in known[:, :count].transpose(1, 0, 2)]
+    return known[:, :count]
 
 
 def _middles(directions: Array, feet: Array, worth: Array, starts: Index) -> tuple[Array, Array]:
