@@ -1,5 +1,6 @@
 """Shape: what every source of data becomes before any mathematics sees it."""
 
+from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass, replace
 from typing import Any, Literal, get_args
 
@@ -68,32 +69,35 @@ class Shape:
     source: str = "array"
 
     def __post_init__(self) -> None:
-        points = _matrix(self.points, "points", self.source)
-        object.__setattr__(self, "points", points)
+        with about(self.source):
+            for name, checked in self._checked():
+                object.__setattr__(self, name, checked)
+        if (self.points[-1] == self.points[0]).all() and (self.points == self.points[0]).all():
+            raise DegenerateShapeError(
+                f"{self.source}: all {len(self.points)} points coincide; a shape needs at least two distinct points"
+            )
+
+    def _checked(self) -> Iterator[tuple[str, Any]]:
+        """Fields as they are kept, one after the other: those that come later are checked against them."""
+        yield "points", _points(self.points)
         if self.weights is not None:
-            object.__setattr__(self, "weights", _weights(self.weights, len(points), self.source))
+            yield "weights", _weights(self.weights, len(self.points))
         if self.normals is not None:
-            object.__setattr__(self, "normals", _normals(self.normals, points, self.source))
+            yield "normals", _normals(self.normals, self.points)
         if self.faces is not None:
-            object.__setattr__(self, "faces", _faces(self.faces, points, self.source))
+            yield "faces", _faces(self.faces, self.points)
         for name in ("weights", "normals", "viewpoint"):
             if self.faces is not None and getattr(self, name) is not None:
-                raise InputError(f"{self.source}: {name} is for clouds; a mesh has faces, leave it out")
+                raise InputError(f"{name} is for clouds; a mesh has faces, leave it out")
         if self.labels is not None:
-            count, what = (len(points), "point") if self.faces is None else (len(self.faces), "face")
-            object.__setattr__(self, "labels", _labels(self.labels, count, what, self.source))
-        object.__setattr__(self, "kinds", _kinds(self.kinds, self.labels, self.source))
+            count, what = (len(self.points), "point") if self.faces is None else (len(self.faces), "face")
+            yield "labels", _labels(self.labels, count, what)
+        yield "kinds", _kinds(self.kinds, self.labels)
         if self.texture is not None and len(self.texture.image) != (0 if self.faces is None else len(self.faces)):
-            raise InputError(
-                f"{self.source}: texture has {len(self.texture.image)} triangles; expected those of the mesh"
-            )
+            raise InputError(f"texture has {len(self.texture.image)} triangles; expected those of the mesh")
         if self.viewpoint is not None:
-            object.__setattr__(self, "viewpoint", _viewpoint(self.viewpoint, points.shape, self.source))
-        object.__setattr__(self, "measure", _measure(self.measure, self.faces, self.source))
-        if (points[-1] == points[0]).all() and (points == points[0]).all():
-            raise DegenerateShapeError(
-                f"{self.source}: all {len(points)} points coincide; a shape needs at least two distinct points"
-            )
+            yield "viewpoint", _viewpoint(self.viewpoint, self.points.shape)
+        yield "measure", _measure(self.measure, self.faces)
 
     @classmethod
     def of(
@@ -133,117 +137,106 @@ class Shape:
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
 
-def _measure(measure: str | None, faces: Index | None, source: str) -> str:
+def _measure(measure: str | None, faces: Index | None) -> str:
     """What carries the mass, where that was not said: the surface of a mesh, the points of a cloud."""
     if measure is None:
         return "points" if faces is None else "surface"
     if measure not in get_args(Measure):
-        raise InputError(f"{source}: measure is {measure!r}; expected one of {list(get_args(Measure))}")
+        raise InputError(f"measure is {measure!r}; expected one of {list(get_args(Measure))}")
     if (faces is None) != (measure == "points"):
         raise InputError(
-            f"{source}: measure is {measure!r}, but a cloud has measure 'points' and a mesh has 'surface' or 'solid'"
+            f"measure is {measure!r}, but a cloud has measure 'points' and a mesh has 'surface' or 'solid'"
         )
     return measure
 
 
-def _numbers(values: ArrayLike, name: str, source: str) -> Array:
-    with about(source):
-        return numbers(values, name)
-
-
-def _matrix(values: ArrayLike, name: str, source: str) -> Array:
-    array = _numbers(values, name, source)
+def _points(values: ArrayLike) -> Array:
+    array = numbers(values, "points")
     if array.ndim != 2 or array.shape[1] < 2:
-        raise InputError(f"{source}: {name} have shape {array.shape}; expected [N, n] with n >= 2")
+        raise InputError(f"points have shape {array.shape}; expected [N, n] with n >= 2")
     if len(array) == 0:
-        raise InputError(f"{source}: no {name}; expected at least two distinct points")
+        raise InputError("no points; expected at least two distinct points")
     if not np.isfinite(array).all():
         bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
         raise InputError(
-            f"{source}: {bad.size} of {len(array)} {name} hold NaN or infinity, the first in row {bad[0]}; "
-            "remove those rows"
+            f"{bad.size} of {len(array)} points hold NaN or infinity, the first in row {bad[0]}; remove those rows"
         )
     return read_only(array)
 
 
-def _weights(values: ArrayLike, count: int, source: str) -> Array:
-    array = _numbers(values, "weights", source)
+def _weights(values: ArrayLike, count: int) -> Array:
+    array = numbers(values, "weights")
     if array.shape != (count,):
-        raise InputError(f"{source}: weights have shape {array.shape}; expected ({count},), one for each point")
+        raise InputError(f"weights have shape {array.shape}; expected ({count},), one for each point")
     if not np.isfinite(array).all() or (array < 0).any() or not array.any():
-        raise InputError(f"{source}: weights must be finite, non-negative and not all zero")
+        raise InputError("weights must be finite, non-negative and not all zero")
     if array.max() > np.finfo(np.float64).max / count:
         raise InputError(
-            f"{source}: weights of up to {array.max():.3g} may add up to more than {np.finfo(np.float64).max:.3g}; "
+            f"weights of up to {array.max():.3g} may add up to more than {np.finfo(np.float64).max:.3g}; "
             "divide all of them by the largest"
         )
     return read_only(array)
 
 
-def _viewpoint(values: ArrayLike, shape: tuple[int, ...], source: str) -> Array:
-    array = _numbers(values, "viewpoints", source)
+def _viewpoint(values: ArrayLike, shape: tuple[int, ...]) -> Array:
+    array = numbers(values, "viewpoints")
     if array.shape not in (shape, shape[1:]) or shape[1] != 3:
-        raise InputError(f"{source}: viewpoint has shape {array.shape}; expected (3,), or {shape}, one for each point")
+        raise InputError(f"viewpoint has shape {array.shape}; expected (3,), or {shape}, one for each point")
     if not (np.abs(array) <= LARGEST).all():
-        raise InputError(f"{source}: viewpoints hold NaN, infinity, or more than {LARGEST:g}")
+        raise InputError(f"viewpoints hold NaN, infinity, or more than {LARGEST:g}")
     places = len(np.unique(array.reshape(-1, 3), axis=0))
     if places > CAMERAS:
-        raise InputError(f"{source}: {places} different viewpoints; expected at most {CAMERAS}, one for each view")
+        raise InputError(f"{places} different viewpoints; expected at most {CAMERAS}, one for each view")
     return read_only(np.broadcast_to(array, shape))
 
 
-def _labels(values: ArrayLike, count: int, what: str, source: str) -> Index:
-    with about(source):
-        array = unmasked(values, "labels")
+def _labels(values: ArrayLike, count: int, what: str) -> Index:
+    array = unmasked(values, "labels")
     if not np.issubdtype(array.dtype, np.integer):
-        raise InputError(f"{source}: labels are {array.dtype}; expected integers, one class for each {what}")
+        raise InputError(f"labels are {array.dtype}; expected integers, one class for each {what}")
     if array.shape != (count,):
-        raise InputError(f"{source}: labels have shape {array.shape}; expected ({count},), one for each {what}")
+        raise InputError(f"labels have shape {array.shape}; expected ({count},), one for each {what}")
     array = array.astype(np.int64)
     array.flags.writeable = False
     return array
 
 
-def _kinds(values: ArrayLike | None, labels: Index | None, source: str) -> NDArray[Any] | None:
+def _kinds(values: ArrayLike | None, labels: Index | None) -> NDArray[Any] | None:
     if values is None:
         return None
     array = np.array(values)
     if array.dtype.kind not in "US":
-        array = _numbers(array, "kinds", source)
+        array = numbers(array, "kinds")
     right = array.ndim == 1 if array.dtype.kind in "US" else array.ndim == 2 and array.shape[1] == 3
     if not right or labels is None or not 0 <= int(labels.min()) <= int(labels.max()) < len(array):
-        raise InputError(
-            f"{source}: kinds have shape {array.shape}; expected colours [K, 3] or texts [K] for labels 0 .. K - 1"
-        )
+        raise InputError(f"kinds have shape {array.shape}; expected colours [K, 3] or texts [K] for labels 0 .. K - 1")
     array.flags.writeable = False
     return array
 
 
-def _normals(values: ArrayLike, points: Array, source: str) -> Array:
-    array = _numbers(values, "normals", source)
+def _normals(values: ArrayLike, points: Array) -> Array:
+    array = numbers(values, "normals")
     if array.shape != points.shape:
-        raise InputError(f"{source}: normals have shape {array.shape}; expected {points.shape}, one for each point")
+        raise InputError(f"normals have shape {array.shape}; expected {points.shape}, one for each point")
     length = np.linalg.norm(array, axis=1)
     bad = np.flatnonzero(~(np.isfinite(length) & (length > 0)))
     if bad.size:
-        raise InputError(
-            f"{source}: normal of row {bad[0]} is {array[bad[0]].tolist()}; expected a finite, non-zero vector"
-        )
+        raise InputError(f"normal of row {bad[0]} is {array[bad[0]].tolist()}; expected a finite, non-zero vector")
     return read_only(array / length[:, None])
 
 
-def _faces(values: ArrayLike, points: Array, source: str) -> Index:
+def _faces(values: ArrayLike, points: Array) -> Index:
     try:
         array = np.array(values)
     except ValueError:
-        raise InputError(f"{source}: faces are ragged; expected [F, 3] integers, triangles only") from None
+        raise InputError("faces are ragged; expected [F, 3] integers, triangles only") from None
     if array.ndim != 2 or array.shape[1] != 3 or not np.issubdtype(array.dtype, np.integer) or len(array) == 0:
-        raise InputError(f"{source}: faces have shape {array.shape} of {array.dtype}; expected [F, 3] integers, F >= 1")
+        raise InputError(f"faces have shape {array.shape} of {array.dtype}; expected [F, 3] integers, F >= 1")
     if points.shape[1] != 3:
-        raise InputError(f"{source}: faces need points in 3-space, these have {points.shape[1]} coordinates")
+        raise InputError(f"faces need points in 3-space, these have {points.shape[1]} coordinates")
     if array.min() < 0 or array.max() >= len(points):
         wrong = array.min() if array.min() < 0 else array.max()
-        raise InputError(f"{source}: face index {wrong} is out of range; there are {len(points)} vertices")
+        raise InputError(f"face index {wrong} is out of range; there are {len(points)} vertices")
     array = array.astype(np.int64)
     array.flags.writeable = False
     return array
