@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from symrefine.fit.gauss_newton import Linearisation, Linearisations
-from symrefine.geometry import Array, Isometry
+from symrefine.fit.gauss_newton import Linearisation
+from symrefine.geometry import Array, Isometry, cross_matrix
 
 # Rows and columns of a Gram matrix: the nine entries of the operation, its shift, and one.
 SIZE = 13
@@ -129,17 +129,16 @@ def _turn(ca: Any, w: Any) -> Any:
 def turn_frame(frame: Array, w: Array) -> Array:
     """The frame (rows are its axes) after the small rotation w [3], as `frame_model` parametrises it."""
     s = 1.0 / np.sqrt(1.0 + w @ w / 4.0)
-    x, y, z = 0.5 * s * w
-    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    k = cross_matrix(0.5 * s * w)
     return (np.eye(3) + 2 * s * k + 2 * k @ k) @ frame
 
 
-def theta_models(grams3: Array, thetas_rad: Array) -> Linearisations:
+def theta_models(grams3: Array, thetas_rad: Array) -> Linearisation:
     """Costs and derivatives in theta [b, 1] of planes through a fixed axis, each from its Gram matrix [b, 3, 3]."""
     count = len(thetas_rad)
     found = _compiled(_theta_function, count)(thetas_rad.T, _beside(grams3))
     costs, gradients, hessians = (_apart(output, count) for output in found)
-    return Linearisations(costs=costs[:, 0, 0], gradients=gradients[:, :, 0], hessians=hessians)
+    return Linearisation(cost=costs[:, 0, 0], gradient=gradients[:, :, 0], hessian=hessians)
 
 
 def frame_model(grams: Array, standard: Array, frame: Array, center: Array, x: Array) -> Linearisation:
