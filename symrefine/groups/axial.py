@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.geometry import Array, frame_with_z, rotation
-from symrefine.groups.names import MAX_FOLD
+from symrefine.groups.names import CLOSED_FOLD, MAX_FOLD
 from symrefine.groups.orthogonal import Index, about_z, angles_about_z, axes_and_angles, determinants, nearest_in_span
 
 # N^2 times the error of angles up to which a fold is taken as exact: at random it is of the order of N.
@@ -30,14 +30,6 @@ class Planar:
     ends: Index
     dets: Index
     angles_rad: Array
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Lattice:
-    """Angles j 2 pi / `fold` for rotations, `phase_rad` + j 2 pi / `fold` for in-plane reflections."""
-
-    fold: int
-    phase_rad: float
 
 
 def common_axes(operations: Array) -> list[tuple[Array, float]]:
@@ -72,8 +64,10 @@ def planar_parts(operations: Array, frame: Array) -> Planar:
     return Planar(ends=ends, dets=dets, angles_rad=angles_about_z(turned, dets))
 
 
-def fit_lattice(parts: Planar, tolerance_rad: float, multiple_of: int, max_fold: int) -> Lattice | None:
-    """The lattice of angles the operations point to, its fold a multiple of `multiple_of`; None if there is none.
+def fit_lattice(parts: Planar, tolerance_rad: float, multiple_of: int) -> tuple[int, float] | None:
+    """Fold N, a multiple of `multiple_of`, and phase of the angles the operations point to; None if there are none.
+
+    They are j 2 pi / N for rotations, the phase + j 2 pi / N for in-plane reflections.
 
     A fold that fits far better than chance (N^2 times the error) is taken as exact, the smallest first. Otherwise the
     errors are weighed as Gaussian, sigma = tolerance / 2, against the N places each angle might have had, among the
@@ -81,12 +75,12 @@ def fit_lattice(parts: Planar, tolerance_rad: float, multiple_of: int, max_fold:
     """
     turns = _distinct(parts.angles_rad[parts.dets > 0], tolerance_rad, drop_zero=True)
     flips = _distinct(parts.angles_rad[parts.dets < 0], tolerance_rad)
-    folds = multiple_of * np.arange(1, max(max_fold // multiple_of, 1) + 1)
+    folds = multiple_of * np.arange(1, max(CLOSED_FOLD // multiple_of, 1) + 1)
     phases = np.angle(np.exp(1j * np.outer(folds, flips)).sum(axis=1)) / folds
     angles = np.concatenate([np.tile(turns, (len(folds), 1)), flips - phases[:, None]], axis=1)
     errors = np.angle(np.exp(1j * folds[:, None] * angles)) / folds[:, None]
     best = _likeliest(folds, errors, len(turns) + max(len(flips) - 1, 0), tolerance_rad)
-    return None if best is None else Lattice(fold=int(folds[best]), phase_rad=float(phases[best]))
+    return None if best is None else (int(folds[best]), float(phases[best]))
 
 
 def _likeliest(folds: Index, errors: Array, count: int, tolerance_rad: float) -> int | None:
@@ -111,14 +105,14 @@ def _distinct(angles: Array, tolerance_rad: float, drop_zero: bool = False) -> A
     return np.array([run.mean() for run in runs if run.size])
 
 
-def closed_operations(parts: Planar, lattice: Lattice, frame: Array) -> Array:
-    """All operations [m, 3, 3], exact, that the operations in `parts` generate on `lattice`."""
-    offsets = np.where(parts.dets < 0, parts.angles_rad - lattice.phase_rad, parts.angles_rad)
-    steps = np.rint(offsets * lattice.fold / (2.0 * np.pi)).astype(int) % lattice.fold
+def closed_operations(parts: Planar, fold: int, phase_rad: float, frame: Array) -> Array:
+    """All operations [m, 3, 3], exact, that the operations in `parts` generate on the lattice of `fit_lattice`."""
+    offsets = np.where(parts.dets < 0, parts.angles_rad - phase_rad, parts.angles_rad)
+    steps = np.rint(offsets * fold / (2.0 * np.pi)).astype(int) % fold
     generators = set(zip(parts.ends.tolist(), parts.dets.tolist(), steps.tolist(), strict=True))
-    e, f, j = np.array(sorted(_close_steps(generators, lattice.fold))).T
-    exact = about_z(e, f, 2.0 * np.pi * j / lattice.fold)
-    phased = rotation([0.0, 0.0, 1.0], -0.5 * lattice.phase_rad) @ frame
+    e, f, j = np.array(sorted(_close_steps(generators, fold))).T
+    exact = about_z(e, f, 2.0 * np.pi * j / fold)
+    phased = rotation([0.0, 0.0, 1.0], -0.5 * phase_rad) @ frame
     return np.asarray(phased.T @ exact @ phased)
 
 
@@ -132,14 +126,13 @@ def _close_steps(generators: set[Step], fold: int) -> set[Step]:
     return group
 
 
-def axial_operations(operations: Array, tolerance_rad: float, orders: Index, max_fold: int) -> Iterator[Array]:
+def axial_operations(operations: Array, tolerance_rad: float, orders: Index) -> Iterator[Array]:
     """Exact closures [m, 3, 3] of noisy operations [k, 3, 3] about each line they may share; nothing if none closes.
 
     Args:
         operations: generators.
         tolerance_rad: largest error of one of them, as an angle of rotation.
         orders: [k] the exact order of each, 0 where unknown.
-        max_fold: largest number N of steps about the axis to consider, unless `orders` say more.
     """
     for direction, moved in common_axes(operations):
         frame = frame_with_z(direction)
@@ -149,6 +142,6 @@ def axial_operations(operations: Array, tolerance_rad: float, orders: Index, max
         if moved > 3.0 * tolerance_rad or multiple > MAX_FOLD:
             continue
         unknown = Planar(ends=parts.ends[~known], dets=parts.dets[~known], angles_rad=parts.angles_rad[~known])
-        lattice = fit_lattice(unknown, tolerance_rad, multiple, max_fold)
+        lattice = fit_lattice(unknown, tolerance_rad, multiple)
         if lattice is not None:
-            yield closed_operations(parts, lattice, frame)
+            yield closed_operations(parts, *lattice, frame)

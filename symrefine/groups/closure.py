@@ -15,7 +15,7 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.groups.axial import axial_operations
 from symrefine.groups.identify import POLYHEDRAL, has_alike, identify, polyhedral_start
-from symrefine.groups.names import CLOSED_FOLD, MAX_FOLD, parse
+from symrefine.groups.names import parse
 from symrefine.groups.orthogonal import Index, nearest_orthogonal, register
 from symrefine.groups.point_group import PointGroup
 from symrefine.groups.standard import standard_operations
@@ -40,9 +40,10 @@ def close(
     tolerance_rad: float,
     *,
     orders: Sequence[int] | None = None,
-    max_fold: int = CLOSED_FOLD,
 ) -> Closure:
     """The smallest finite group that contains every generator up to `tolerance_rad`.
+
+    Cn, Cnv, Cnh, Sn, Dn, Dnh are tried up to n = `CLOSED_FOLD`, Dnd up to half of it, unless `orders` ask for more.
 
     Args:
         generators: [k, 3, 3] orthogonal up to noise, determinant +1 or -1 each.
@@ -50,7 +51,6 @@ def close(
             by 2 d). The larger it is, the less can be told about many-fold axes from few generators.
         orders: exact order of each generator where known, 0 where not: the order 24 of a turn by 15.2 degrees is
             knowledge, not something the angle tells.
-        max_fold: largest n of Cn, Cnv, Cnh, Sn, Dn, Dnh to consider (half of it for Dnd), unless `orders` ask for more.
     Raises:
         InputError: no generators of shape [k, 3, 3], a tolerance outside (0, 0.2], or `orders` of another length.
     """
@@ -61,16 +61,16 @@ def close(
     if len(given) == 0 or len(known) != len(given):
         raise InputError(f"one order per generator, one generator at least: {len(known)} orders for {len(given)}")
     tried = []
-    for group in _candidates(given, tolerance_rad, known, min(max_fold, MAX_FOLD)):
+    for group in _candidates(given, tolerance_rad, known):
         tried.append(_fitted(given, group))
         if tried[-1].error_rad <= tolerance_rad:
             return tried[-1]
     return _not_finite(tried, tolerance_rad)
 
 
-def _candidates(generators: Array, tolerance_rad: float, orders: Index, max_fold: int) -> Iterator[PointGroup]:
+def _candidates(generators: Array, tolerance_rad: float, orders: Index) -> Iterator[PointGroup]:
     """Roughly placed groups that may contain the generators, axial ones first, then polyhedral ones by order."""
-    for operations in axial_operations(generators, tolerance_rad, orders, max_fold):
+    for operations in axial_operations(generators, tolerance_rad, orders):
         yield identify(operations)
     for name in POLYHEDRAL:  # the first that fits is what they generate
         if has_alike(generators, parse(name), tolerance_rad):

@@ -98,7 +98,7 @@ def repeated(cloud: LocalPlanes, diagonal: float) -> list[Placed]:
         center = np.linalg.pinv(still, rcond=DOUBLE) @ m.shift
         if np.linalg.norm(m.shift - still @ center) > WITHIN * diagonal or np.linalg.norm(center) > diagonal:
             continue
-        group = close(m.matrix[None], 0.5 * AGREE_RAD, max_fold=CLOSED_FOLD).group
+        group = close(m.matrix[None], 0.5 * AGREE_RAD).group
         found += [Placed(group=group, center=center)] if group.order > 1 else []
     return found
 

@@ -16,21 +16,21 @@ LEAK = 0.35
 CHANCE = 0.01
 
 
-def azimuthal_spectrum(points: Array, weights: Array, axis: Array, max_fold: int = CLOSED_FOLD) -> tuple[Array, Array]:
+def azimuthal_spectrum(points: Array, weights: Array, axis: Array) -> tuple[Array, Array]:
     """Azimuthal coefficients about an axis through the origin.
 
     `c_kq = sum w f_q(rho, h) e^(i k phi)` with the slowly varying f = rho * (1, h, h^2, rho): bounded in k, unlike
     the polynomial rho^k, so that high folds (gears) stay above the noise of the outermost points.
 
-    Returns: c [max_fold + 1, 4] complex, and the standard deviation [4] of each if the azimuths were random.
+    Returns: c [CLOSED_FOLD + 1, 4] complex, and the standard deviation [4] of each if the azimuths were random.
     """
     radial, azimuths, sigma = _around(points, weights, axis)
-    bins = BINS_PER_ORDER * max_fold
+    bins = BINS_PER_ORDER * CLOSED_FOLD
     place = np.floor(azimuths * (bins / (2.0 * np.pi))).astype(np.int64) % bins
     binned = np.stack([np.bincount(place, weights=r, minlength=bins) for r in radial])
-    k = np.arange(max_fold + 1)
+    k = np.arange(CLOSED_FOLD + 1)
     middle = np.exp(1j * np.pi * k / bins) / np.sinc(k / bins)
-    return (np.conj(np.fft.rfft(binned))[:, : max_fold + 1] * middle).T, sigma
+    return (np.conj(np.fft.rfft(binned))[:, : CLOSED_FOLD + 1] * middle).T, sigma
 
 
 def _around(points: Array, weights: Array, axis: Array) -> tuple[Array, Array, Array]:
