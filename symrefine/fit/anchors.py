@@ -5,7 +5,7 @@ onto one that is as far and under the same angle; the two images and the determi
 few others share leave few operations to ask. Where all are as far, on a sphere, they are told by their neighbours.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,11 +45,13 @@ def permuting_groups(points: Array, labels: Index | None, within: float) -> Iter
     tree, shifted = labelled(points, labels)
     radii = np.linalg.norm(points, axis=1)
     distant, reach = LEVER * radii.max(), 2.0 * within
-    kinds = _Kinds.of((radii + shifted)[None], reach)
+    traits = (radii + shifted)[None]
+    kinds = _Kinds.of(traits, [reach])
     first, second = _anchors(points, kinds, distant)
     if kinds.alike[first] * kinds.alike[second] > CANDIDATES:
         # On a sphere all are alike but for what is around them, which moves by as much as both ends do.
-        kinds = kinds.and_of(tree.query(tree.points, AROUND, skip=1)[0].T, 2.0 * reach)
+        around = tree.query(tree.points, AROUND, skip=1)[0].T
+        kinds = _Kinds.of(np.concatenate([traits, around]), [reach, *AROUND * [2.0 * reach]])
         first, second = _anchors(points, kinds, distant)
     aside = np.linalg.norm(np.cross(points, unit(points[first])), axis=1)
     if aside[second] < distant:
@@ -96,23 +98,15 @@ class _Kinds:
     alike: Index
 
     @classmethod
-    def of(cls, traits: Array, reach: float) -> "_Kinds":
+    def of(cls, traits: Array, reach: Sequence[float]) -> "_Kinds":
         alike = np.empty(traits.shape, dtype=np.intp)
-        for own, found in zip(traits, alike, strict=True):
+        for own, within, found in zip(traits, reach, alike, strict=True):
             # Numbers in order are looked up ten times as fast.
             order = np.argsort(own)
             ascending = own[order]
-            found[order] = np.searchsorted(ascending, ascending + reach, side="right")
-            found[order] -= np.searchsorted(ascending, ascending - reach)
-        return cls(traits=traits, reach=np.full(len(traits), reach), alike=alike.min(axis=0))
-
-    def and_of(self, traits: Array, reach: float) -> "_Kinds":
-        more = self.of(traits, reach)
-        return _Kinds(
-            traits=np.concatenate([self.traits, more.traits]),
-            reach=np.concatenate([self.reach, more.reach]),
-            alike=np.minimum(self.alike, more.alike),
-        )
+            found[order] = np.searchsorted(ascending, ascending + within, side="right")
+            found[order] -= np.searchsorted(ascending, ascending - within)
+        return cls(traits=traits, reach=np.array(reach), alike=alike.min(axis=0))
 
     def rarest(self, allowed: Mask) -> int:
         """The point allowed of which there are the fewest."""

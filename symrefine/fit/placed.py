@@ -142,9 +142,7 @@ def fitted_matrices(group: PointGroup) -> list[Array]:
 
 def _round_matrices(group: PointGroup) -> list[Array]:
     """Mirrors through the axis and, where the group has them, one across it or turns about the others."""
-    angles = np.pi * np.arange(5) / 5
-    normals = np.stack([-np.sin(angles), np.cos(angles), np.zeros(5)], axis=1)
-    matrices = [householder(n) for n in normals]
+    matrices = [*mirror_bundle(5, np.eye(3), np.zeros(3)).standard]
     if group.name == "Dinfh":
         matrices.append(householder([0.0, 0.0, 1.0]))
     if group.name == "Kh":

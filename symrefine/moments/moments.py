@@ -296,18 +296,15 @@ def _binomials(dim: int, order: int) -> tuple[NDArray[np.int64], NDArray[np.int6
     """
     table = [tuple(e) for e in exponents(dim, order).tolist()]
     position = {e: i for i, e in enumerate(table)}
-    starts: list[int] = []
-    kept: list[int] = []
-    shifts: list[int] = []
-    coefficients: list[float] = []
-    for e in table:
-        starts.append(len(kept))
-        for k in product(*(range(v + 1) for v in e)):
-            rest = tuple(a - b for a, b in zip(e, k, strict=True))
-            kept.append(position[k])
-            shifts.append(position[rest])
-            coefficients.append((-1.0) ** sum(rest) * prod(comb(a, b) for a, b in zip(e, k, strict=True)))
-    return np.array(starts), np.array(kept), np.array(shifts), np.array(coefficients)
+    starts = np.cumsum([0, *(prod(v + 1 for v in e) for e in table[:-1])])
+    terms = [
+        (position[k], position[rest], (-1.0) ** sum(rest) * prod(map(comb, e, k)))
+        for e in table
+        for k in product(*(range(v + 1) for v in e))
+        for rest in [tuple(a - b for a, b in zip(e, k, strict=True))]
+    ]
+    kept, shifts, coefficients = map(np.array, zip(*terms, strict=True))
+    return starts, kept, shifts, coefficients
 
 
 def recentred(values: Array, dim: int, order: int) -> Array:

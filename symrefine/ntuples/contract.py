@@ -200,21 +200,13 @@ class _Entries:
 def _program(dim: int, order: int, orders: tuple[tuple[int, ...], ...]) -> _Program:
     """The tables for moments to `order` in n = `dim` dimensions."""
     entries, used = _Entries(dim, order), sorted({p for term in orders for p in (*term, 0)})
-    left: list[int] = []
-    right: list[int] = []
-    factors: list[int] = []
-    starts: list[int] = []
-    labels: list[str] = []
-    degrees: list[tuple[int, int]] = []
-    for label, small, large, term in _contractions(entries, orders):
-        labels.append(label)
-        degrees.append((used.index(term[0]), used.index(term[1])))
-        for step in np.eye(dim, dtype=int).tolist():
-            starts.append(len(left))
-            for e, place in small.items():
-                left.append(place)
-                right.append(large[tuple(a + b for a, b in zip(e, step, strict=True))])
-                factors.append(occurrences(e))
+    found = [*_contractions(entries, orders)]
+    products = [
+        [(p, large[tuple(a + b for a, b in zip(e, step, strict=True))], occurrences(e)) for e, p in small.items()]
+        for _, small, large, _ in found
+        for step in np.eye(dim, dtype=int).tolist()
+    ]
+    left, right, factors = np.concatenate(products).T
     low = [p - p % 2 for p in used]
     high = [p + p % 2 for p in used]
     return _Program(
@@ -224,12 +216,12 @@ def _program(dim: int, order: int, orders: tuple[tuple[int, ...], ...]) -> _Prog
         ends=tuple(() if b <= order else entries.norms(p) for p, b in zip(used, high, strict=True)),
         ratio=tuple(p / max(a, 1) for p, a in zip(used, low, strict=True)),
         traces=read_only(np.stack(entries.columns, axis=1)),
-        left=np.array(left),
-        right=np.array(right),
-        factors=np.array(factors, dtype=np.float64),
-        starts=np.array(starts),
-        labels=tuple(labels),
-        degrees=np.array(degrees),
+        left=left,
+        right=right,
+        factors=factors.astype(np.float64),
+        starts=np.cumsum([0, *map(len, products[:-1])]),
+        labels=tuple(label for label, *_ in found),
+        degrees=np.array([[used.index(p) for p in term] for *_, term in found]),
     )
 
 
