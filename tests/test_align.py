@@ -40,10 +40,10 @@ from symrefine.geometry import Array, householder, line_angle_rad, random_orthog
 from symrefine.groups.orthogonal import chord_angles
 from symrefine.moments.moments import PARTS, central_moments
 from symrefine.ntuples.contract import ntuples
-from symrefine.propose.consensus import Matches, consensus, pair_invariants
+from symrefine.propose.maps import consensus, pair_invariants
 from symrefine.propose.signatures import signatures
 from symrefine.shape import Shape
-from symrefine.surface.skin import make_skin
+from symrefine.surface.skin import Planes, make_skin
 from symrefine.surface.tree import Tree
 
 DETERMINANTS = (1, -1)
@@ -1221,6 +1221,11 @@ def test_handedness_is_told_by_two_lines(det: int) -> None:
     assert np.abs(here[-1]).max() > 0.1
 
 
+def planes(points: Array, normals: Array) -> Planes:
+    none = np.zeros(len(points))
+    return Planes(points=points, normals=normals, thickness=none, flatness=none)
+
+
 @pytest.mark.parametrize("det", DETERMINANTS)
 def test_consensus_finds_a_fifth_of_true_matches(det: int) -> None:
     rng = rng_of(58)
@@ -1228,7 +1233,7 @@ def test_consensus_finds_a_fifth_of_true_matches(det: int) -> None:
     matrix = random_orthogonal(rng, det=det)
     target, there = points @ matrix.T + 1.0, normals @ matrix.T
     target[40:], there[40:] = rng.normal(size=(160, 3)), unit(rng.normal(size=(160, 3)))
-    best = consensus(Matches(source=points, source_normals=normals, target=target, target_normals=there), 0.05)[0]
+    best = consensus(planes(points, normals), planes(target, there), 0.05)[0]
     np.testing.assert_allclose(best.matrix, matrix, atol=1e-9)
     np.testing.assert_allclose(best.shift, 1.0, atol=1e-9)
     assert best.support >= 40
@@ -1237,7 +1242,7 @@ def test_consensus_finds_a_fifth_of_true_matches(det: int) -> None:
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_consensus_of_too_few_matches_is_none(count: int) -> None:
     points, normals = np.eye(3)[:count], np.eye(3)[:count]
-    assert consensus(Matches(source=points, source_normals=normals, target=points, target_normals=normals), 0.1) == []
+    assert consensus(planes(points, normals), planes(points, normals), 0.1) == []
 
 
 def test_each_map_is_told_once_with_all_matches_that_agree_with_it() -> None:
@@ -1249,7 +1254,7 @@ def test_each_map_is_told_once_with_all_matches_that_agree_with_it() -> None:
     for some, matrix in true:
         target[some], there[some] = points[some] @ matrix.T + 0.3, normals[some] @ matrix.T
     within = 0.1
-    found = consensus(Matches(source=points, source_normals=normals, target=target, target_normals=there), within)
+    found = consensus(planes(points, normals), planes(target, there), within)
     for map_, (some, matrix) in zip(found[:2], true, strict=True):
         np.testing.assert_allclose(map_.matrix, matrix, atol=1e-9)
         assert map_.support == some.stop - some.start

@@ -3,8 +3,7 @@
 import numpy as np
 
 from symrefine.geometry import Array
-from symrefine.propose.consensus import Proposal
-from symrefine.propose.maps import AROUND, PLANES, agreed
+from symrefine.propose.maps import AROUND, PLANES, Proposal, agreed
 from symrefine.propose.signatures import least_flat_first, signatures, square_distances
 from symrefine.shape import Index
 from symrefine.surface.skin import LocalPlanes

@@ -16,7 +16,6 @@ from symrefine.fit.matching import SCALE_FLOOR, each_coordinate, geman_mcclure, 
 from symrefine.fit.refine import MAX_OUTER, SETTLED, SHORT, WITHIN_NOISE
 from symrefine.fit.residual import SIZE, design_rows, gram, turn_frame
 from symrefine.geometry import Array, Isometry, cross_matrix
-from symrefine.propose.consensus import Proposal
 from symrefine.samples import GLANCE
 from symrefine.surface.misses import RIM
 from symrefine.surface.skin import LocalPlanes, Patches, Skin
@@ -34,7 +33,7 @@ class Similarity(Isometry):
     scale: float = 1.0
 
     @classmethod
-    def of(cls, motion: "Isometry | Proposal") -> "Similarity":
+    def of(cls, motion: Isometry) -> "Similarity":
         """A map that keeps lengths."""
         return cls(matrix=motion.matrix, shift=motion.shift)
 

@@ -8,7 +8,7 @@ a revolution meets all normals, which is linear in its Pluecker coordinates (Pot
 import numpy as np
 
 from symrefine.geometry import Array, rows
-from symrefine.propose.consensus import pair_slopes
+from symrefine.propose.maps import pair_slopes
 from symrefine.rounding import DOUBLE
 from symrefine.shape import Index
 
