@@ -105,6 +105,11 @@ def dots(a: Array, b: Array) -> Array:
     return np.asarray(np.einsum("...i,...i->...", a, b))
 
 
+def column_dots(a: Array, b: Array) -> Array:
+    """Products [K] of vectors that stand in columns, [3, K] and [3, K]."""
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
 def unit(vector: ArrayLike) -> Array:
     """`vector / |vector|` along the last axis."""
     v = np.asarray(vector, dtype=np.float64)

@@ -170,7 +170,17 @@ def _report(
         inversion=chosen.group.has_inversion,
         inversion_residual=None if inversion is None else inversion.deviation,
         inversion_confidence=None if inversion is None else sure[id(inversion)],
-        near_misses=tuple(_near_miss(e, origin, scale, tolerance) for e in turned_down),
+        near_misses=tuple(
+            NearMiss(
+                kind=e.operations.kind,
+                direction=positive(e.operations.direction),
+                point=origin + scale * e.center,
+                order=e.operations.order,
+                residual=e.deviation,
+                excess=e.need / tolerance,
+            )
+            for e in turned_down
+        ),
         iterations=chosen.iterations,
         tolerance=tolerance,
         diagonal=surface.diagonal * scale,
@@ -267,17 +277,6 @@ def _turned_down(found: Examined, chosen: Hypothesis, most: float) -> list[Eleme
         if min(others, default=math.inf) > math.radians(5.0):
             told.append(e)
     return told[:NEAR]
-
-
-def _near_miss(element: Element, origin: Array, scale: float, tolerance: float) -> NearMiss:
-    return NearMiss(
-        kind=element.operations.kind,
-        direction=positive(element.operations.direction),
-        point=origin + scale * element.center,
-        order=element.operations.order,
-        residual=element.deviation,
-        excess=element.need / tolerance,
-    )
 
 
 def _covariance(surface: Surface, chosen: Hypothesis) -> Array | None:

@@ -5,7 +5,7 @@ the shape.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -64,7 +64,8 @@ def corners(shape: Shape, center: Array, diagonal: float, within: float) -> Iter
     flat = Facets.flat(thick, within)
     least = flat.straight(own.points, within)
     if 0 < len(ends := least.corners) < len(own.points):
-        yield Corners(points=own.points[ends], labels=None, facets=(cache(lambda: least.of_these(ends)),))
+        renumbered = cache(lambda: replace(least, edges=np.searchsorted(ends, least.edges)))
+        yield Corners(points=own.points[ends], labels=None, facets=(renumbered,))
     single = cache(lambda: Facets.single(triangles.faces, triangles.labels))
     yield Corners(points=own.points, labels=None, facets=(single, lambda: flat))
 

@@ -110,10 +110,6 @@ class Facets:
             found, left = longer, within - longer.bend
         return _joined(found, _only(self, ~several))
 
-    def of_these(self, points: Index) -> "Facets":
-        """The same with points numbered as they come among these, ascending."""
-        return replace(self, edges=np.searchsorted(points, self.edges))
-
     def prints(self, images: Index) -> Index:
         """A number for each facet, ascending, where every corner went to its image [N]: that of one facet is its own.
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symrefine.fit.ordered import ordered
-from symrefine.geometry import Array, Mask
+from symrefine.geometry import Array, Mask, column_dots
 from symrefine.shape import Index
 from symrefine.surface.neighbourhoods import smallest_eigenvectors
 
@@ -106,7 +106,7 @@ class Triangles:
         near, far = one // 3, two // 3
         corners = self.faces.ravel()
         start, beyond = corners[one], corners[3 * far + (two + 2) % 3]
-        volume = np.abs(_dot(_of(self.across, near), _of(self.points, beyond) - _of(self.points, start)))
+        volume = np.abs(column_dots(_of(self.across, near), _of(self.points, beyond) - _of(self.points, start)))
         least = self.areas[near] + self.areas[far]
         # Twice the other two areas, each of two sides that meet, are no more than twice the square of the longest.
         longest = self.sides.max(axis=0)
@@ -131,13 +131,13 @@ class Triangles:
         corners = self.faces.ravel()
         length = self.sides.T.ravel()[one]
         # Seen along the edge in one sense, normals of what lies on both its sides point in opposite ones.
-        inner = _dot(_of(self.across, near), _of(self.across, far))
+        inner = column_dots(_of(self.across, near), _of(self.across, far))
         inner = np.where(corners[one] == corners[two], inner, -inner)
         unfolded = inner <= within * length * np.maximum(self.areas[near], self.areas[far])
         if (none := np.flatnonzero(length == 0.0)).size:  # of an edge without length all that is told is where they go
             apex, beyond = (corners[3 * (of[none] // 3) + (of[none] + 2) % 3] for of in (one, two))
             own, other = (self.points[:, of] - self.points[:, corners[one[none]]] for of in (apex, beyond))
-            unfolded[none] = _dot(own, other) <= within * np.maximum(_norm(own), _norm(other))
+            unfolded[none] = column_dots(own, other) <= within * np.maximum(_norm(own), _norm(other))
         return np.asarray(unfolded)
 
     def planes(self, rows: Index, of: Index) -> tuple[Array, Array]:
@@ -153,7 +153,7 @@ class Triangles:
             spread[i, j] = spread[j, i] = _summed(products, of, count)
         normals = _sharpened(np.ascontiguousarray(smallest_eigenvectors(spread.transpose(2, 0, 1))[1].T), spread)
         own = _of(normals, of)
-        return normals, np.max([np.abs(_dot(corner, own)) for corner in corners], axis=0)
+        return normals, np.max([np.abs(column_dots(corner, own)) for corner in corners], axis=0)
 
 
 def _sharpened(normals: Array, spread: Array) -> Array:
@@ -169,9 +169,9 @@ def _sharpened(normals: Array, spread: Array) -> Array:
     one /= _norm(one)
     two = _cross(normals, one)
     across, along, beside = ((spread * way).sum(axis=1) for way in (normals, one, two))
-    least = _dot(normals, across)
-    a, b, c = _dot(one, along) - least, _dot(one, beside), _dot(two, beside) - least
-    p, q = _dot(one, across), _dot(two, across)
+    least = column_dots(normals, across)
+    a, b, c = column_dots(one, along) - least, column_dots(one, beside), column_dots(two, beside) - least
+    p, q = column_dots(one, across), column_dots(two, across)
     scale = a * c - b * b
     told = scale > 0.0  # else any plane through a line does
     scale = np.where(told, scale, 1.0)
@@ -198,11 +198,6 @@ def _cross(a: Array, b: Array) -> Array:
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
-def _dot(a: Array, b: Array) -> Array:
-    """Products [K] of vectors [3, K]."""
-    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-
-
 def _norm(a: Array) -> Array:
     """Lengths [K] of vectors [3, K]."""
-    return np.sqrt(_dot(a, a))
+    return np.sqrt(column_dots(a, a))

@@ -158,10 +158,12 @@ def _on(
     if images is None:
         return None
     place = settled(own.points, images, near)
-    miss = _largest_miss(own.points - place.center, place.group.operations(), images)
+    operations, local = place.group.operations(), own.points - place.center
+    off = (local @ g.T - local[image] for g, image in zip(operations, images, strict=True))
+    miss = max(float(np.linalg.norm(apart, axis=1).max()) for apart in off)
     if miss > within:
         return None
-    bend = own.bend_under([images[h] for h, _ in generators(place.group.operations())])
+    bend = own.bend_under([images[h] for h, _ in generators(operations)])
     return OnVertices(
         group=PointGroup(name=group.name, frame=place.group.frame),
         center=center + diagonal * place.center,
@@ -211,9 +213,3 @@ def _glanced(own: Corners, place: Placed, within: float) -> Placed | None:
         place, _ = towards(place, some, place.center + np.mean(back, axis=0))
     # Noise of the vertices themselves is for all of them to judge.
     return place if miss <= 2.0 * within else None
-
-
-def _largest_miss(points: Array, operations: Array, images: Index) -> float:
-    """Largest distance of an image of points [N, 3] about the centre to its counterpart."""
-    pairs = zip(operations, images, strict=True)
-    return max(float(np.linalg.norm(points @ g.T - points[image], axis=1).max()) for g, image in pairs)

@@ -7,7 +7,7 @@ its own, and how far these lean towards it. "High" is the side to which the surf
 
 import numpy as np
 
-from symrefine.geometry import Array
+from symrefine.geometry import Array, column_dots
 from symrefine.shape import Index
 from symrefine.surface.skin import Planes
 from symrefine.surface.tree import pairs_within
@@ -29,12 +29,12 @@ def signatures(cloud: Planes, radius: float, every: int = 1) -> Array:
         one, other = one[either], other[either]
     toward = points.take(other, axis=1) - points.take(one, axis=1)
     near, far = normals.take(one, axis=1), normals.take(other, axis=1)
-    squares = _dot(toward, toward)
+    squares = column_dots(toward, toward)
     # Of either end: how high the other stands over its plane.
-    ends = np.concatenate([_dot(toward, near), -_dot(toward, far)])
+    ends = np.concatenate([column_dots(toward, near), -column_dots(toward, far)])
     slopes = ends / np.tile(np.maximum(np.sqrt(squares), 1e-300), 2)
     shell = np.tile(np.minimum(squares * (SHELLS / radius**2), SHELLS - 1).astype(np.int64), 2)
-    owner, leaning, turned = np.concatenate([one, other]), np.roll(slopes, len(one)), np.tile(_dot(near, far), 2)
+    owner, leaning, turned = np.concatenate([one, other]), np.roll(slopes, len(one)), np.tile(column_dots(near, far), 2)
     if every > 1:
         some = np.flatnonzero(told[np.concatenate([other, one])])
         owner, ends, slopes, leaning, turned, shell = (v[some] for v in (owner, ends, slopes, leaning, turned, shell))
@@ -44,11 +44,6 @@ def signatures(cloud: Planes, radius: float, every: int = 1) -> Array:
     found = np.stack([_histograms(shell, v, count * SHELLS) for v in (height, np.abs(turned), np.abs(leaning))], axis=1)
     found /= np.maximum(np.bincount(shell, minlength=count * SHELLS), 1)[:, None, None]
     return np.asarray(found.reshape(count, -1))
-
-
-def _dot(one: Array, other: Array) -> Array:
-    """Products [K] of vectors that stand side by side, [3, K] and [3, K]."""
-    return np.asarray(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
 
 
 def _histograms(owner: Index, values: Array, count: int) -> Array:

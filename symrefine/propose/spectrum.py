@@ -47,14 +47,14 @@ def _neighbours() -> Index:
     return np.argpartition(-closeness, 8, axis=1)[:, :8]
 
 
-def _energy(moments: Moments, kept: Callable[[int, Index], NDArray[np.bool_]]) -> tuple[Array, float]:
-    """Energy about every direction [DIRECTIONS] of the orders m that `kept(l, m)` selects, and all of it."""
+def _share(moments: Moments, kept: Callable[[int, Index], NDArray[np.bool_]]) -> Array:
+    """Fraction of the energy about every direction [DIRECTIONS] that is of the orders m that `kept(l, m)` selects."""
     energy, total = np.zeros(DIRECTIONS), 0.0
     for l, c in harmonic_moments(moments).items():
         rows = _rows(l, tuple(np.flatnonzero(kept(l, np.arange(-l, l + 1))).tolist()))
         energy += ((rows.reshape(-1, 2 * l + 1) @ c[0].T) ** 2).reshape(DIRECTIONS, -1).sum(axis=1)
         total += float((c[0] ** 2).sum())
-    return energy, max(total, 1e-300)
+    return energy / max(total, 1e-300)
 
 
 @lru_cache(maxsize=128)
@@ -64,14 +64,12 @@ def _rows(l: int, chosen: tuple[int, ...]) -> Array:
 
 def mirror_misses(moments: Moments) -> Array:
     """Fraction of the energy that the mirror normal to each direction flips, [DIRECTIONS]."""
-    flipped, total = _energy(moments, lambda l, m: (l + m) % 2 == 1)
-    return flipped / total
+    return _share(moments, lambda l, m: (l + m) % 2 == 1)
 
 
 def axis_misses(moments: Moments, order: int) -> Array:
     """Fraction of the energy that a rotation by 2 pi / order about each direction does not keep, [DIRECTIONS]."""
-    moved, total = _energy(moments, lambda _, m: m % order != 0)
-    return moved / total
+    return _share(moments, lambda _, m: m % order != 0)
 
 
 def local_minima(misses: Array, *, count: int) -> tuple[Array, Array]:

@@ -107,7 +107,7 @@ def filled(points: Array, around: Surroundings, rng: np.random.Generator) -> lis
     to one so large that noise does not make the surface look so too. `around` tells of some of the points.
     """
     thick = around.thickness / ball_thickness(AROUND)
-    within, least = _smooth(thick, around) > FILLED, SHARES[-1] * len(thick)
+    within, least = thick[around.near].mean(axis=1) > FILLED, SHARES[-1] * len(thick)
     if within.sum() <= least:
         return []
     tree = Tree(points)
@@ -156,11 +156,6 @@ def _filled_at(size: int, within: Mask, points: Array, tree: Tree, around: Surro
     found = within.copy()
     found[within] = thick[near].sum(axis=1) > FILLED * asked[near].sum(axis=1)
     return found
-
-
-def _smooth(values: Array, around: Surroundings) -> Array:
-    """Means [N] over the neighbours of each point."""
-    return np.asarray(values[around.near].mean(axis=1))
 
 
 def _blobness(points: Array, tree: Tree, queries: Array, size: int) -> Array:

@@ -256,8 +256,9 @@ def openings(
         blurred: whether noise alone needs all that is allowed: then nobody sees where it is open, only that, if so.
     """
     none = np.zeros(len(cloud.points), dtype=bool)
+    closed = Openings(line=none, border=none, evident=bool(cameras), cameras=cameras, clumps=clumps, floor=floor)
     if cameras:
-        return Openings(line=none, border=none, evident=True, cameras=cameras, clumps=clumps, floor=floor)
+        return closed
     if len(points) < NEIGHBOURS:
         return None
     aside, width = _aside(cloud, points, tree, near)
@@ -268,15 +269,12 @@ def openings(
     is_open = width <= WIDEST and far.mean() >= least * width and _is_long(cloud.points[far], width)
     evident = bool(is_open and far.mean() > EVIDENT * width)
     if blurred or not is_open:
-        closed = Openings(line=none, border=none, evident=evident, clumps=clumps, floor=floor)
-        return closed if closed.covering or evident else None
+        return replace(closed, evident=evident) if closed.covering or evident else None
     line = (aside > ASIDE) & _beside(cloud, far)
     border = _beside(cloud, line)
     far[far] = ~_thin(cloud.points[far], points, tree)
     ends = border & ~_beside(cloud, line & _beside(cloud, far)) if far.any() else border
-    return Openings(
-        line=line, border=border, evident=evident, ends=ends if ends.any() else None, clumps=clumps, floor=floor
-    )
+    return replace(closed, line=line, border=border, evident=evident, ends=ends if ends.any() else None)
 
 
 def _covered(covering: tuple[Clump | Floor, ...], points: Array) -> Mask:

@@ -273,11 +273,7 @@ def _evened(points: Array, rng: np.random.Generator) -> tuple[Index, Array]:
 
 
 def _evenness(around: Surroundings) -> Array:
-    """How much surface [N] the points around each stand for in the mean."""
-    return np.asarray(_area(around)[around.near].mean(axis=1))
-
-
-def _area(around: Surroundings) -> Array:
-    """How much surface [N] each point stands for, up to a factor."""
+    """How much surface [N] the points around each stand for in the mean, up to a factor."""
     away = around.away[:, -1]
-    return np.asarray(np.minimum(away, np.quantile(away, 1.0 - SHARES[2])) ** 2)
+    area = np.minimum(away, np.quantile(away, 1.0 - SHARES[2])) ** 2
+    return np.asarray(area[around.near].mean(axis=1))
