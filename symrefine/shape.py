@@ -132,6 +132,11 @@ class Shape:
         return int(self.points.shape[1])
 
     @property
+    def masses(self) -> Array:
+        """[N] weights of the points of a cloud, 1 each where none are given."""
+        return np.ones(len(self.points)) if self.weights is None else self.weights
+
+    @property
     def diagonal(self) -> float:
         """Diagonal of the axis-aligned bounding box, in input units."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))

@@ -120,12 +120,11 @@ def test_the_first_candidates_are_the_true_mirrors_in_any_pose(shape, normals, d
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=1e-12)
 
 
-def test_candidates_are_apart_and_no_more_than_asked_for():
-    for count in (3, 16):
-        found = np.array(mirror_candidates(shape_moments(CUBE, ORDER), count=count))
-        assert len(found) <= count
-        closeness = np.abs(found @ found.T) - np.eye(len(found))
-        assert closeness.max() < np.cos(np.radians(5))
+def test_candidates_are_apart_and_few():
+    found = np.array(mirror_candidates(shape_moments(CUBE, ORDER)))
+    assert len(found) <= 16
+    closeness = np.abs(found @ found.T) - np.eye(len(found))
+    assert closeness.max() < np.cos(np.radians(5))
 
 
 def test_local_minima_of_a_known_field():

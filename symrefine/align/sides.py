@@ -28,7 +28,7 @@ def side_of(shape: Shape, parts: int) -> Side:
     return Side(
         shape=shape,
         moments=class_moments(shape, shape.labels, parts, ORDERS[shape.dim]),
-        weights=shares(shape, np.ones(len(shape.points)) if shape.weights is None else shape.weights),
+        weights=shares(shape, shape.masses),
     )
 
 
@@ -48,10 +48,9 @@ def thinned(source: Shape, target: Shape, seed: int) -> tuple[Shape, Shape]:
 
 def _spread(cloud: Shape) -> Array:
     """Variances [n] of the points along their principal axes, ascending, as shares of all."""
-    weights = np.ones(len(cloud.points)) if cloud.weights is None else cloud.weights
     local = cloud.points - cloud.points[0]
-    local -= weights @ local / weights.sum()
-    values = np.linalg.eigvalsh((local * weights[:, None]).T @ local)
+    local -= cloud.masses @ local / cloud.masses.sum()
+    values = np.linalg.eigvalsh((local * cloud.masses[:, None]).T @ local)
     return np.asarray(values / max(float(values.sum()), 1e-300))
 
 

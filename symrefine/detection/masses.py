@@ -35,17 +35,6 @@ def classes_of(shape: Shape) -> Index | None:
     return classes if classes.any() else None
 
 
-def masses(shape: Shape) -> Array:
-    """Masses [N] of the points of a cloud, where each class has a density of its own."""
-    classes = classes_of(shape)
-    return mass_of(shape) if classes is None else mass_of(shape) * density_of(classes)
-
-
-def mass_of(shape: Shape) -> Array:
-    """Masses [N] of the points of a cloud."""
-    return np.ones(len(shape.points)) if shape.weights is None else shape.weights
-
-
 def density_of(classes: Index) -> Array:
     """Densities of classes [N]: multiples of the golden ratio modulo 1 keep any number of them apart."""
     return np.asarray(0.5 + np.modf(0.6180339887498949 * (classes + 1))[0])
@@ -62,7 +51,7 @@ def class_moments(
         return shape_moments(shape, order, parts=parts)
     each = np.ones(1) if classes is None else density_of(classes)
     if shape.faces is None:
-        return shape_moments(replace(shape, weights=mass_of(shape) * each), order, parts=parts)
+        return shape_moments(replace(shape, weights=shape.masses * each), order, parts=parts)
     each = each if density is None else each * density
     nodes, weights = mesh_nodes(replace(shape, measure="surface"), order)
     heavier = weights * np.repeat(each, len(weights) // len(each))

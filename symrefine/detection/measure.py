@@ -10,7 +10,7 @@ import numpy as np
 
 from symrefine.decide.doubts import on_a_line, set_by_strays
 from symrefine.decide.posterior import least_told
-from symrefine.detection.masses import class_moments, classes_of, heavy, is_few, mass_of
+from symrefine.detection.masses import class_moments, classes_of, heavy, is_few
 from symrefine.errors import InputError
 from symrefine.fit.placed import Placed
 from symrefine.fit.vertices import OnVertices, exact_symmetry
@@ -277,19 +277,12 @@ def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLE
         return evidence, Surface(cloud=isolated_points(local, labels), diagonal=tight_diagonal(local))
     if measured.solid and normals is None and fills_volume(local, Tree(local)):
         return evidence, _volume(local, labels, tolerance, rng)
-    return evidence, _surface(measured, local, normals, weights, labels, tolerance, rng)
+    return evidence, _surface(measured, local, tolerance, rng)
 
 
-def _surface(
-    measured: Measured,
-    local: Array,
-    normals: Array | None,
-    weights: Array,
-    labels: Index | None,
-    tolerance: float,
-    rng: np.random.Generator,
-) -> Surface:
+def _surface(measured: Measured, local: Array, tolerance: float, rng: np.random.Generator) -> Surface:
     """Local planes with what noise alone shows, and what is hidden of them."""
+    _, normals, weights, labels = _cloud(measured)
     moments, views, exact = measured.moments, measured.views, measured.shape.faces is not None
     tree = None if exact else Tree(local)
     uneven = None if exact or np.ptp(weights) == 0.0 else weights
@@ -355,7 +348,7 @@ def _cloud(measured: Measured) -> tuple[Array, Array | None, Array, Index | None
     """Points, normals, weights and classes: samples with exact normals for a mesh, else the points themselves."""
     shape, classes, density = measured.shape, measured.classes, measured.density
     if measured.samples is None:
-        return shape.points, shape.normals, mass_of(shape), classes
+        return shape.points, shape.normals, shape.masses, classes
     points, normals, face = measured.samples
     weights = np.ones(len(points)) if density is None else density[face]
     return points, normals, weights, None if classes is None else classes[face]

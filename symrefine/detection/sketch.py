@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.clock import passed
-from symrefine.detection.masses import ORDER, masses
+from symrefine.detection.masses import ORDER, classes_of, density_of
 from symrefine.detection.measure import Measured
 from symrefine.errors import DegenerateShapeError
 from symrefine.geometry import Array
@@ -131,7 +131,8 @@ def _chunks(given: Shape | Stream) -> Iterator[tuple[Array, Array]]:
     if isinstance(given, Stream):
         yield from ((chunk, np.ones(len(chunk))) for chunk in given)
         return
-    weights, done = masses(given), 0
+    classes, done = classes_of(given), 0
+    weights = given.masses if classes is None else given.masses * density_of(classes)
     for chunk in Stream.of(given.points):
         yield chunk, weights[done : done + len(chunk)]
         done += len(chunk)

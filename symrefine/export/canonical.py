@@ -92,7 +92,7 @@ def _free(group: PointGroup) -> Array:
 def _masses(shape: Shape) -> tuple[Array, Array]:
     """Nodes [M, 3] about the centre of mass, RMS radius 1, and weights [M] of sum 1; the surface of a mesh."""
     if shape.faces is None:
-        nodes, weights = shape.points, np.ones(len(shape.points)) if shape.weights is None else shape.weights
+        nodes, weights = shape.points, shape.masses
     else:
         nodes, weights = mesh_nodes(replace(shape, measure="surface"), _DEGREE)
         nodes = nodes + shape.points[0]

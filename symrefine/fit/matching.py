@@ -25,9 +25,7 @@ class Pairs:
     weights: Array
 
 
-def match(
-    cloud: LocalPlanes, motions: Sequence[Isometry], uncertainty: float, *, stride: int = 1, robust: float = ROBUST
-) -> tuple[Pairs, ...]:
+def match(cloud: LocalPlanes, motions: Sequence[Isometry], uncertainty: float, *, stride: int = 1) -> tuple[Pairs, ...]:
     """Pair every `stride`-th local plane, moved by each of K operations, with the nearest one, and weight the pairs.
 
     Pairs are dropped when the moved normal disagrees by more than 45 degrees, when the point hardly moves, so that it
@@ -38,7 +36,6 @@ def match(
 
     Args:
         uncertainty: how far the motions may still move a point, RMS radii.
-        robust: that scale over the median absolute residual.
     """
     source = np.arange(0, len(cloud.points), stride)
     points, classes = cloud.points[source], cloud.classes(source)
@@ -65,7 +62,7 @@ def match(
         flat = worth(cloud.flatness[source], cloud.flatness[target])
 
     def weighted(off: Array, kept: Mask) -> Array:
-        return geman_mcclure(off[kept] ** 2, robust_scale(off[kept], cloud.spacing, uncertainty, robust))
+        return geman_mcclure(off[kept] ** 2, robust_scale(off[kept], cloud.spacing, uncertainty))
 
     return tuple(
         Pairs(sources=source[k], targets=t[k], weights=f[k] * weighted(e, k))
@@ -88,11 +85,11 @@ def worth(source: Array, target: Array) -> Array:
     return np.asarray(np.exp(-(source**2) - target**2))
 
 
-def robust_scale(error: Array, spacing: float, uncertainty: float, robust: float = ROBUST) -> float:
+def robust_scale(error: Array, spacing: float, uncertainty: float) -> float:
     """Scale of the Geman-McClure weights from residuals [N], bounded from below."""
     half = error.size // 2
     middle = float(np.partition(np.abs(error), half)[half]) if error.size else 0.0
-    return max(robust * middle, SCALE_FLOOR * spacing, uncertainty)
+    return max(ROBUST * middle, SCALE_FLOOR * spacing, uncertainty)
 
 
 def geman_mcclure(error2: Array, scale: float) -> Array:

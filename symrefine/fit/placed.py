@@ -84,7 +84,8 @@ def elements(group: PointGroup, *, powers: int = 0) -> list[Operations]:
     elif group.name == "Dinfh":
         normals = group.frame[2:]
     found = [Operations(kind="plane", direction=n, order=1.0, matrices=(householder(n),)) for n in normals]
-    for direction, order in group.rotation_axes() if group.is_finite else _endless(group):
+    # Of a continuous group the endless axes; of a sphere all three that stand for it.
+    for direction, order in (a for a in group.rotation_axes() if group.is_finite or math.isinf(a[1])):
         turns = tuple(rotation(direction, float(a)) for a in _angles(order, powers))
         found.append(Operations(kind="axis", direction=direction, order=order, matrices=turns))
     for direction, order in group.improper_axes() if group.is_finite else []:
@@ -95,12 +96,6 @@ def elements(group: PointGroup, *, powers: int = 0) -> list[Operations]:
         z = np.array([0.0, 0.0, 1.0])
         found.append(Operations(kind="inversion", direction=z, order=2.0, matrices=(-np.eye(3),)))
     return found
-
-
-def _endless(group: PointGroup) -> list[tuple[Array, float]]:
-    """The continuous axis; of a sphere, all three that stand for it."""
-    axes = [(u, k) for u, k in group.rotation_axes() if math.isinf(k)]
-    return axes if group.name == "Kh" else axes[:1]
 
 
 def _angles(order: float, powers: int) -> tuple[float, ...]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symrefine.fit.gauss_newton import Linearisation, Solution, minimise, minimise_all
-from symrefine.fit.matching import ROBUST, Pairs, match, pair_equations
+from symrefine.fit.matching import Pairs, match, pair_equations
 from symrefine.fit.residual import (
     axis_gram,
     design_rows,
@@ -116,9 +116,7 @@ def refine(
     start: Framed,
     *,
     start_error_rad: float = 0.05,
-    max_outer: int = MAX_OUTER,
     stride: int = 1,
-    robust: float = ROBUST,
 ) -> Iterator[Iterate]:
     """Refine operations that share a frame: theta of each plane first, then the unknowns they have in common.
 
@@ -126,9 +124,7 @@ def refine(
         cloud: local planes, normalised units.
         start: the operations where the moments put them.
         start_error_rad: how far the start may be off; sets the first gate and robust scale.
-        max_outer: outer iterations at most.
         stride: use every stride-th local plane as a source.
-        robust: scale of the weights over the median absolute residual (see `match`).
 
     Yields: the start as iterate 0, then one iterate for each outer iteration, the last one when the change settles.
     """
@@ -139,9 +135,9 @@ def refine(
         index=0, state=state, theta_rad=np.zeros(0), step=np.inf, covariance=np.zeros((6, 6)), cost=np.nan, inliers=0,
         pairs=(), converged=False,
     )  # fmt: skip
-    for index in range(1, max_outer + 1):
+    for index in range(1, MAX_OUTER + 1):
         uncertainty = min(start_error_rad, RIM * step)
-        pairs = match(cloud, state.motions, uncertainty, stride=stride, robust=robust)
+        pairs = match(cloud, state.motions, uncertainty, stride=stride)
         grams = np.stack([pair_gram(cloud, p) for p in pairs])
         theta = _thetas(grams, state) if state.bundle else np.zeros(0)
         solution, sight, unseen = _solve(grams, state, float(np.median(theta)) if theta.size else 0.0)

@@ -217,8 +217,7 @@ def shape_moments(shape: Shape, order: int, *, parts: int = 0) -> Moments:
         DegenerateShapeError: no area, no volume, or no spread.
     """
     if shape.faces is None:
-        weights = np.ones(len(shape.points)) if shape.weights is None else shape.weights
-        return central_moments(shape.points, weights, order, parts=parts)
+        return central_moments(shape.points, shape.masses, order, parts=parts)
     nodes, weights = mesh_nodes(shape, order)
     if shape.measure == "solid":
         return _solid_moments(nodes, weights, shape, order)

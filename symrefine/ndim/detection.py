@@ -106,7 +106,7 @@ def detect_nd(
     with clock("moments"):
         moments = shape_moments(shape, 5, parts=PARTS if sampled else 0)
         fixed = fixed_subspace(ntuples(moments, PAPER_ORDERS), floor=FLOOR * tolerance / TOLERANCE)
-    masses = np.ones(len(shape.points)) if shape.weights is None else shape.weights
+    masses = shape.masses
     kept = masses > 0
     points, masses = (shape.points[kept] - moments.center) / moments.scale, masses[kept]
     diameter = 2.0 * float(np.linalg.norm(points, axis=1).max())

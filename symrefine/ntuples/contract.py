@@ -168,7 +168,7 @@ class _Entries:
 
     def __init__(self, dim: int, order: int) -> None:
         table = [tuple(e) for e in exponents(dim, order).tolist()]
-        self.dim, self.order, self.table = dim, order, table
+        self.dim, self.table = dim, table
         self.of_degree = {d: [e for e in table if sum(e) == d] for d in range(order + 1)}
         self.position = {e: i for i, e in enumerate(table)}
         self.columns: list[Array] = []

@@ -148,7 +148,7 @@ def about(evidence: Evidence, direction: Array) -> list[Placed]:
     return [*found, *(placed(f"C{fold}", turns[fold, polished]) for fold, polished in sorted(turns, reverse=True))]
 
 
-def polish_frame(harmonics: dict[int, Array], frame: Array, fold: int, *, steps: int = 6) -> Array:
+def polish_frame(harmonics: dict[int, Array], frame: Array, fold: int) -> Array:
     """Turn a C_bv frame until the moments that break the group vanish: Gauss-Newton on SO(3), noise-weighted.
 
     No point is matched. In the frame, the invariant coefficients are cos(m phi) with b | m; every other one is a
@@ -175,7 +175,7 @@ def polish_frame(harmonics: dict[int, Array], frame: Array, fold: int, *, steps:
             cost=float(weights @ here[0] ** 2), gradient=weighted @ here[0], hessian=weighted @ jacobian.T
         )
 
-    return minimise(linearise, frame, move=turn_frame, max_steps=steps, longest=LONGEST).x
+    return minimise(linearise, frame, move=turn_frame, longest=LONGEST).x
 
 
 def _counted(points: Array, direction: Array) -> set[int]:
@@ -199,14 +199,13 @@ def turned_over(evidence: Evidence, known: Placed) -> list[Placed]:
 def beside(known: Placed) -> list[Placed]:
     """What may hold beside a group that holds: multiples of its order, revolution, what turns its axis over."""
     group, center = known.group, known.center
-    main = [(u, k) for u, k in group.rotation_axes()[:1] if group.symbol.fold > 0]
     found = [Placed(group=PointGroup(name="Ci"), center=center)] if not group.has_inversion else []
     if group.name in POLYHEDRAL:
         found.append(placed("Kh", group.frame, center))
     if not group.is_finite:
         mirrored = [placed("Cs", group.frame, center)] if group.name == "Cinfv" else []
         return [*mirrored, placed("Kh", group.frame, center)] if group.name != "Kh" else []
-    for u, k in main:
+    for u, k in group.rotation_axes()[:1] if group.symbol.fold > 0 else []:
         frame = frame_with_z(u)
         found.append(placed("Cinfv", frame, center))
         found += [placed(f"C{int(p * k)}", frame, center) for p in (2, 3, 5) if 2 * p * k <= CLOSED_FOLD]

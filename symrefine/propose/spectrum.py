@@ -108,11 +108,11 @@ def whitened(moments: Moments) -> Moments:
     return transformed(moments, (vectors / np.sqrt(3.0 * values)) @ vectors.T)
 
 
-def mirror_candidates(moments: Moments, *, count: int = 16) -> list[Array]:
+def mirror_candidates(moments: Moments) -> list[Array]:
     """Normals of candidate mirror planes through the centre, raw and whitened spectrum together, least miss first."""
-    found = [local_minima(mirror_misses(m), count=count) for m in (whitened(moments), moments)]
+    found = [local_minima(mirror_misses(m), count=16) for m in (whitened(moments), moments)]
     directions, misses = (np.concatenate(part) for part in zip(*found, strict=True))
-    return apart(directions[np.argsort(misses, kind="stable")], np.radians(5.0))[:count]
+    return apart(directions[np.argsort(misses, kind="stable")], np.radians(5.0))[:16]
 
 
 def apart(directions: Iterable[Array], angle_rad: float = START_ERROR) -> list[Array]:

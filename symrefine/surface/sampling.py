@@ -69,9 +69,7 @@ def distinct(points: Array, labels: Index | None) -> tuple[Index, Index]:
         return np.arange(len(points)), np.arange(len(points))
     rows = points if labels is None else np.column_stack([points, labels])
     _, first, own = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    place = np.empty(len(first), dtype=np.int64)
-    place[np.argsort(first)] = np.arange(len(first))
-    return np.sort(first), place[own.reshape(-1)]
+    return np.sort(first), np.argsort(np.argsort(first))[own.reshape(-1)]
 
 
 def sampling(

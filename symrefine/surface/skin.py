@@ -210,11 +210,9 @@ class Skin:
     @cached_property
     def width(self) -> float:
         """Radius of the neighbourhoods that planes are fitted to; 0 where points and normals are exact."""
-        return self._reach(self.neighbours - 1) if self.neighbours > 1 else 0.0
-
-    def _reach(self, neighbour: int) -> float:
-        """Median distance from a point to one of the others, counted by how near they are, from 1 on."""
-        return float(np.median(self.tree.query(self._probes, 1, skip=neighbour)[0]))
+        if self.neighbours == 1:
+            return 0.0
+        return float(np.median(self.tree.query(self._probes, 1, skip=self.neighbours - 1)[0]))
 
     @property
     def _probes(self) -> Array:
