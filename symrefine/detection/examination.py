@@ -88,9 +88,9 @@ class Examined:
         if known is not None and not group.is_finite:
             return known.rounded(group) if is_subgroup(known.group, group, SAME_RAD) else None
         # What corners prove may be less than what all vertices have, where a hole makes corners of a few.
-        origin, scale = self.measured.moments.center, self.measured.moments.scale
-        center = origin + scale * found.placed.center
-        return on_vertices(self.measured.shape, group, center, diagonal=scale * self.surface.diagonal)
+        moments = self.measured.moments
+        center, diagonal = moments.restored(found.placed.center), moments.scale * self.surface.diagonal
+        return on_vertices(self.measured.shape, group, center, diagonal=diagonal)
 
     def decided(self, tolerance: float, *, shown: bool = False) -> Decision:
         """The likeliest group of the chain at a tolerance; with `shown` as if what no camera saw kept to the rest."""
@@ -265,7 +265,7 @@ def _strangers(found: Examined, points: Array, tolerance: float) -> tuple[Index,
     if not few:
         return ()
     own = np.setdiff1d(np.arange(len(points)), np.concatenate(measured.apart), assume_unique=True)
-    local = (points[own] - measured.moments.center) / measured.moments.scale
+    local = measured.moments.normalised(points[own])
     nearest = Tree(surface.cloud.points[:: surface.stride(COUNT)]).nearest(local)[1]
     for rival in few:
         unmet = unmet_by(surface, rival.placed, COUNT)
@@ -338,7 +338,7 @@ def _is_part(found: Examined, blob: Array, tolerance: float) -> bool:
     is, would not break.
     """
     surface, cloud, moments = found.surface, found.surface.cloud.of_one_class(), found.measured.moments
-    points, margin = (blob - moments.center) / moments.scale, surface.far * surface.diagonal
+    points, margin = moments.normalised(blob), surface.far * surface.diagonal
     link = found.link(tolerance)
     motions = [m for element in link.elements for m in element.motions]
     if not motions or found.doubt(tolerance):
@@ -355,7 +355,7 @@ def _is_part(found: Examined, blob: Array, tolerance: float) -> bool:
 def _replaces(found: Examined, clump: Array, tolerance: float) -> bool:
     """Whether about as much of the surface has its image under points set apart as these are: a part out of place."""
     surface, cloud, moments = found.surface, found.surface.cloud.of_one_class(), found.measured.moments
-    there, margin = Clump.of((clump - moments.center) / moments.scale), surface.far * surface.diagonal
+    there, margin = Clump.of(moments.normalised(clump)), surface.far * surface.diagonal
     own, hidden = cloud.points, [0.0]
     for element in found.link(tolerance).elements:
         for motion in element.motions:
@@ -372,7 +372,7 @@ def _belongs(found: Examined, clump: Array, tolerance: float) -> bool:
     one passes through any clump by chance; a part of the object is carried by a third of the elements and more.
     """
     surface, cloud, moments = found.surface, found.surface.cloud.of_one_class(), found.measured.moments
-    points, margin = (clump - moments.center) / moments.scale, surface.far * surface.diagonal
+    points, margin = moments.normalised(clump), surface.far * surface.diagonal
     beside = disc_distances(cloud, points) > margin
     points = points[beside] if beside.any() else points  # what lies in the surface is carried with it
     own, carried = Tree(points), []

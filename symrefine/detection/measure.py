@@ -98,8 +98,7 @@ class Measured:
         """What saw a scan, in normalised units; none if nothing is known of it."""
         if self.scan is None or self.scan.viewpoint is None:
             return ()
-        places = (self.scan.points, self.scan.viewpoint)
-        return cameras(*((p - self.moments.center) / self.moments.scale for p in places))
+        return cameras(*map(self.moments.normalised, (self.scan.points, self.scan.viewpoint)))
 
     @cached_property
     def tuples(self) -> FixedSubspace:
@@ -265,7 +264,7 @@ def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLE
     """What proposals are made of, and the surface that judges them."""
     shape, moments = measured.shape, measured.moments
     points, normals, weights, labels = _cloud(measured)
-    local = (points - moments.center) / moments.scale
+    local = moments.normalised(points)
     evidence = Evidence(
         moments=moments,
         tuples=measured.tuples,
@@ -317,7 +316,7 @@ def _surface(measured: Measured, local: Array, tolerance: float, rng: np.random.
             tree,
             views,
             near,
-            clumps=tuple(Clump.of((p - moments.center) / moments.scale) for _, p in measured.clumps),
+            clumps=tuple(Clump.of(moments.normalised(p)) for _, p in measured.clumps),
             floor=None if measured.floor is None else measured.floor.normalised(moments.center, moments.scale),
             strays=len(measured.strays) > 0,
             blurred=surface.floor >= tolerance,
@@ -361,10 +360,10 @@ def by_vertices(
 
     It is exact, whatever is sampled of the shape.
     """
-    origin, scale = measured.moments.center, measured.moments.scale
-    exact, proof = exact_symmetry(measured.shape, scale * diagonal)
+    moments = measured.moments
+    exact, proof = exact_symmetry(measured.shape, moments.scale * diagonal)
     if exact is None or exact.group.name == "C1":
         return exact, None, evidence
-    found = [None if known is None else known.beside(origin) for known in (exact, proof)]
-    placed = [None if k is None else Placed(group=k.group, center=(k.center - origin) / scale) for k in found]
+    found = [None if known is None else known.beside(moments.center) for known in (exact, proof)]
+    placed = [None if k is None else Placed(group=k.group, center=moments.normalised(k.center)) for k in found]
     return found[0], found[1], replace(evidence, vertices=placed[0], proven=placed[1])

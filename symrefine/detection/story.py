@@ -22,6 +22,7 @@ from symrefine.fit.placed import Placed
 from symrefine.fit.refine import answered
 from symrefine.fit.vertices import OnVertices
 from symrefine.geometry import Array, Axis, Plane, cross_matrix, positive
+from symrefine.moments.moments import Moments
 from symrefine.samples import FOLLOWED
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
@@ -131,8 +132,7 @@ def _report(
 ) -> Detection:
     """What is told where the group of the chain with that index is the answer, or none is for a reason."""
     measured, surface, links = found.measured, found.surface, found.links
-    origin, scale = measured.moments.center, measured.moments.scale
-    chosen = links[index]
+    moments, chosen = measured.moments, links[index]
     names, needs = [h.group.name for h in links], [h.need for h in links]
     told = alternatives(names, needs, decision, -1 if reason else index)
     history, known = chosen.history, _covariance(surface, chosen)
@@ -152,18 +152,18 @@ def _report(
         confidence=0.0 if reason else decision.probabilities[index],
         alternatives=tuple(told) if len(links) > 1 and not reason else (),
         group=chosen.group,
-        center=origin + scale * chosen.placed.center if on is None else on.center,
+        center=moments.restored(chosen.placed.center) if on is None else on.center,
         planes=tuple(
-            FoundPlane(plane=_plane(e, origin, scale), confidence=sure[id(e)], **_as_told(e, known, scale))
+            FoundPlane(plane=_plane(e, moments), confidence=sure[id(e)], **_as_told(e, known, moments.scale))
             for e in sorted(planes, key=lambda e: e.need)
         ),
         axes=tuple(
             FoundAxis(
-                axis=Axis(point=origin + scale * e.center, direction=positive(e.operations.direction)),
+                axis=Axis(point=moments.restored(e.center), direction=positive(e.operations.direction)),
                 order=e.operations.order,
                 improper=e.operations.kind == "improper",
                 confidence=sure[id(e)],
-                **_as_told(e, known, scale),
+                **_as_told(e, known, moments.scale),
             )
             for e in sorted(turns, key=lambda e: (-e.operations.order, e.need))
         ),
@@ -174,7 +174,7 @@ def _report(
             NearMiss(
                 kind=e.operations.kind,
                 direction=positive(e.operations.direction),
-                point=origin + scale * e.center,
+                point=moments.restored(e.center),
                 order=e.operations.order,
                 residual=e.deviation,
                 excess=e.need / tolerance,
@@ -183,7 +183,7 @@ def _report(
         ),
         iterations=chosen.iterations,
         tolerance=tolerance,
-        diagonal=surface.diagonal * scale,
+        diagonal=surface.diagonal * moments.scale,
         undetermined=reason,
         staircase=steps,
         tuples=measured.tuples,
@@ -195,7 +195,7 @@ def _report(
             Candidate(
                 point_group=start.group.name,
                 direction=positive(start.group.frame[2]),
-                point=origin + scale * start.center,
+                point=moments.restored(start.center),
                 excess=need / tolerance,
             )
             for start, need in sorted((*found.pool.looked, *found.pool.hopeless), key=lambda k: k[1])
@@ -210,8 +210,8 @@ def _report(
         exact=None if on is None else _exact(on, measured.shape),
         sample=found.sample,
         even_sample=len(measured.shape.points) if measured.is_thinned else None,
-        origin=origin,
-        scale=scale,
+        origin=moments.center,
+        scale=moments.scale,
         timings=clock.seconds,
         examined=found,
     )
@@ -223,7 +223,7 @@ def _exact(on: OnVertices, shape: Shape) -> Exact:
 
 def _polished(chosen: Hypothesis, on: OnVertices, measured: Measured) -> Hypothesis:
     """The group and its elements where the vertices put them, with the misses that decided."""
-    center = (on.center - measured.moments.center) / measured.moments.scale
+    center = measured.moments.normalised(on.center)
     turn = on.group.frame.T @ chosen.group.frame
 
     def turned(element: Element) -> Element:
@@ -318,7 +318,6 @@ def _uncertainty(covariance: Array | None, element: Element) -> tuple[float, flo
     return math.sqrt(largest[0]), math.sqrt(largest[1])
 
 
-def _plane(element: Element, origin: Array, scale: float) -> Plane:
-    point = origin + scale * element.center
+def _plane(element: Element, moments: Moments) -> Plane:
     normal = positive(element.operations.direction)
-    return Plane(normal=normal, offset=float(normal @ point))
+    return Plane(normal=normal, offset=float(normal @ moments.restored(element.center)))

@@ -85,7 +85,7 @@ def _painted(found: Examined, shape: Shape, rng: np.random.Generator) -> Painted
     assert shape.faces is not None
     points, _, face = sample_surface(shape, PLANES, rng)
     moments = found.measured.moments
-    local, vertices = ((x - moments.center) / moments.scale for x in (points, shape.points))
+    local, vertices = map(moments.normalised, (points, shape.points))
     order = rng.permutation(len(points))  # any stride takes an even part
     return Painted.of(local[order], face[order], vertices[shape.faces], shape.texture, found.surface.diagonal)
 
@@ -144,7 +144,7 @@ def _marked(
     seen = examined(Shape(points=points, normals=normals, labels=labels), tolerance=tolerance, clock=Clock())
     here, there = found.measured.moments, seen.measured.moments
     inside = [
-        Placed(group=h.group, center=(there.center + there.scale * h.placed.center - here.center) / here.scale)
+        Placed(group=h.group, center=here.normalised(there.restored(h.placed.center)))
         for h in seen.links[1:]
         if is_subgroup(h.group, whole.group, SAME_RAD)
     ]

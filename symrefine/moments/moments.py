@@ -151,6 +151,14 @@ class Moments(ReadOnly):
     center: Array
     scale: float
 
+    def normalised(self, points: Array) -> Array:
+        """Points [..., n] of the input in the frame of the moments."""
+        return (points - self.center) / self.scale
+
+    def restored(self, points: Array) -> Array:
+        """The way back."""
+        return self.center + self.scale * points
+
     def tensor(self, degree: int) -> Array:
         """Symmetric moment tensor T_degree, shape [n]*degree."""
         return self.values[tensor_index(self.dim, degree, self.order)]

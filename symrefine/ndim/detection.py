@@ -108,7 +108,7 @@ def detect_nd(
         fixed = fixed_subspace(ntuples(moments, PAPER_ORDERS), floor=FLOOR * tolerance / TOLERANCE)
     masses = shape.masses
     kept = masses > 0
-    points, masses = (shape.points[kept] - moments.center) / moments.scale, masses[kept]
+    points, masses = moments.normalised(shape.points[kept]), masses[kept]
     diameter = 2.0 * float(np.linalg.norm(points, axis=1).max())
     cloud = Points(points=points, masses=masses, diameter=diameter)
     low = samples.block(moments, samples.LOW)
