@@ -337,8 +337,7 @@ def _is_part(found: Examined, blob: Array, tolerance: float) -> bool:
     point of space in place lies about that point, as all larger groups of the rest do, which a clump there, round as it
     is, would not break.
     """
-    surface, cloud, moments = found.surface, found.surface.cloud.of_one_class(), found.measured.moments
-    points, margin = moments.normalised(blob), surface.far * surface.diagonal
+    cloud, points = found.surface.cloud.of_one_class(), found.measured.moments.normalised(blob)
     link = found.link(tolerance)
     motions = [m for element in link.elements for m in element.motions]
     if not motions or found.doubt(tolerance):
@@ -348,20 +347,19 @@ def _is_part(found: Examined, blob: Array, tolerance: float) -> bool:
     if not link.group.is_polar and own.reshape(len(motions), -1).mean(axis=1).min() > 0.5:
         return True
     others = moved[~own]
-    met = disc_distances(cloud, others) <= margin
+    met = disc_distances(cloud, others) <= found.surface.margin
     return 2 * len(others) > len(moved) and bool(met.mean() > 0.5)
 
 
 def _replaces(found: Examined, clump: Array, tolerance: float) -> bool:
     """Whether about as much of the surface has its image under points set apart as these are: a part out of place."""
-    surface, cloud, moments = found.surface, found.surface.cloud.of_one_class(), found.measured.moments
-    there, margin = Clump.of(moments.normalised(clump)), surface.far * surface.diagonal
+    cloud, there = found.surface.cloud.of_one_class(), Clump.of(found.measured.moments.normalised(clump))
     own, hidden = cloud.points, [0.0]
     for element in found.link(tolerance).elements:
         for motion in element.motions:
             moved = motion.apply(own)
             under = moved[there.covers(moved)]
-            hidden.append(float((disc_distances(cloud, under) > margin).sum()) if len(under) else 0.0)
+            hidden.append(float((disc_distances(cloud, under) > found.surface.margin).sum()) if len(under) else 0.0)
     return max(hidden) * found.measured.count >= COUNTERPART * len(clump) * len(own)
 
 
@@ -371,8 +369,8 @@ def _belongs(found: Examined, clump: Array, tolerance: float) -> bool:
     That is onto the surface, onto themselves or, where cameras are known, to where they could not see. Of many mirrors
     one passes through any clump by chance; a part of the object is carried by a third of the elements and more.
     """
-    surface, cloud, moments = found.surface, found.surface.cloud.of_one_class(), found.measured.moments
-    points, margin = moments.normalised(clump), surface.far * surface.diagonal
+    surface, cloud = found.surface, found.surface.cloud.of_one_class()
+    points, margin = found.measured.moments.normalised(clump), surface.margin
     beside = disc_distances(cloud, points) > margin
     points = points[beside] if beside.any() else points  # what lies in the surface is carried with it
     own, carried = Tree(points), []

@@ -134,6 +134,11 @@ class Surface:
         return LIMITS[1] * self.tolerance
 
     @property
+    def margin(self) -> float:
+        """The same in normalised units."""
+        return self.far * self.diagonal
+
+    @property
     def ceiling(self) -> float:
         """What is needed from which on nothing is told apart of an open surface."""
         return HOPELESS * self.tolerance
@@ -182,9 +187,7 @@ class Surface:
         points, normals = self.cloud.points[::stride], self.cloud.normals[::stride]
         moved = np.stack([motion.apply(points) for motion in motions])
         turned = np.stack([motion.turn(normals) for motion in motions]) if self.viewed else None
-        unseen = self.openings.unseen(
-            self.cloud, moved, away, stride, self.far * self.diagonal, turned=turned, group=group
-        )
+        unseen = self.openings.unseen(self.cloud, moved, away, stride, self.margin, turned=turned, group=group)
         if together and not self.viewed:
             unseen[away] = agreed(moved[away], unseen[away])
         return np.where(unseen, np.nan, misses)
@@ -192,7 +195,7 @@ class Surface:
     def coverage(self, misses: Array, motions: Sequence[Isometry], *, sources: int = 10**9) -> Coverage:
         """What K operations say that miss by so much where it was seen [K, N]: the one that says least."""
         some = slice(None, None, self.stride(sources))
-        still, far = self.cloud.points[some], self.far * self.diagonal
+        still, far = self.cloud.points[some], self.margin
         travels = np.stack([m.apply(still) - still for m in motions])
         lengths = np.linalg.norm(travels, axis=2)
         unseen = np.isnan(misses)
