@@ -35,6 +35,12 @@ def classes_of(shape: Shape) -> Index | None:
     return classes if classes.any() else None
 
 
+def masses(shape: Shape) -> Array:
+    """Masses [N] of the points of a cloud, where each class has a density of its own."""
+    classes = classes_of(shape)
+    return shape.masses if classes is None else shape.masses * density_of(classes)
+
+
 def density_of(classes: Index) -> Array:
     """Densities of classes [N]: multiples of the golden ratio modulo 1 keep any number of them apart."""
     return np.asarray(0.5 + np.modf(0.6180339887498949 * (classes + 1))[0])

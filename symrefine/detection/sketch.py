@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.clock import passed
-from symrefine.detection.masses import ORDER, classes_of, density_of
+from symrefine.detection.masses import ORDER, masses
 from symrefine.detection.measure import Measured
 from symrefine.errors import DegenerateShapeError
 from symrefine.geometry import Array
@@ -89,33 +89,32 @@ def sketched(given: Shape | Stream, seed: int = 0) -> Sketch:
         InputError: what `Stream` refuses while it is read.
         DegenerateShapeError: the points do not spread.
     """
-    count = given.count if isinstance(given, Stream) else len(given.points)
-    picked = _picked(count, np.random.default_rng(seed))
+    stream, weights = (given, None) if isinstance(given, Stream) else (Stream.of(given.points), masses(given))
+    picked = _picked(stream.count, np.random.default_rng(seed))
     drawn: list[Array] = []
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
 
     def chunks() -> Iterator[tuple[Array, Array]]:
         done = 0
-        for points, weights in _chunks(given):
+        for points in stream:
             # Column by column: numpy goes through rows of three one at a time.
             np.minimum(low, [column.min() for column in points.T], out=low)
             np.maximum(high, [column.max() for column in points.T], out=high)
             some = picked[slice(*np.searchsorted(picked, [done, done + len(points)]))] - done
             drawn.append(points[some])
+            yield points, np.ones(len(points)) if weights is None else weights[done : done + len(points)]
             done += len(points)
-            yield points, weights
-            passed(done, count)
+            passed(done, stream.count)
 
     try:
         moments = running_moments(chunks(), ORDER, parts=PARTS)
     except DegenerateShapeError as error:
         raise DegenerateShapeError(f"{given.source}: {error}") from None
     if isinstance(given, Stream):
-        sample = Shape(np.concatenate(drawn), source=given.source, unit=given.unit)
+        sample, whole = Shape(np.concatenate(drawn), source=given.source, unit=given.unit), None
     else:
-        sample = given.chosen(picked)
-    whole = None if isinstance(given, Stream) else given
-    return Sketch(sample=sample, picked=picked, moments=moments, low=low, high=high, count=count, whole=whole)
+        sample, whole = given.chosen(picked), given
+    return Sketch(sample=sample, picked=picked, moments=moments, low=low, high=high, count=stream.count, whole=whole)
 
 
 def _picked(count: int, rng: np.random.Generator) -> Index:
@@ -124,18 +123,6 @@ def _picked(count: int, rng: np.random.Generator) -> Index:
         return np.arange(count)
     ends = np.arange(SAMPLE + 1) * count // SAMPLE
     return ends[:-1] + (rng.random(SAMPLE) * np.diff(ends)).astype(np.int64)
-
-
-def _chunks(given: Shape | Stream) -> Iterator[tuple[Array, Array]]:
-    """Points and masses of each chunk, where classes have densities of their own."""
-    if isinstance(given, Stream):
-        yield from ((chunk, np.ones(len(chunk))) for chunk in given)
-        return
-    classes, done = classes_of(given), 0
-    weights = given.masses if classes is None else given.masses * density_of(classes)
-    for chunk in Stream.of(given.points):
-        yield chunk, weights[done : done + len(chunk)]
-        done += len(chunk)
 
 
 def set_apart(measured: Measured, sketch: Sketch | None, *, outliers: bool) -> tuple[Index, float]:
