@@ -41,7 +41,7 @@ from symrefine.propose.candidates import repeated
 from symrefine.propose.maps import maps_onto_itself
 from symrefine.propose.votes import AGREE_RAD, FEET, _mirrored, mirror_votes, revolution
 from symrefine.shape import CAMERAS, Shape
-from symrefine.surface.cameras import cameras, outwards, unclosed
+from symrefine.surface.cameras import cameras, outwards
 from symrefine.surface.clumps import Clump, clump_among
 from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.openings import agreed
@@ -1072,7 +1072,8 @@ def test_the_normals_of_what_was_seen_tell_what_was_not(count, low, high):
     normals = points * np.random.default_rng(46).choice([-1.0, 1.0], (len(points), 1))
     turned = outwards(cameras(points, places), points, normals)
     np.testing.assert_array_equal(turned, points)
-    assert low <= unclosed(turned, np.ones(len(points))) < high
+    _, surface = gather(measure(Shape(points=points, viewpoint=places)), np.random.default_rng(0))
+    assert low <= surface.unclosed < high
 
 
 @pytest.mark.parametrize("opening", [0.05, 0.11, 0.22])

@@ -37,7 +37,7 @@ EVEN_PICTURE, EVEN_PICTURE_MIRROR, STEEPNESS_PICTURE = 0.6, 0.75, 3.6
 # that noise makes volumes of, and of 76 that have a part out of place two to three fewer are told, and 10 fewer surely.
 UNKNOWN, BLURRED = 0.7, 2.0
 # Probability that what no camera saw breaks what the rest shows, where as much as was seen is missing
-# (`cameras.unclosed`, in single views two thirds of that), by how many mirrors of a group no operation of it exchanges
+# (`Surface.unclosed`, in single views two thirds of that), by how many mirrors of a group no operation of it exchanges
 # with others: two stand for more, and being round counts as one. What is repeated a number of times is hardly broken
 # where nobody looked; most things have one mirror, and a second one is what a car, a mug and a sofa lack. Of one half
 # of the objects of `experiments.studies.single_views`, seeds 2721 to 2724 and 2731 to 2736, 0 of 107, 8 of 169 and 10

@@ -117,7 +117,7 @@ def _elsewhere(dim: int) -> str:
 def _step(found: Examined, tolerance: float) -> Step:
     """The group at another tolerance, read from the same table."""
     undetermined = bool(found.doubt(tolerance))
-    name = "undetermined" if undetermined else found.links[found.decided(tolerance).index].group.name
+    name = "undetermined" if undetermined else found.link(tolerance).group.name
     return Step(tolerance=tolerance, point_group=name, undetermined=undetermined)
 
 

@@ -69,7 +69,7 @@ def textured(found: Examined, shape: Shape, *, tolerance: float, limit: float, s
         painted = _painted(found, shape, rng)
         few = [h.placed for h in found.links[1:] if h.group.order <= MOST]
         many = [h.placed for h in found.links[1:] if h.group.order > MOST]
-        if found.links[found.decided(tolerance).index].group.order > MOST:
+        if found.link(tolerance).group.order > MOST:
             few, marked = _marked(found, painted, shape, many[-1], tolerance, rng)
             many = [*marked, *many]
         links = [NOTHING]

@@ -31,9 +31,9 @@ class _Found:
     orders: Array
     dets: Array
 
-    def operations(self, continuous_angle_rad: float = 1.0) -> Array:
-        """Generators [k, 3, 3]; a continuous axis is represented by a turn of `continuous_angle_rad`."""
-        angles = np.where(np.isinf(self.orders), continuous_angle_rad, 2.0 * np.pi / self.orders)
+    def operations(self) -> Array:
+        """Generators [k, 3, 3]; a continuous axis is represented by a turn of one radian."""
+        angles = np.where(np.isinf(self.orders), 1.0, 2.0 * np.pi / self.orders)
         turn = [rotation if det > 0.0 else rotoreflection for det in self.dets]
         return np.array([f(u, a) for f, u, a in zip(turn, self.directions, angles, strict=True)])
 

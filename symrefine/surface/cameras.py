@@ -83,18 +83,6 @@ def outwards(views: Sequence[Camera], points: Array, normals: Array) -> Array:
     return np.where(np.einsum("ni,ni->n", towards, normals)[:, None] < 0.0, -normals, normals)
 
 
-def unclosed(normals: Array, areas: Array) -> float:
-    """How much is missing at least of a surface, by the area that was seen: 0 of all of it, 1/2 of half a ball.
-
-    The normals of a closed surface, out of it and as long as its parts are large, add up to nothing.
-
-    Args:
-        normals: [N, 3] unit normals of its parts, out of the body.
-        areas: [N], up to a factor.
-    """
-    return float(np.linalg.norm(areas @ normals) / areas.sum())
-
-
 def _camera(eye: Array, points: Array) -> Camera:
     points = np.unique(points, axis=0)  # rays that are told twice would seem to lie side by side without a gap
     ranges = np.linalg.norm(points - eye, axis=1)

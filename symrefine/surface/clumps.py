@@ -80,9 +80,7 @@ def clump_among(points: Array, unmet: Mask) -> Index:
         return found[:0]
     part = parts_among(Surroundings.of(points[found]))
     own = found[part == np.bincount(part).argmax()]
-    if len(own) < max(least, 0.5 * len(found)):
-        return found[:0]
-    return own if _is_filled(points[own]) else found[:0]
+    return own if len(own) >= max(least, 0.5 * len(found)) and _is_filled(points[own]) else found[:0]
 
 
 def _is_filled(points: Array) -> bool:

@@ -373,8 +373,8 @@ def _is_long(points: Array, width: float) -> bool:
 
 def _lines(cloud: LocalPlanes, chosen: Mask) -> Mask:
     """Which of some local planes stand side by side, as those of a border do: two others within twice their reach."""
-    found = chosen.copy()
+    found = np.zeros_like(chosen)
     if chosen.sum() > 2:
         points = cloud.points[chosen]
         found[chosen] = Tree(points).query(points, 1, skip=2)[0][:, 0] < 2.0 * cloud.reach[chosen]
-    return found if chosen.sum() > 2 else np.zeros(len(chosen), dtype=bool)
+    return found

@@ -10,7 +10,6 @@ import numpy as np
 from symrefine.geometry import Array, Axis, Isometry, read_only
 from symrefine.moments.moments import PARTS
 from symrefine.samples import COUNT, LOOK
-from symrefine.surface.cameras import unclosed
 from symrefine.surface.drift import Drift
 from symrefine.surface.misses import (
     DISCS,
@@ -125,8 +124,12 @@ class Surface:
 
     @cached_property
     def unclosed(self) -> float:
-        """How much of it cameras did not see at least, by what they saw; nothing where none are known."""
-        return unclosed(self.cloud.normals, self.cloud.reach**2) if self.viewed else 0.0
+        """How much of it cameras did not see at least, by the area that they saw: 1/2 of half a ball; 0 without them.
+
+        The normals of a closed surface, out of it and as long as its parts are large, add up to nothing.
+        """
+        areas = self.cloud.reach**2
+        return float(np.linalg.norm(areas @ self.cloud.normals) / areas.sum()) if self.viewed else 0.0
 
     @property
     def far(self) -> float:
