@@ -14,8 +14,13 @@ from symrefine.moments.quadrature import sample_surface
 from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import fixed_subspace
 from symrefine.propose.candidates import polish_frame
-from symrefine.propose.folds import BINS_PER_ORDER, azimuthal_spectrum, fold_candidates, mirror_through
+from symrefine.propose.folds import BINS_PER_ORDER, FoldCandidate, azimuthal_spectrum, folds_of, mirror_through
 from symrefine.shape import Shape
+
+
+def fold_candidates(points: np.ndarray, weights: np.ndarray, axis: np.ndarray) -> list[FoldCandidate]:
+    return folds_of(azimuthal_spectrum(points, weights, axis), axis)
+
 
 ORDER = 8
 Z_AXIS = np.array([0.0, 0, 1])

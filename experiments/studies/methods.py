@@ -26,7 +26,7 @@ from symrefine.groups import from_elements
 from symrefine.moments.moments import shape_moments
 from symrefine.ntuples.contract import ntuples
 from symrefine.ntuples.rank import fixed_subspace
-from symrefine.propose.folds import fold_candidates
+from symrefine.propose.folds import azimuthal_spectrum, folds_of
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.skin import LocalPlanes, local_planes
@@ -143,7 +143,8 @@ def from_axis(scan: Scan) -> Answer:
         plane = Plane(normal=tuples.directions[2], offset=float(tuples.directions[2] @ moments.center))
         return Answer(planes=[plane], group="Cs", starts=1, iterations=0, iterations_all=0, passes=0, evaluations=0)
     local = (scan.points - moments.center) / moments.scale
-    folds = fold_candidates(local, np.full(len(local), 1.0 / len(local)), tuples.directions[0])
+    axis = tuples.directions[0]
+    folds = folds_of(azimuthal_spectrum(local, np.full(len(local), 1.0 / len(local)), axis), axis)
     if tuples.kind != "axis" or not folds:
         return Answer(planes=[], group="Cinfv" if tuples.kind == "axis" else "C1", starts=0)
     fold, frame = folds[0].fold, folds[0].frame

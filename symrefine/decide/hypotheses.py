@@ -18,7 +18,7 @@ from symrefine.fit.placed import FITTED, Operations, Placed, elements
 from symrefine.fit.refine import SHORT, Iterate, refine
 from symrefine.geometry import Array, Axis, Isometry, frame_with_z, rotation
 from symrefine.groups import PointGroup, is_subgroup
-from symrefine.propose.folds import fold_candidates
+from symrefine.propose.folds import azimuthal_spectrum, folds_of
 from symrefine.rounding import START_ERROR
 from symrefine.samples import COUNT, GLANCE
 from symrefine.surface.misses import Deviation
@@ -286,7 +286,7 @@ def _telling(element: Element, wedge: Wedge) -> tuple[Isometry, ...]:
 def _fold(skin: Skin, axis: Axis) -> int:
     """How often a surface repeats about an axis, as the azimuths of its points tell; 0 if they do not."""
     points = skin.points - axis.point
-    told = fold_candidates(points, np.ones(len(points)), axis.direction)
+    told = folds_of(azimuthal_spectrum(points, np.ones(len(points)), axis.direction), axis.direction)
     return told[0].fold if told else 0
 
 

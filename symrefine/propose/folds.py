@@ -57,17 +57,12 @@ class FoldCandidate(ReadOnly):
     leak: float
 
 
-def fold_candidates(points: Array, weights: Array, axis: Array) -> list[FoldCandidate]:
-    """Folds b >= 2 whose multiples carry the azimuthal energy beyond the noise, the least leaking first.
+def folds_of(spectrum: tuple[Array, Array], axis: Array) -> list[FoldCandidate]:
+    """Folds b >= 2 whose multiples carry the azimuthal energy about an axis beyond the noise, the least leaking first.
 
     For C_b only k = 0 mod b survives; for C_bv all phases arg(c_k)/k agree on the mirrors (method.md, section 4).
     An empty list means a surface of revolution as far as the azimuthal spectrum can tell, or no axis at all.
     """
-    return folds_of(azimuthal_spectrum(points, weights, axis), axis)
-
-
-def folds_of(spectrum: tuple[Array, Array], axis: Array) -> list[FoldCandidate]:
-    """The same, from the azimuthal spectrum about the axis."""
     c, sigma = spectrum
     energy = _energy_over_noise(c, sigma)
     energy[0] = 0.0
