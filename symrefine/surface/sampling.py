@@ -90,7 +90,6 @@ def sampling(
     size = len(points)
     kept: Index = np.arange(size)
     taken: list[Index] = []
-    lone: list[Index] = []
     if len(points) <= AROUND or points.std() == 0.0:
         return Sampling.as_given(size)
     some = some_of(points, rng)
@@ -106,8 +105,7 @@ def sampling(
         taken += [kept[c] for c in found]
         kept = _without(kept, taken, size)
         around = around_some(points[kept], rng)
-    if outliers and groups and not foreign:
-        lone = [kept[b] for b in filled(points[kept], around, rng)]
+    lone = [kept[b] for b in filled(points[kept], around, rng)] if outliers and groups and not foreign else []
     if foreign:
         taken += [np.intersect1d(group, kept, assume_unique=True) for group in foreign]
         kept = _without(kept, taken, size)
