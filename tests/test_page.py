@@ -191,9 +191,34 @@ def test_an_inversion_alone_has_its_row() -> None:
     assert "Under it, 95 % of the points meet their images" in text
 
 
+MORE = "more than what was meant so mostly does."
+
+
+@pytest.mark.parametrize(
+    ("excesses", "group", "said"),
+    [
+        ([1.2, 3.0], "Cs", []),
+        ([0.31, 3.0], "Cs", [f"Those below 1 exclude what was found, or miss by {MORE}"]),
+        ([0.31, 3.0], "C1", [f"Those below 1 miss by {MORE}"]),
+        ([0.0, 0.31], "Cs", ["One of 0.00 holds as well as what was found: the two exclude one another."]),
+    ],
+)
+def test_near_misses_are_told_together(excesses: list[float], group: str, said: list[str]) -> None:
+    first, *others = words.all_turned_down(excesses, group)
+    assert first.endswith("they miss by `x limit` times what the tolerance allows.")
+    assert others == said
+
+
+def test_where_several_places_are_as_likely_the_group_is_told_to_be_surer_than_where() -> None:
+    assert words.elsewhere("Cs", 0.99, [0.99]) == ""
+    assert words.elsewhere("C1", 0.99, []) == ""
+    assert words.elsewhere("Cs", 0.99, [0.33]).startswith("That it is Cs is surer than where")
+
+
 def test_a_near_miss_that_holds_is_told_to_be_excluded() -> None:
     assert words.turned_down(1.25, 0.02, "Cs") == "It was turned down: 1.25 times what a tolerance of 2 % allows."
     assert words.turned_down(0.004, 0.02, "C1").startswith("It was turned down: 0.00 times")
+    assert words.turned_down(0.31, 0.02, "Cs").endswith("allows; it excludes what was found, or misses by " + MORE)
     found = detect(table())
     excess = {"residual": found.planes[0].residual, "kind": "plane", "direction": np.eye(3)[0], "point": found.center}
     miss = NearMiss(**excess, order=1.0, excess=0.0)

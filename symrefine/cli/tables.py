@@ -15,7 +15,8 @@ from symrefine.picture.words import (
     DOUBLETS,
     NO_FLOOR,
     TUPLES,
-    as_well,
+    all_turned_down,
+    elsewhere,
     evened,
     exactly,
     kind_name,
@@ -30,7 +31,6 @@ Record = dict[str, Any]
 
 _RESIDUALS = ("mean", "p95", "max")
 _WORDS = ("kind",)
-_REFINED = "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows"
 
 
 def record_lines(record: Record) -> Iterator[Table | str]:
@@ -71,9 +71,10 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
     if record["planes"] or record["axes"] or record["inversion"] or record["near_misses"]:
         yield "Offsets in units of the file, misses in % of the diagonal; axes go through the centre."
     if record["near_misses"]:
-        yield f"{_REFINED}, or, below 1, by more than what was meant so mostly does."
-        if record["point_group"] != "C1" and any(as_well(miss["excess"]) for miss in record["near_misses"]):
-            yield "One of 0.00 holds as well as what was found: the two exclude one another."
+        yield from all_turned_down([miss["excess"] for miss in record["near_misses"]], record["point_group"])
+    each = [e["confidence"] for e in (*record["planes"], *record["axes"])]
+    if told := elsewhere(record["point_group"], record["confidence"], each):
+        yield told
     if record["alternatives"]:
         yield f"It may be meant otherwise: {otherwise(record)}."
     if record["staircase"]:
@@ -184,7 +185,7 @@ def planar_lines(record: Record) -> Iterator[Table | str]:
     yield ""
     yield "Offsets in units of the file (of a picture: pixels, y up), misses in % of the diagonal."
     if record["near_misses"]:
-        yield f"{_REFINED}."
+        yield from all_turned_down([miss["excess"] for miss in record["near_misses"]], record["point_group"])
     yield f"{seconds(record)} s"
 
 

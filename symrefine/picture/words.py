@@ -1,7 +1,7 @@
 """What a point group means, in words a person reads."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 
 from symrefine.detection.result import Detection
 from symrefine.geometry import Array, positive
@@ -10,6 +10,7 @@ from symrefine.ndim.detection import SubspaceDetection
 from symrefine.plane.detection import PlanarDetection
 from symrefine.surface.misses import LIMITS
 
+_MORE = "more than what was meant so mostly does"
 _NAMED = {
     "C1": "no symmetry",
     "Cs": "one mirror plane",
@@ -215,7 +216,28 @@ def turned_down(excess: float, tolerance: float, group: str) -> str:
     """Why something was turned down where a group was found, in a sentence."""
     if as_well(excess) and group != "C1":
         return "It holds as well as what was found, and the two exclude one another."
-    return f"It was turned down: {excess:.2f} times what a tolerance of {percent(tolerance)} allows."
+    told = f"It was turned down: {excess:.2f} times what a tolerance of {percent(tolerance)} allows"
+    if excess >= 1.0:
+        return f"{told}."
+    excluded = "" if group == "C1" else "excludes what was found, or "
+    return f"{told}; it {excluded}misses by {_MORE}."
+
+
+def all_turned_down(excesses: Sequence[float], group: str) -> Iterator[str]:
+    """The same of all near misses, in sentences about a column `x limit`."""
+    yield "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows."
+    if group != "C1" and any(map(as_well, excesses)):
+        yield "One of 0.00 holds as well as what was found: the two exclude one another."
+    elif min(excesses) < 1.0:
+        excluded = "" if group == "C1" else "exclude what was found, or "
+        yield f"Those below 1 {excluded}miss by {_MORE}."
+
+
+def elsewhere(group: str, confidence: float, each: Sequence[float]) -> str:
+    """That a group is surer than where it stands, if it is surer than any of its elements; else nothing."""
+    if not each or max(each) >= confidence:
+        return ""
+    return f"That it is {group} is surer than where: it may stand elsewhere as well, and not in two places at once."
 
 
 def kind_name(kind: str, order: float = 0.0) -> str:
