@@ -114,10 +114,27 @@ def test_what_is_missed_by_more_than_it_may_be_off_ends_early(monkeypatch):
     across = Placed(group=PointGroup(name="Cs", frame=frame_with_z(np.eye(3)[0])), center=center)
     steps: list[int] = []
     monkeypatch.setattr(looks, "refine", lambda *args, **given: (steps.append(1) or i for i in refine(*args, **given)))
-    looked_at(surface, across, np.inf, useful=1.5 * surface.tolerance)
+    looked_at(surface, across, np.inf, follow=1.5 * surface.tolerance)
     assert len(steps) == SHORT + 1
     assert looked_at(surface, across, np.inf).needs > 1.5 * surface.tolerance
     assert len(steps) > 2 * (SHORT + 1)
+
+
+@pytest.mark.parametrize("follow", [0.0, 0.02, 0.03, 0.05, 0.2])
+@pytest.mark.parametrize("angle", [0.3, 0.8, 1.4])
+def test_what_is_not_worth_to_follow_needs_more_than_that_wherever_it_is_followed_to(angle, follow, monkeypatch):
+    """Mirrors through the axis of a mug but beside its handle: a bound ends the fit on a whole surface, too."""
+    measured = measure(Shape(points=sample(mug(), 20000, 0.0, np.random.default_rng(4))))
+    surface = gather(measured, np.random.default_rng(0))[1]
+    assert not surface.is_open
+    frame = frame_with_z([np.cos(angle), np.sin(angle), 0.0])
+    beside = Placed(group=PointGroup(name="Cs", frame=frame), center=np.zeros(3))
+    steps: list[int] = []
+    monkeypatch.setattr(looks, "refine", lambda *args, **given: (steps.append(1) or i for i in refine(*args, **given)))
+    told = looked_at(surface, beside, np.inf, follow=follow).needs
+    ended = len(steps) == SHORT + 1
+    assert (told > follow and looked_at(surface, beside, np.inf).needs > follow) if ended else follow > 0.0
+    assert ended or follow > surface.tolerance
 
 
 @pytest.mark.parametrize("evident", [False, True])

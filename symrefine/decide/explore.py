@@ -193,16 +193,19 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
         if glance >= hopeless(start_error(surface)):
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
             continue
-        look = looked_at(surface, start, COARSE * pool.limit, pool.has_as_seen, useful=ALIKE * pool.limit)
+        useful = ALIKE * pool.limit
+        # Of a whole surface the first few tell what a larger tolerance may take.
+        follow = useful if surface.is_open or len(pool.looked) >= FOLLOWED else math.inf
+        look = looked_at(surface, start, COARSE * pool.limit, pool.has_as_seen, useful=useful, follow=follow)
         moved, needs = look.placed, look.needs
         pool = replace(pool, looks=(*pool.looks, (glance, moved)))
-        if needs > ALIKE * pool.limit:
+        if needs > useful:
             pool = replace(pool, looked=(*pool.looked, (moved, needs)))
-            parts += _holding(surface, moved, ALIKE * pool.limit)
+            parts += _holding(surface, moved, useful)
         elif not pool.has(moved, needs) and not pool.met(moved):
             pool = _joined_at_once(surface, pool, moved) if needs <= pool.limit and pool.largest.elements else pool
             if not pool.has(moved, needs):
-                found = fitted(surface, moved, error_rad=look.error_rad, close=ALIKE * pool.limit)
+                found = fitted(surface, moved, error_rad=look.error_rad, close=useful)
                 if surface.openings is None or surface.viewed or found.supported >= SUPPORTED:
                     pool = _grown(surface, pool, found)
                     # What does not hold may have elements that do, which nothing else proposes.

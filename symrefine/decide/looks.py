@@ -65,12 +65,13 @@ def looked_at(
     known: Callable[[Placed], bool] = lambda _: False,
     *,
     useful: float = math.inf,
+    follow: float = math.inf,
 ) -> Look:
     """A fit on a few points; one that needs more than `most` after `SHORT` steps ends, and is judged by fewer.
 
-    One that comes to what is `known` to need nothing ends there, and one that will need more than is `useful`. What it
-    asks to believe in is needed as well, and one that asks for more than that, or needs more wherever it is moved
-    sideways, stays where the fit put it.
+    One that comes to what is `known` to need nothing ends there, and one that wherever the fit goes will need more than
+    is worth to `follow`. What it asks to believe in is needed as well, and one that asks for more than is `useful`, or
+    needs more wherever it is moved sideways, stays where the fit put it.
     """
     state, error, history = start.roughly_framed(), start_error(surface), list[Iterate]()
     stride = look_stride(surface, len(state.standard))
@@ -86,7 +87,10 @@ def looked_at(
             # No image is farther off than by twice what the group may be, as of a mirror.
             reach = 2.0 * min(error, RIM * iterate.step) / surface.diagonal
             needs, asked, least = _told(surface, here, GLANCE, reach)
-            if needs > most or least > useful:
+            if needs > most:
+                break
+            if least > follow:
+                needs = needs if surface.is_open else seems(surface, here)
                 break
     else:
         needs, asked, _ = _told(surface, start.moved(iterate.state), LOOK)
@@ -277,11 +281,9 @@ def _told(surface: Surface, placed: Placed, sources: int, reach: float = 0.0) ->
     motions = few_motions(placed)
     seen = surface.seen(surface.misses(motions, sources=sources), motions, sources=sources, together=True)
     needs = float(surface.needed(seen, motions, GLANCED).max())
-    if not surface.is_open:
-        return needs, 0.0, 0.0
     # Misses end early on open surfaces, so that a group may need more than it seems to.
     least = float(surface.needed(np.maximum(seen - reach, 0.0), motions, GLANCED).max()) if reach else needs
-    if surface.viewed:
+    if not surface.is_open or surface.viewed:
         return needs, 0.0, least
     each = [surface.coverage(miss[None], [m], sources=sources).belief for miss, m in zip(seen, motions, strict=True)]
     return needs, surface.tolerance * sorted(each)[len(each) // 2], least
