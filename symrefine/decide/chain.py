@@ -9,13 +9,13 @@ from dataclasses import replace
 from functools import partial
 from operator import attrgetter
 
-from symrefine.decide.broken import unbroken
-from symrefine.decide.hypotheses import NOTHING, Hypothesis, fitted, has_all, hidden_need
+from symrefine.decide.hypotheses import NOTHING, Hypothesis, fitted, has_all, hidden_need, single
 from symrefine.decide.joins import better_parts, is_loose, join, size_of
 from symrefine.decide.looks import COARSE, by_chance
-from symrefine.decide.place import least_elsewhere
+from symrefine.decide.place import is_told, least_elsewhere
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import ALIKE, ALONE
+from symrefine.fit.placed import joined
 from symrefine.samples import FOLLOWED
 from symrefine.surface.surface import Surface
 
@@ -71,12 +71,34 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     links = [_excluded(link, links[i + 1 :], limit) for i, link in enumerate(links)]
     told = [NOTHING]
     for link in links[1:]:
-        part = unbroken(surface, link)
+        part = _unbroken(surface, link)
         if part and part.holds(told[-1].placed) and not told[-1].holds(part.placed):
             need, elsewhere = min(max(part.need, told[-1].need), link.need), least_elsewhere(surface, part.placed)
             told.append(replace(part, need=need, elsewhere=elsewhere))
         told.append(link)
     return tuple(told)
+
+
+def _unbroken(surface: Surface, found: Hypothesis) -> Hypothesis | None:
+    """What stays of a group where something that no camera saw breaks a mirror that is no image of others.
+
+    Of a mirror across an axis of order 3 or more that leaves what keeps the direction of the axis; of several mirrors
+    that are all such, the one of which cameras saw most. Otherwise None, as of Cs and C2h, and where too little was
+    seen to tell what is left.
+    """
+    group, lone = found.group, found.group.lone_mirrors() if surface.viewed else ()
+    mirrors = [e for e in found.elements if e.operations.kind == "plane"]
+    if len(lone) == 1 and group.symbol.fold > 2:
+        axis = group.frame[2]
+        kept = tuple(e for e in found.elements if all(axis @ m @ axis > 0.0 for m in e.operations.matrices))
+        placed = joined([e.operations.alone(e.center) for e in kept]) if kept else None
+        if placed is None or not is_told(placed, [(e.operations, e.coverage.supported) for e in kept]):
+            return None
+        return Hypothesis(placed=placed, elements=kept, need=max(e.need for e in kept))
+    if 1 < len(mirrors) == len(lone):
+        first, *others = sorted((single(e) for e in mirrors), key=lambda h: -h.supported)
+        return replace(first, rivals=tuple(h.placed for h in others))
+    return None
 
 
 def _worst(found: Hypothesis, hidden: float) -> tuple[float, float]:

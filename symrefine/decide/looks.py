@@ -219,9 +219,9 @@ def _sideways(placed: Placed) -> Array:
     return np.asarray(vectors[:, values > ROUNDED * values[-1]].T)
 
 
-def seems(surface: Surface, placed: Placed, sources: int = LOOK) -> float:
+def seems(surface: Surface, placed: Placed) -> float:
     """What a group where it stands needs, as a few operations tell on a few points."""
-    return float(surface.needs(few_motions(placed), sources=sources, tests=GLANCED, together=True).max())
+    return float(surface.needs(few_motions(placed), sources=LOOK, tests=GLANCED, together=True).max())
 
 
 def unmet_by(surface: Surface, placed: Placed, sources: int) -> Mask:

@@ -150,12 +150,12 @@ def meant(link: Link, tolerance: float, noise: float = 0.0, curve: Curve = SPACE
     return link.placed * float(1.0 / (1.0 + strained ** (sharpness(noise / tolerance, curve.steepness) / 2.0)))
 
 
-def certain(tolerance: float, noise: float = 0.0, curve: Curve = SPACE) -> float:
+def certain(tolerance: float, noise: float = 0.0) -> float:
     """The need up to which a group leaves less doubt at a tolerance than is worth telling.
 
     In noise, which needs so many tolerances, the one that strains a group as much.
     """
-    return float(curve.even * tolerance * LEAST ** (1.0 / curve.steepness) / math.hypot(1.0, BLURRED * noise))
+    return float(EVEN * tolerance * LEAST ** (1.0 / STEEPNESS) / math.hypot(1.0, BLURRED * noise))
 
 
 def least_told(noise: float) -> float:
