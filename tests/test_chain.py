@@ -203,14 +203,14 @@ def test_parts_of_one_need_are_joined_at_once():
 
 
 def test_the_largest_group_brings_its_exact_elements():
-    links = chain(ring()[1], Pool(largest=needing(of("C6v"), 0.025, turns=0.0), small=()), LIMIT)
+    links = chain(ring()[1], Pool(largest=needing(of("C6v"), 0.025, turns=0.0), limit=LIMIT), LIMIT)
     assert [h.group.name for h in links][:2] == ["C1", "C6"]
     assert links[1].need < 1e-9
 
 
 def test_a_group_that_is_not_the_largest_brings_its_better_elements_as_well():
     """Turns of a fat screw hold, and its mirrors nearly: it was C1, and sure, as all were joined to what is round."""
-    links = chain(ring()[1], Pool(small=(needing(of("C2v"), 0.02, turns=0.01),)), LIMIT)
+    links = chain(ring()[1], Pool(small=(needing(of("C2v"), 0.02, turns=0.01),), limit=LIMIT), LIMIT)
     assert [h.group.name for h in links] == ["C1", "C2", "C2v"]
     assert links[-1].need == 0.02
 

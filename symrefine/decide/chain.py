@@ -36,8 +36,9 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     # What is hidden by noise, or by the least tolerance that is asked for, tells no two groups apart.
     hidden = max(hidden_need(surface), pool.nothing / ALIKE)
     worst = partial(_worst, hidden=hidden)
-    fitted_ones = (*pool.small, pool.largest)
-    every = [*fitted_ones, *(part for h in fitted_ones for part in better_parts(h)), *near]
+    # What does not hold within the limit had its better elements tried.
+    holding = (h for h in (*pool.small, pool.largest) if h.need <= pool.limit)
+    every = [*pool.small, *(part for h in holding for part in better_parts(h)), pool.largest, *near]
     rest = sorted((h for h in every if h.need <= hidden or not by_chance(seen, h.placed)), key=worst)
     known = [pool.largest, *pool.failed, *pool.small]
     links = [NOTHING, *[h for h in every if h.proven][:1]]
