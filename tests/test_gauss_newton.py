@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares, rosen
 
-from symrefine.fit.gauss_newton import Linearisation, minimise, minimise_all
+from symrefine.fit.gauss_newton import Linearisation, Linearisations, minimise, minimise_all
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -135,8 +135,8 @@ def test_the_start_is_not_touched_and_the_solution_is_read_only():
 def many(residual, jacobian):
     def linearise(x, _):
         r, J = (np.array([f(row) for row in x]) for f in (residual, jacobian))
-        return Linearisation(
-            cost=(r**2).sum(axis=1), gradient=np.einsum("kri,kr->ki", J, r), hessian=J.transpose(0, 2, 1) @ J
+        return Linearisations(
+            costs=(r**2).sum(axis=1), gradients=np.einsum("kri,kr->ki", J, r), hessians=J.transpose(0, 2, 1) @ J
         )
 
     return linearise
@@ -151,7 +151,7 @@ def test_each_start_ends_where_it_would_alone(residual, jacobian):
     for k, start in enumerate(starts):
         alone = minimise(problem(residual, jacobian), start, max_steps=40, longest=0.5)
         np.testing.assert_allclose(found.x[k], alone.x, rtol=1e-12)
-        assert found.cost[k] == pytest.approx(alone.cost, rel=1e-12)
+        assert found.costs[k] == pytest.approx(alone.cost, rel=1e-12)
         assert (found.steps[k], found.converged[k]) == (alone.steps, alone.converged)
 
 
@@ -161,7 +161,7 @@ def test_a_start_ends_where_its_step_gains_less_than_is_asked_for():
     best, found = (minimise_all(linearise, starts, max_steps=40, least=least) for least in (0.0, 0.01))
     assert found.converged.all()
     assert (found.steps < best.steps).all()
-    np.testing.assert_allclose(found.cost, best.cost, rtol=0.02)
+    np.testing.assert_allclose(found.costs, best.costs, rtol=0.02)
 
 
 def test_no_step_is_longer_than_allowed():

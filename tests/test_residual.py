@@ -150,7 +150,7 @@ def test_results_belong_to_their_caller():
 
     small = [np.diag([1.0, 2, 3]), np.diag([5.0, 1, 1])]
     thetas = theta_models(np.array(small), np.full((2, 1), 0.3))
-    assert thetas.hessian[0, 0, 0] != thetas.hessian[1, 0, 0]
+    assert thetas.hessians[0, 0, 0] != thetas.hessians[1, 0, 0]
 
 
 def test_arguments_are_not_changed():
@@ -254,7 +254,7 @@ def test_the_theta_model_is_the_cost_of_the_plane_at_that_angle(theta):
 
     at = np.array([theta])
     beside = theta_models(np.stack([np.eye(3), small]), np.array([[0.7], at]))  # planes side by side do not mix
-    found, J = [v[1] for v in (beside.cost, beside.gradient, beside.hessian)], jacobian(residuals, at)
+    found, J = [v[1] for v in (beside.costs, beside.gradients, beside.hessians)], jacobian(residuals, at)
     phi = coordinates(Isometry.reflection(axis_planes(frame, point, theta)))
     assert found[0] == pytest.approx(phi @ big @ phi, rel=1e-10)
     assert found[0] == pytest.approx(np.sum(residuals(at) ** 2), rel=1e-10)

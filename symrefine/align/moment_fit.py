@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from symrefine.fit.gauss_newton import Linearisation, minimise_all
+from symrefine.fit.gauss_newton import Linearisations, minimise_all
 from symrefine.fit.refine import MAX_OUTER, WITHIN_NOISE
 from symrefine.geometry import Array, orthogonal_factor
 from symrefine.moments.harmonics import FLOOR
@@ -119,11 +119,11 @@ def fit(pair: MomentPair, starts: Array) -> Fits:
     """
     root = np.sqrt(pair.weights)
 
-    def linearise(matrices: Array, _: Index) -> Linearisation:
+    def linearise(matrices: Array, _: Index) -> Linearisations:
         here = pair.moved(matrices)
         r, j = root * (here - pair.target[0]), root * pair.action.tangents(here)
-        return Linearisation(
-            cost=np.einsum("ki,ki->k", r, r), gradient=(j @ r[:, :, None])[:, :, 0], hessian=j @ j.transpose(0, 2, 1)
+        return Linearisations(
+            costs=np.einsum("ki,ki->k", r, r), gradients=(j @ r[:, :, None])[:, :, 0], hessians=j @ j.transpose(0, 2, 1)
         )
 
     found = minimise_all(
@@ -135,8 +135,8 @@ def fit(pair: MomentPair, starts: Array) -> Fits:
         longest=LONGEST,
         least=WITHIN_NOISE**2 * len(planes(starts.shape[1])) / pair.size,
     )
-    order, matrices = np.argsort(found.cost, kind="stable"), orthogonal_factor(found.x)
-    return Fits(matrices=matrices, costs=found.cost, hessians=found.hessian, moved=pair.moved(matrices))[order]
+    order, matrices = np.argsort(found.costs, kind="stable"), orthogonal_factor(found.x)
+    return Fits(matrices=matrices, costs=found.costs, hessians=found.hessians, moved=pair.moved(matrices))[order]
 
 
 def best_fits(pair: MomentPair, starts: Array) -> Fits:

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symrefine.geometry import Array, ReadOnly
 from symrefine.shape import Index
@@ -13,31 +13,49 @@ from symrefine.shape import Index
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Linearisation:
-    """Cost `r'r`, gradient `J'r` [n] and Gauss-Newton matrix `J'J` [n, n] at one point; or of K, [K] in front."""
+    """Cost `r'r`, gradient `J'r` and Gauss-Newton matrix `J'J` at one point."""
 
-    cost: Any
+    cost: float
     gradient: Array
     hessian: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Solution(ReadOnly):
-    """Where the iteration stopped, with the evidence: `steps` accepted steps, and whether it converged.
+class Linearisations:
+    """The same at K points: costs [K], gradients [K, n] and matrices [K, n, n]."""
 
-    Of K problems side by side all have [K] in front.
-    """
+    costs: Array
+    gradients: Array
+    hessians: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Solution(ReadOnly):
+    """Where the iteration stopped, with the evidence: `steps` accepted steps, and whether it converged."""
 
     x: Array
-    cost: Any
+    cost: float
     hessian: Array
-    steps: Any
-    converged: Any
+    steps: int
+    converged: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Solutions:
+    """The same for K problems: x [K, ...], costs [K], hessians [K, n, n], accepted steps [K], converged [K]."""
+
+    x: Array
+    costs: Array
+    hessians: Array
+    steps: NDArray[np.intp]
+    converged: NDArray[np.bool_]
 
 
 def minimise(
     linearise: Callable[[Array], Linearisation],
     start: Array,
     *,
+    first: Linearisation | None = None,
     move: Callable[[Array, Array], Array] = np.add,
     max_steps: int = 6,
     tolerance: float = 1e-6,
@@ -48,43 +66,41 @@ def minimise(
     Args:
         linearise: cost, gradient [n] and Gauss-Newton matrix [n, n] in small steps from x.
         start: [n], or whatever `move` moves.
+        first: what `linearise` says of the start, if that is known.
         move: x after a step [n].
         max_steps: evaluations after the first.
         tolerance: converged once a step is shorter than this.
         longest: steps are cut to this length.
     """
-
-    def alone(x: Array, _: Index) -> Linearisation:
-        here = linearise(x[0])
-        return Linearisation(cost=np.array([here.cost]), gradient=here.gradient[None], hessian=here.hessian[None])
-
-    found = minimise_all(
-        alone,
-        start[None],
-        move=lambda x, step: move(x[0], step[0])[None],
-        max_steps=max_steps,
-        tolerance=tolerance,
-        longest=longest,
-    )
-    return Solution(
-        x=found.x[0],
-        cost=float(found.cost[0]),
-        hessian=found.hessian[0],
-        steps=int(found.steps[0]),
-        converged=bool(found.converged[0]),
-    )
+    x: Array = np.array(start, dtype=np.float64)
+    here = first or linearise(start)
+    damping: Array = np.zeros(())
+    steps, converged = 0, here.hessian.trace() <= 0.0
+    for _ in range(max_steps):
+        if converged:
+            break
+        step = _steps(here.gradient, here.hessian, damping)
+        length = math.sqrt(step @ step)
+        trial = move(x, step if length <= longest else step * (longest / length))
+        there = linearise(trial)
+        better = there.cost <= here.cost
+        if better:
+            x, here, steps = trial, there, steps + 1
+        damping = _next_damping(damping, better)
+        converged = length < tolerance or here.hessian.trace() <= 0.0
+    return Solution(x=x, cost=here.cost, hessian=here.hessian, steps=steps, converged=bool(converged))
 
 
 def minimise_all(
-    linearise: Callable[[Array, Index], Linearisation],
+    linearise: Callable[[Array, Index], Linearisations],
     starts: Array,
     *,
     move: Callable[[Array, Array], Array] = np.add,
     max_steps: int = 6,
     tolerance: float = 1e-6,
-    longest: float = math.inf,
+    longest: float = np.inf,
     least: float = 0.0,
-) -> Solution:
+) -> Solutions:
     """`minimise` from K starts [K, ...] at once; each ends where it would alone, or sooner with `least`.
 
     Args:
@@ -97,7 +113,7 @@ def minimise_all(
         least: it has as well once a step that it took was promised to lower the cost by less than this share.
     """
     x, first = np.array(starts, dtype=np.float64), linearise(starts, np.arange(len(starts)))
-    costs, gradients, hessians = first.cost.copy(), first.gradient.copy(), first.hessian.copy()
+    costs, gradients, hessians = first.costs.copy(), first.gradients.copy(), first.hessians.copy()
     damping, steps = np.zeros(len(x)), np.zeros(len(x), dtype=np.intp)
     converged = np.trace(hessians, axis1=1, axis2=2) <= 0.0
     for _ in range(max_steps):
@@ -109,21 +125,26 @@ def minimise_all(
         step *= np.minimum(1.0, longest / np.maximum(length, 1e-300))[:, None]
         trial, worth = move(x[active], step), gain >= least * costs[active]
         there = linearise(trial, active)
-        better = there.cost <= costs[active]
+        better = there.costs <= costs[active]
         taken = active[better]
-        x[taken], costs[taken] = trial[better], there.cost[better]
-        gradients[taken], hessians[taken] = there.gradient[better], there.hessian[better]
+        x[taken], costs[taken] = trial[better], there.costs[better]
+        gradients[taken], hessians[taken] = there.gradients[better], there.hessians[better]
         steps[taken] += 1
-        damping[active] = np.where(better, damping[active] / 10, np.maximum(10 * damping[active], 1e-4))
+        damping[active] = _next_damping(damping[active], better)
         converged[active] = (
             (length < tolerance) | (better & ~worth) | (np.trace(hessians[active], axis1=1, axis2=2) <= 0.0)
         )
-    return Solution(x=x, cost=costs, hessian=hessians, steps=steps, converged=converged)
+    return Solutions(x=x, costs=costs, hessians=hessians, steps=steps, converged=converged)
+
+
+def _next_damping(damping: Array, better: bool | NDArray[np.bool_]) -> Array:
+    """Damping [...] after steps, from that before them and whether they descended."""
+    return np.where(better, damping / 10, np.maximum(10 * damping, 1e-4))
 
 
 def _steps(gradients: Array, hessians: Array, damping: Array) -> Array:
-    """Damped Gauss-Newton steps [K, n], by shares [K] of the largest curvature."""
-    scale = np.diagonal(hessians, axis1=1, axis2=2).max(axis=1)
+    """Damped Gauss-Newton steps [..., n], by shares [...] of the largest curvature."""
+    scale = np.diagonal(hessians, axis1=-2, axis2=-1).max(axis=-1)
     added = scale * np.maximum(damping, 1e-12)
-    damped = hessians + added[:, None, None] * np.eye(gradients.shape[-1])
+    damped = hessians + added[..., None, None] * np.eye(gradients.shape[-1])
     return np.asarray(-np.linalg.solve(damped, gradients[..., None])[..., 0])

@@ -244,17 +244,19 @@ def _solve(grams: Array, state: Framed, theta: float) -> tuple[Solution, Array, 
     def model(x: Array) -> Linearisation:
         return frame_model(grams, state.standard, state.frame, state.center, x)
 
-    values, vectors = np.linalg.eigh(model(np.zeros(6)).hessian)
+    here = model(np.zeros(6))
+    values, vectors = np.linalg.eigh(here.hessian)
     seen = values > DOUBLE * values[-1]
     basis = vectors[:, seen]
 
-    def within(y: Array) -> Linearisation:
-        full = model(basis @ y)
+    def within(full: Linearisation) -> Linearisation:
         return Linearisation(cost=full.cost, gradient=basis.T @ full.gradient, hessian=basis.T @ full.hessian @ basis)
 
+    start = basis.T @ np.array([0.0, 0.0, theta, 0.0, 0.0, 0.0])
     solution = minimise(
-        within,
-        basis.T @ np.array([0.0, 0.0, theta, 0.0, 0.0, 0.0]),
+        lambda y: within(model(basis @ y)),
+        start,
+        first=within(model(basis @ start) if theta else here),
         # What a step leaves is about its square (radians, RMS radii), and the next iterate takes it.
         tolerance=math.sqrt(0.1 * SETTLED),
     )

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from symrefine.fit.gauss_newton import Linearisation
+from symrefine.fit.gauss_newton import Linearisation, Linearisations
 from symrefine.geometry import Array, Isometry, cross_matrix
 
 # Rows and columns of a Gram matrix: the nine entries of the operation, its shift, and one.
@@ -133,12 +133,12 @@ def turn_frame(frame: Array, w: Array) -> Array:
     return (np.eye(3) + 2 * s * k + 2 * k @ k) @ frame
 
 
-def theta_models(grams3: Array, thetas_rad: Array) -> Linearisation:
+def theta_models(grams3: Array, thetas_rad: Array) -> Linearisations:
     """Costs and derivatives in theta [b, 1] of planes through a fixed axis, each from its Gram matrix [b, 3, 3]."""
     count = len(thetas_rad)
     found = _compiled(_theta_function, count)(thetas_rad.T, _beside(grams3))
     costs, gradients, hessians = (_apart(output, count) for output in found)
-    return Linearisation(cost=costs[:, 0, 0], gradient=gradients[:, :, 0], hessian=hessians)
+    return Linearisations(costs=costs[:, 0, 0], gradients=gradients[:, :, 0], hessians=hessians)
 
 
 def frame_model(grams: Array, standard: Array, frame: Array, center: Array, x: Array) -> Linearisation:
