@@ -48,9 +48,9 @@ def thinned(source: Shape, target: Shape, seed: int) -> tuple[Shape, Shape]:
 
 def _spread(cloud: Shape) -> Array:
     """Variances [n] of the points along their principal axes, ascending, as shares of all."""
-    local = cloud.points - cloud.points[0]
-    local -= cloud.masses @ local / cloud.masses.sum()
-    values = np.linalg.eigvalsh((local * cloud.masses[:, None]).T @ local)
+    local, masses = cloud.points - cloud.points[0], cloud.masses
+    local -= masses @ local / masses.sum()
+    values = np.linalg.eigvalsh((local * masses[:, None]).T @ local)
     return np.asarray(values / max(float(values.sum()), 1e-300))
 
 

@@ -13,7 +13,7 @@ from symrefine.front.verbs import detect_in_space
 from symrefine.lengths import relative_tolerance
 from symrefine.load.objects import shape_of
 from symrefine.options import flag_of, whole_of
-from symrefine.picture.words import kind_name
+from symrefine.picture.words import MORE, kind_name
 from symrefine.surface.misses import TOLERANCE
 
 # Each verb imports what it needs when it is used.
@@ -176,6 +176,6 @@ def _nearest_miss(found: "Detection") -> str:
         return ""
     miss, allowed = found.near_misses[0], f"what a tolerance of {100 * found.tolerance:.3g} % allows"
     told = f"; the nearest, a {kind_name(miss.kind, miss.order)}, misses by {miss.excess:.2g} times {allowed}"
-    told += ", more than what was meant so mostly does" if miss.excess < 1.0 else ""
+    told += f", {MORE}" if miss.excess < 1.0 else ""
     told += "; parts of the surface were not seen" if found.is_partial else ""
     return f"{told}: choose a larger tolerance if that counts as symmetric"

@@ -10,7 +10,8 @@ from symrefine.ndim.detection import SubspaceDetection
 from symrefine.plane.detection import PlanarDetection
 from symrefine.surface.misses import LIMITS
 
-_MORE = "more than what was meant so mostly does"
+# By what something is turned down that the tolerance allows.
+MORE = "more than what was meant so mostly does"
 _NAMED = {
     "C1": "no symmetry",
     "Cs": "one mirror plane",
@@ -220,7 +221,7 @@ def turned_down(excess: float, tolerance: float, group: str) -> str:
     if excess >= 1.0:
         return f"{told}."
     excluded = "" if group == "C1" else "excludes what was found, or "
-    return f"{told}; it {excluded}misses by {_MORE}."
+    return f"{told}; it {excluded}misses by {MORE}."
 
 
 def all_turned_down(excesses: Sequence[float], group: str) -> Iterator[str]:
@@ -230,7 +231,7 @@ def all_turned_down(excesses: Sequence[float], group: str) -> Iterator[str]:
         yield "One of 0.00 holds as well as what was found: the two exclude one another."
     elif min(excesses) < 1.0:
         excluded = "" if group == "C1" else "exclude what was found, or "
-        yield f"Those below 1 {excluded}miss by {_MORE}."
+        yield f"Those below 1 {excluded}miss by {MORE}."
 
 
 def elsewhere(group: str, confidence: float, each: Sequence[float]) -> str:

@@ -110,9 +110,10 @@ def whitened(moments: Moments) -> Moments:
 
 def mirror_candidates(moments: Moments) -> list[Array]:
     """Normals of candidate mirror planes through the centre, raw and whitened spectrum together, least miss first."""
-    found = [local_minima(mirror_misses(m), count=16) for m in (whitened(moments), moments)]
+    count = 16
+    found = [local_minima(mirror_misses(m), count=count) for m in (whitened(moments), moments)]
     directions, misses = (np.concatenate(part) for part in zip(*found, strict=True))
-    return apart(directions[np.argsort(misses, kind="stable")], np.radians(5.0))[:16]
+    return apart(directions[np.argsort(misses, kind="stable")], np.radians(5.0))[:count]
 
 
 def apart(directions: Iterable[Array], angle_rad: float = START_ERROR) -> list[Array]:
