@@ -85,7 +85,7 @@ def looked_at(
             break
         if iterate.index == SHORT:
             # No image is farther off than by twice what the group may be, as of a mirror.
-            reach = 2.0 * min(error, RIM * iterate.step) / surface.diagonal
+            reach = 2.0 * min(error, RIM * iterate.step) / surface.diagonal if follow < math.inf else 0.0
             needs, asked, least = _told(surface, here, GLANCE, reach)
             if needs > most:
                 break
