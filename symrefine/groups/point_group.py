@@ -220,7 +220,7 @@ def point_group(name: str, frame: ArrayLike | None = None) -> PointGroup:
 
 def is_subgroup(a: PointGroup, b: PointGroup, tolerance_rad: float = SINGLE) -> bool:
     """Whether every operation of `a` is, within `tolerance_rad`, an operation of `b`, both where they stand."""
-    if b.is_finite and not a.is_finite:
+    if a.order > b.order:
         return False
     members = a.frame.T @ standard_operations(_sampled(a.symbol, 7)) @ a.frame
     return bool(_away_rad(b, members).max() <= tolerance_rad)
