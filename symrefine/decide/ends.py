@@ -11,7 +11,7 @@ from symrefine.decide.looks import few_motions
 from symrefine.geometry import Array, Isometry, Mask
 from symrefine.samples import GLANCE, LOOK
 from symrefine.surface.misses import SURE
-from symrefine.surface.openings import MOST, TELLING
+from symrefine.surface.openings import MOST, TELLING, in_a_row
 from symrefine.surface.surface import Surface
 from symrefine.surface.tree import Tree
 
@@ -22,14 +22,14 @@ KEPT = 0.5
 PLACES = 3
 
 
-def ends_there(surface: Surface, found: Hypothesis) -> bool:
+def ends_there(surface: Surface, found: Hypothesis, borders: Mask | None = None) -> bool:
     """Whether a group carries the open borders onto themselves, as what a sensor leaves out has no symmetry.
 
-    What it carries to where nothing was seen tells nothing of that.
+    What it carries to where nothing was seen tells nothing of that. Asked of all, or of the local planes [M] of some.
     """
     if surface.openings is None or surface.viewed or not surface.openings.line.any():
         return False
-    line, cloud = surface.openings.line, surface.cloud
+    line, cloud = surface.openings.line if borders is None else borders, surface.cloud
     classes, shares = cloud.classes(np.flatnonzero(line)), []
     for motion in _motions(found):
         away, near = cloud.nearest(motion.apply(cloud.points[line]), classes)
@@ -52,14 +52,14 @@ def ends_too(surface: Surface, found: Hypothesis, hidden: Sequence[tuple[Isometr
 
     What is `hidden_by` the group may not go on from there. And a handle at a rim breaks what the rest keeps: it comes
     to lie where the rim ends, which all other operations carry onto the rim. Few operations do not tell by themselves
-    where it ends, but by how much of the border they keep.
+    where it ends, but by how much they keep of the borders that it lies at: a cup has a rim, wherever its hole is.
     """
     if surface.viewed:
         return False  # what cameras see to be free says it
     if not _goes_on(surface, hidden):
         return True
     few = len(found.placed.motions()) < TELLING
-    return ends_there(surface, found) if few else seen_to_end(surface, found) > limit
+    return ends_there(surface, found, _borders_of(surface, hidden)) if few else seen_to_end(surface, found) > limit
 
 
 def hides_surely(surface: Surface, found: Hypothesis, limit: float) -> bool:
@@ -99,6 +99,20 @@ def hides_there(surface: Surface, hidden: Sequence[tuple[Isometry, Mask]]) -> bo
         for motion, some in hidden
     ]
     return MOST * float(np.median(shares)) >= 1.0
+
+
+def _borders_of(surface: Surface, hidden: Sequence[tuple[Isometry, Mask]]) -> Mask:
+    """Which local planes [M] make up the open borders that something lies at that is `hidden_by` a group."""
+    assert surface.openings is not None
+    cloud, line = surface.cloud, np.flatnonzero(surface.openings.line)
+    borders, row = Tree(cloud.points[line]), in_a_row(cloud.points[line], cloud.beside)
+    at = np.zeros(len(line), dtype=bool)
+    for motion, some in hidden:
+        away, near = borders.nearest(motion.apply(cloud.points[some]))
+        at |= np.isin(row, row[near[away < cloud.beside]])
+    found = np.zeros(len(cloud.points), dtype=bool)
+    found[line[at]] = True
+    return found
 
 
 def _goes_on(surface: Surface, hidden: Sequence[tuple[Isometry, Mask]]) -> bool:

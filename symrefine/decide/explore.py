@@ -141,7 +141,7 @@ def _of_part(surface: Surface, whole: Pool) -> Pool:
         pool = _grown(surface, pool, h)
     # Votes find most of what was found of the whole, and better, as nothing that is missing biases them.
     pool = _with(surface, pool, voted)
-    pool = _with(surface, pool, _by_details(surface, pool))
+    pool = _with(surface, pool, _by_details(surface, pool), anew=True)
     for h in known:
         pool = pool if pool.has(h.placed, h.need) else _grown(surface, pool, fitted(surface, h.placed))
     return pool
@@ -159,9 +159,9 @@ def _by_details(surface: Surface, pool: Pool) -> list[Placed]:
     return beside_details(nearly_round, details)
 
 
-def _with(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
+def _with(surface: Surface, pool: Pool, starts: Iterable[Placed], *, anew: bool = False) -> Pool:
     """The pool with candidates tried, and then the neighbours of its largest group, as long as that grows."""
-    before, pool = pool.largest, _tried(surface, pool, starts)
+    before, pool = pool.largest, _tried(surface, pool, starts, anew=anew)
     while pool.largest is not before:
         before = pool.largest
         pool = _tried(surface, pool, beside(before.placed))
@@ -179,11 +179,14 @@ def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tup
     return best[:LOOKED] if surface.is_open else best
 
 
-def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> Pool:
-    """The pool with candidates fitted, but for those that the group so far has anyway."""
+def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], *, anew: bool = False) -> Pool:
+    """The pool with candidates fitted, but for those that the group so far has anyway.
+
+    And, unless they are tried `anew`, for those beside one that was seen to be no better.
+    """
     parts, inside = list[Placed](), 0
     for start, glance in _glanced(surface, pool, starts):
-        if not pool.wants(start) or pool.shows(start, glance, whole=not surface.is_open):
+        if not pool.wants(start) or (not anew and pool.shows(start, glance, whole=not surface.is_open)):
             continue
         # Parts of what is round beyond doubt only matter to smaller tolerances, and the first of them tell.
         clear = not pool.largest.group.is_finite and pool.largest.need <= doubtless(surface)

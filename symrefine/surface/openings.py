@@ -184,7 +184,9 @@ class Openings:
         free = (most * begins >= every - both) & (every > 0)
         if there_openings.doubted and there_openings.ends is not None:
             sure = at_border & ~there_openings.ends[target][back]
-            free &= most * np.bincount(own, sure, whole) >= begins
+            # What ends before the others of its kind is where these go on to their ends, and not in the middle of them.
+            tips = np.bincount(patch[(away & self.border[::stride]).ravel()], minlength=whole)
+            free &= (most * np.bincount(own, sure, whole) >= begins) | (most * tips < begins)
         if len(group) >= TELLING and there.any():
             # What says nothing is asked where nothing else of a patch is at a border.
             asked = at_border | (there & (begins[own] == 0))
@@ -364,11 +366,16 @@ def _is_long(points: Array, width: float) -> bool:
     """
     if not len(points):
         return False
-    away, near = Tree(points).query(points, min(AROUND, len(points)))
-    linked = away < 2.0 * math.sqrt(2.0) * width
-    part = connected_parts(np.nonzero(linked)[0], near[linked], len(points))
+    part = in_a_row(points, 2.0 * math.sqrt(2.0) * width)
     middles = np.stack([np.bincount(part, column) for column in points.T], axis=1) / np.bincount(part)[:, None]
     return bool(np.linalg.norm(points - middles[part], axis=1).max() > width)
+
+
+def in_a_row(points: Array, within: float) -> Index:
+    """Number of the row that each of points [N, 3] belongs to: neighbours nearer than `within` hang together."""
+    away, near = Tree(points).query(points, min(AROUND, len(points)))
+    linked = away < within
+    return connected_parts(np.nonzero(linked)[0], near[linked], len(points))
 
 
 def _lines(cloud: LocalPlanes, chosen: Mask) -> Mask:
