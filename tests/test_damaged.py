@@ -30,7 +30,7 @@ from symrefine.decide.looks import COARSE, looked_at
 from symrefine.decide.pool import Pool
 from symrefine.detection import examination
 from symrefine.detection.measure import HIDDEN, gather, measure
-from symrefine.detection.story import detect
+from symrefine.detection.story import LADDER, detect
 from symrefine.errors import InputError
 from symrefine.fit.placed import FREE_TURNS, Placed
 from symrefine.geometry import Isometry, frame_with_z, householder, line_angle_rad, random_orthogonal, rotation, unit
@@ -715,6 +715,40 @@ def test_a_cut_across_the_axis_is_kept_by_all_that_is_left_and_open_all_the_same
     height = (points - points.mean(axis=0)) @ truth.group.rotation_axes()[0][0]
     found = detect(Pose.random(rng).of(points[height < np.quantile(height, 0.8)]))
     assert (found.point_group, found.at_least) == (group, True)
+
+
+def mug_with_a_hole(seed, share):
+    """A mug that noise makes the walls of thick, of which a share of the surface is gone."""
+    rng = np.random.default_rng([seed, round(100 * share), 0])
+    return damage.hole(specimen("household", "mug")[0], share, rng).points
+
+
+def test_the_rim_of_a_cup_says_nothing_of_a_hole_elsewhere():
+    """Its mirror keeps the rim, which is most of all borders, and nothing of the border that something is hidden by."""
+    found = detect(mug_with_a_hole(4, 0.1))
+    assert (found.point_group, found.at_least) == ("Cs", True)
+
+
+def test_no_thin_part_ends_in_the_middle_of_others():
+    """Sixteen neighbours tell no border in such noise, and nothing that ends is carried to where the wall is gone."""
+    found = detect(mug_with_a_hole(2, 0.15))
+    assert (found.point_group, found.at_least) == ("Cs", True)
+
+
+def test_what_details_tell_of_a_mirror_is_looked_at_whatever_was_seen_beside_it():
+    """Of what is nearly round any mirror nearby seems to do, and none does."""
+    found = detect(mug_with_a_hole(5, 0.1))
+    assert found.point_group == "Cs" or [a.point_group for a in found.alternatives] == ["Cs"]
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_lone_mirror_is_weighed_as_far_as_its_curve_goes_whatever_tolerances_are_told_besides(seed):
+    rng = np.random.default_rng([seed, 10, 5])
+    points = damage.hole(specimen("household", "mug")[0], 0.1, rng).points
+    points += 0.005 * np.linalg.norm(np.ptp(points, axis=0)) * rng.normal(size=points.shape)
+    alone, beside = detect(points), detect(points, ladder=LADDER)
+    assert [a.point_group for a in alone.alternatives] == ["Cs"]
+    assert (alone.point_group, alone.confidence) == (beside.point_group, pytest.approx(beside.confidence, abs=1e-9))
 
 
 @pytest.mark.parametrize("name", ["tray", "paddles", "radiator"])

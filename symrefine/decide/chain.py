@@ -14,7 +14,7 @@ from symrefine.decide.joins import better_parts, is_loose, join, size_of
 from symrefine.decide.looks import COARSE, by_chance
 from symrefine.decide.place import is_told, least_elsewhere
 from symrefine.decide.pool import Pool
-from symrefine.decide.posterior import ALIKE, ALONE
+from symrefine.decide.posterior import ALIKE, ALONE, lenience
 from symrefine.fit.placed import joined
 from symrefine.samples import FOLLOWED
 from symrefine.surface.surface import Surface
@@ -44,8 +44,9 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     links = [NOTHING, *[h for h in every if h.proven][:1]]
     while rest := [h for h in rest if not links[-1].holds(h.placed)]:
         here = links[-1]
-        # A mirror is a lone one by what the next group needs.
+        # A lone mirror is forgiven more, and is one by what the next group needs.
         most = max(limit, ALONE * here.need) if here.group.name == "Cs" else limit
+        most *= 1.0 if here.elements else lenience(rest[0].group.name)
         if rest[0].need > most:
             break
         level = max(ALIKE * rest[0].need, here.need, hidden)

@@ -13,7 +13,7 @@ import numpy as np
 
 from symrefine.decide.looks import COARSE, Look, exact_need, least_around, mended, seems, slid
 from symrefine.decide.place import is_told, least_elsewhere
-from symrefine.decide.posterior import EVEN, EVEN_MIRROR, certain
+from symrefine.decide.posterior import certain, lenience
 from symrefine.fit.placed import FITTED, Operations, Placed, elements
 from symrefine.fit.refine import SHORT, Iterate, refine
 from symrefine.geometry import Array, Axis, Isometry, frame_with_z, rotation
@@ -357,7 +357,7 @@ def belief_in_as_much(surface: Surface, placed: Placed) -> float:
 
     A lone mirror is forgiven more for being made inexactly, not for what nobody saw of it.
     """
-    return surface.tolerance * (EVEN_MIRROR / EVEN if placed.group.name == "Cs" else 1.0)
+    return surface.tolerance * lenience(placed.group.name)
 
 
 def _moved_each(operations: int, least: int) -> int:

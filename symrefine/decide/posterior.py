@@ -150,6 +150,11 @@ def meant(link: Link, tolerance: float, noise: float = 0.0, curve: Curve = SPACE
     return link.placed * float(1.0 / (1.0 + strained ** (sharpness(noise / tolerance, curve.steepness) / 2.0)))
 
 
+def lenience(point_group: str) -> float:
+    """How many times as much a group of that name is forgiven as others, if it is a lone mirror."""
+    return EVEN_MIRROR / EVEN if point_group == "Cs" else 1.0
+
+
 def certain(tolerance: float, noise: float = 0.0) -> float:
     """The need up to which a group leaves less doubt at a tolerance than is worth telling.
 
