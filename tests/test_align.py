@@ -494,6 +494,7 @@ def test_points_on_a_line_leave_every_map_across_it_free() -> None:
     np.testing.assert_allclose(np.abs(found.free_axis[0] @ matrix @ line[0]), np.linalg.norm(line[0]), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_rectangle_has_four_maps_and_a_disc_has_them_all() -> None:
     rng = rng_of(31)
     matrix = random_orthogonal(rng, 2, -1)
@@ -767,6 +768,7 @@ def painted(points: Array, matrix: Array, shift: float) -> Shape:
     return Shape(points=points @ matrix.T + shift, labels=labels)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.5, 0.9, 1.1, 2.0])
 @pytest.mark.parametrize("name", ["airplane", "fan7", "chair"])
 def test_objects_that_agree_at_one_size_only_are_told_so(name: str, factor: float) -> None:
@@ -1039,6 +1041,7 @@ def test_of_maps_that_may_all_be_right_the_one_that_neither_side_denies_comes_fi
     assert score(seen(0.0, denied=0.02)) > score(seen(0.0, denied=0.0))
 
 
+@pytest.mark.slow
 def test_a_camera_that_saw_free_space_denies_what_borders_leave_open() -> None:
     # A long box laid on one view of a short one reaches beyond the outline that the view ends with: unseen, unless it
     # is known where the camera stood.

@@ -72,6 +72,7 @@ def names(*paths: str, recursive: bool = False) -> list[str]:
     return [source.name for source in sources(paths, recursive=recursive).ours]
 
 
+@pytest.mark.slow
 def test_files_of_other_kinds_are_told(run: Run, lab: Path) -> None:
     for name in ("a.json", "b.PNG", "readme.md", "LICENSE", ".hidden.txt.bak"):
         (lab / "objects" / name).write_text("{}")
@@ -184,6 +185,7 @@ def test_addresses_name_what_they_need(monkeypatch: pytest.MonkeyPatch) -> None:
         names("s3://bucket/models/")
 
 
+@pytest.mark.slow
 def test_local_addresses_reach_other_processes(run: Run, lab: Path) -> None:
     pytest.importorskip("fsspec")
     folder = f"file://{lab}/objects"
@@ -335,6 +337,7 @@ def test_objects_of_a_file_are_found_again_one_by_one(run: Run, trajectory: Path
     assert "done before" not in told
 
 
+@pytest.mark.slow
 def test_who_does_them_changes_no_row_of_several_in_a_file(run: Run, trajectory: Path) -> None:
     run("batch", "chem", "--table", "one.csv")
     run("batch", "chem", "--workers", "2", "--table", "two.csv")
@@ -471,6 +474,7 @@ def test_mistakes_are_one_line_and_write_nothing(run: Run, lab: Path, line: str,
     assert [path for path in sorted(lab.rglob("*")) if "__pycache__" not in path.parts] == before
 
 
+@pytest.mark.slow
 def test_processes_and_shards_give_the_same_table(run: Run, lab: Path) -> None:
     for kind in ("csv", "parquet"):
         assert run("batch", "objects", "--out", "whole.jsonl", "--table", f"whole.{kind}")[0] == 0
@@ -708,6 +712,7 @@ def half_way(line: str, file: Path) -> subprocess.Popen[str]:
     return process
 
 
+@pytest.mark.slow
 @posix
 @pytest.mark.parametrize("line", ["batch objects -q --out r.jsonl", "run thirds.yaml -q --out r"])
 def test_of_two_writers_at_once_one_is_refused(lab: Path, line: str) -> None:

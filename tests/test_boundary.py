@@ -136,6 +136,7 @@ def test_uneven_meshes_are_symmetric_but_for_their_areas(name):
     assert np.abs(sides.sum(axis=0)).max() > 0.0015 * areas.sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["table walled", "stool3 walled", "chair rough", "starfish walled"])
 def test_more_area_on_one_side_breaks_no_symmetry(name):
     """It draws the centroid to it by more than starts may be off."""

@@ -415,6 +415,7 @@ def test_an_exact_group_stays_where_a_larger_one_that_it_is_no_part_of_is_found_
     assert [detect(shape, tolerance=t).point_group for t in (0.001, 0.0025)] == ["D10h", "D10h"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "noise_rel"), [("spool", 0.0), ("cone", 0.01)])
 def test_of_many_mirrors_that_noise_hides_the_truest_is_told(name, noise_rel):
     """A body of revolution with one detail out of place: mirrors near the true one need next to nothing as well."""
@@ -542,6 +543,7 @@ def test_points_on_an_axis_say_nothing_against_its_fold(on_axis):
         assert found.confidence > 0.95
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_something_round_has_no_fold_that_nothing_in_it_has(seed):
     """Noise hides the four holes of a flange from many mirrors, any two of which make some fold."""
@@ -552,6 +554,7 @@ def test_something_round_has_no_fold_that_nothing_in_it_has(seed):
     assert all(a.point_group in ("C1", "Cs", "C2v", "C4v", "Cinfv", "Dinfh") for a in found.alternatives)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_the_exact_mirror_of_what_is_nearly_round_is_found(seed):
     """Of a flange with three holes of four, which all turns nearly leave as it is, azimuths tell the mirror."""

@@ -561,6 +561,7 @@ def test_align_says_it_in_words(run: Run, data: Path, tmp_path: Path) -> None:
     assert json.loads((tmp_path / "a.json").read_text())["determinant"] == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("option", "told"),
     [
@@ -594,6 +595,7 @@ def registry() -> Any:
     return Registry().with_resources([(str(resource.id()), resource) for resource in every])
 
 
+@pytest.mark.slow
 def test_align_takes_several_targets(run: Run, data: Path, tmp_path: Path) -> None:
     jsonschema = pytest.importorskip("jsonschema")
     matrix = random_orthogonal(np.random.default_rng(4), det=-1)
@@ -619,6 +621,7 @@ def test_align_takes_several_targets(run: Run, data: Path, tmp_path: Path) -> No
     assert found[0] | {"timings": 0} == alone | {"timings": 0}
 
 
+@pytest.mark.slow
 def test_align_strict_ends_with_a_status_of_its_own(run: Run, data: Path, tmp_path: Path) -> None:
     (tmp_path / "other.ply").write_text(ply([[0, 0, 0], [6, 3, 0], [1, -3, 1], [3, 1, 3]], SCALENE_SIDES))
     one, other = data / "scalene.ply", tmp_path / "other.ply"
@@ -763,6 +766,7 @@ def test_a_bug_in_one_file_does_not_end_the_others(
     assert errors["b.ply"].endswith("internal error: ZeroDivisionError: oh")
 
 
+@pytest.mark.slow
 def test_workers_give_the_same_rows(shelf: Path, tmp_path: Path) -> None:
     done = command("batch", shelf, "--workers", 2, "--out", tmp_path / "r.jsonl")
     assert done.returncode == 1

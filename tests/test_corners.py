@@ -160,6 +160,7 @@ def test_a_needle_that_stands_out_counts_however_thin_it_is():
     assert proven(shape) == "C1"
 
 
+@pytest.mark.slow
 def test_a_round_outline_is_not_straight_though_its_steps_nearly_are():
     """Sides that bend by less than rounding each, and by a quarter of a circle together."""
     angles = np.linspace(0.0, 0.5 * np.pi, 400)

@@ -188,6 +188,7 @@ def test_a_density_that_falls_off_hides_nothing_and_is_told(make):
     assert f"decided by {found.even_sample:,} points, more evenly spread" in scanned(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "strength"), [("clump", 0.05), ("hole", 0.15), ("views", 2.0), ("mild", 0.05)])
 def test_labels_that_every_operation_keeps_change_nothing(kind, strength):
     case = damaged.Case(family="shape", name="bossed_prism", kind=kind, strength=strength, seed=3)
@@ -201,6 +202,7 @@ def test_labels_that_every_operation_keeps_change_nothing(kind, strength):
     assert len(whole.points) >= len(made.points) - len(found.outliers)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("labelled", [False, True])
 def test_what_fills_a_volume_beside_the_body_is_a_part_if_it_is_carried_to_others(labelled):
     """A blade whose walls noise makes one; a clump on a mirror, which carries it to itself, may be none."""
@@ -216,6 +218,7 @@ def test_what_fills_a_volume_beside_the_body_is_a_part_if_it_is_carried_to_other
         assert examination._is_part(found.examined, blob, found.tolerance) is is_part
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "is_part"), [("wheel7", True), ("plain_flange_nut", False)])
 def test_what_fills_a_volume_in_the_middle_hides_nothing(name, is_part):
     """All that leaves a single point in place keeps what is round about it; an axis may hide that it is turned over."""
@@ -237,6 +240,7 @@ def test_outliers_are_told_and_can_be_kept():
         detect(points, outliers="some")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise_rel", [0.0, 0.003])
 def test_a_clump_that_touches_the_body_is_told(noise_rel):
     rng = np.random.default_rng(3)
@@ -264,6 +268,7 @@ def test_what_breaks_a_symmetry_is_no_clump(mesh, group, noise_rel):
     assert found.undetermined or found.point_group == group
 
 
+@pytest.mark.slow
 def test_a_clump_by_the_axis_may_hide_what_it_breaks():
     """What lies about an axis is carried onto itself, or nearly: a part of the object, or a clump that stands there."""
     mesh, truth = specimen("shape", "bottle")
@@ -546,6 +551,7 @@ def test_strays_among_few_points_are_no_border_that_is_evident():
     assert not made.openings.evident
 
 
+@pytest.mark.slow
 def test_strays_that_may_hide_more_leave_an_answer_that_says_so():
     """What is left of four in ten points beside a spool denies that it is round, of one in twenty it does not."""
     spool, _ = specimen("shape", "spool")
@@ -649,6 +655,7 @@ def test_a_border_that_hides_what_a_group_asks_for_is_one_however_short(name, gr
     assert (found.point_group, found.at_least) == (group, True)
 
 
+@pytest.mark.slow
 def test_what_a_view_tells_of_a_plane_is_as_uncertain_as_it_says():
     """Edges tell where it stands, on which hardly any point lies: its pairs alone seemed to tell it far better."""
     ratios = []
@@ -684,6 +691,7 @@ def test_what_comes_to_lie_where_nothing_was_seen_tells_not_where_an_object_ends
     assert (found.point_group, found.at_least) == ("Cinfv", True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "noise", "seed"),
     [("propeller", 0.003, 43), ("radiator", 0, 4), ("rocket", 0.005, 43), ("tray", 0.003, 4), ("rocket", 0, 12)],
@@ -751,6 +759,7 @@ def test_a_lone_mirror_is_weighed_as_far_as_its_curve_goes_whatever_tolerances_a
     assert (alone.point_group, alone.confidence) == (beside.point_group, pytest.approx(beside.confidence, abs=1e-9))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tray", "paddles", "radiator"])
 def test_a_sample_sparser_than_walls_are_thick_tells_no_end_of_one_from_a_hole(name):
     """Sixteen neighbours are as wide: they see none of the ends, which what is not short shows to be some."""
@@ -853,6 +862,7 @@ def test_the_corner_of_a_cube_says_at_least():
     assert (found.point_group, found.at_least) == ("C3v", True)
 
 
+@pytest.mark.slow
 def test_what_is_no_clump_by_one_group_may_be_one_by_another():
     """What most operations of a group carry to where nothing is holds more than the clump alone: each is asked."""
     case = damaged.Case(family="shape", name="crate", kind="clump", strength=0.05, seed=3202)
@@ -862,6 +872,7 @@ def test_what_is_no_clump_by_one_group_may_be_one_by_another():
 # Votes
 
 
+@pytest.mark.slow
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 10**6))
 def test_votes_know_no_centroid(seed):
@@ -940,6 +951,7 @@ def test_classes_are_kept_by_what_a_surface_tells_carries_it_onto_itself():
     assert not [s for s in repeated(coloured.cloud, coloured.diagonal) if s.group.name == "Ci"]
 
 
+@pytest.mark.slow
 def test_a_box_of_parallel_sides_with_a_corner_gone_keeps_its_inversion():
     """No mirror and no turn tells it, and moments of what is left have their centroid elsewhere."""
     right = 0
@@ -976,6 +988,7 @@ def test_a_third_of_a_goblet_is_seen_to_be_round():
     assert row.group == "at least Cinfv"
 
 
+@pytest.mark.slow
 def test_few_points_beside_an_outline_do_not_deny_what_nobody_saw():
     """Of a cube with a corner to the camera some mirrors leave next to nothing to be seen, half of it rough rays."""
     row = single_views.run(single_views.Case(family="shape", name="bossed_cube", clean=False, seed=3003))
@@ -983,6 +996,7 @@ def test_few_points_beside_an_outline_do_not_deny_what_nobody_saw():
     assert row.group == "at least Oh"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "part", "seed"), [("spool", "Cinfv", 4006), ("wheel5", "C5v", 4003)])
 def test_what_nobody_saw_may_break_a_mirror_across_and_leave_what_keeps_the_axis(name, part, seed):
     """Both ends look alike as far as they are seen; that it turns about its axis is surer."""
@@ -1086,6 +1100,7 @@ def test_few_points_of_a_view_seem_hidden(kind, count):
         assert camera.hidden.mean() < 0.5 * HIDDEN
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["views", "rough views"])
 def test_two_views_from_opposite_sides_show_a_table(kind):
     made = damage.KINDS[kind][0](table(), 2.0, np.random.default_rng(19))
@@ -1110,6 +1125,7 @@ def test_the_normals_of_what_was_seen_tell_what_was_not(count, low, high):
     assert low <= surface.unclosed < high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("opening", [0.05, 0.11, 0.22])
 @pytest.mark.parametrize("count", [5000, 20000])
 def test_a_bowl_may_be_a_ball_with_a_hole_and_is_not_told_as_one(opening, count):
@@ -1129,6 +1145,7 @@ OPEN_BOXES = {  # sides, which of six faces are not there, the group
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.0, 0.003])
 @pytest.mark.parametrize(("sides", "without", "group"), OPEN_BOXES.values(), ids=OPEN_BOXES)
 def test_what_ends_at_edges_all_along_has_no_hole_there(sides, without, group, noise):
@@ -1143,6 +1160,7 @@ def test_what_ends_at_edges_all_along_has_no_hole_there(sides, without, group, n
     assert (whole.point_group, whole.at_least) == ("Oh" if len(set(sides)) == 1 else "D4h", True)
 
 
+@pytest.mark.slow
 def test_a_single_view_leaves_a_doubt_and_views_from_all_sides_none():
     sure = {}
     for count in (1.0, 2.0):
@@ -1151,6 +1169,7 @@ def test_a_single_view_leaves_a_doubt_and_views_from_all_sides_none():
     assert 0.5 < sure[1.0] < sure[2.0]
 
 
+@pytest.mark.slow
 def test_what_a_camera_sees_apart_from_the_rest_is_no_clump():
     """The seat hides where the legs of a stool begin, and one leg hides another."""
     case = damaged.Case(family="shape", name="stool3", kind="views", strength=1.0, seed=404)
@@ -1232,6 +1251,7 @@ def scans(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_the_report_says_what_was_left_out_and_not_seen(scans, capsys):
     assert invoke(["detect", str(scans / "strays.xyz"), "--json", "-"]) == 0
     record = json.loads(capsys.readouterr().out)
@@ -1245,6 +1265,7 @@ def test_the_report_says_what_was_left_out_and_not_seen(scans, capsys):
     assert json.loads(capsys.readouterr().out)["outliers"]["count"] == 0
 
 
+@pytest.mark.slow
 def test_the_viewpoint_of_a_pcd_counts(scans, capsys):
     shape = load(scans / "view.pcd")
     assert shape.viewpoint is not None
@@ -1270,6 +1291,7 @@ def test_what_is_wrong_is_said_in_one_line(scans, capsys, monkeypatch, words, sa
     assert not (scans / words[-1]).exists()
 
 
+@pytest.mark.slow
 def test_complete_marks_what_it_inferred(scans, capsys):
     out = scans / "full.npz"
     assert invoke(["complete", str(scans / "cut.xyz"), "-o", str(out), "--json", "-"]) == 0
@@ -1297,6 +1319,7 @@ def test_damage_leaves_points_of_the_object_and_strays(kind):
     assert (made.viewpoint is None) == (not kind.endswith(("views", "tabletop")))
 
 
+@pytest.mark.slow
 def test_a_row_of_the_bench():
     row = damaged.run(damaged.Case(family="shape", name="crate", kind="cut", strength=0.05))
     assert (row.truth, row.false, row.contradicted) == ("D2h", 0, False)
@@ -1340,6 +1363,7 @@ def test_an_element_is_right_if_it_carries_points_where_a_true_one_does(tilt_deg
     assert not right or found.error_deg == pytest.approx(tilt_deg, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_one_view_of_an_object_is_judged():
     case = single_views.Case(family="household", name="table", clean=True, seed=3)
     row = single_views.run(case)

@@ -75,6 +75,7 @@ def test_pixels_that_measured_nothing_are_no_points(tmp_path):
     assert len(load_depth(tmp_path / "holes.npy", INTRINSICS).points) == 45
 
 
+@pytest.mark.slow
 def test_one_view_of_a_stool_tells_its_group_as_at_least(folder, tmp_path):
     out = tmp_path / "found.json"
     arguments = ["detect", str(folder / "room.png"), "--intrinsics", OPTION, "--mask", str(folder / "mask.png")]
@@ -86,6 +87,7 @@ def test_one_view_of_a_stool_tells_its_group_as_at_least(folder, tmp_path):
     assert abs(found["center"][2] - up[:, 2].mean()) < 0.2
 
 
+@pytest.mark.slow
 def test_it_completes_what_it_saw(folder, tmp_path):
     out = tmp_path / "full.npz"
     assert invoke(["complete", str(folder / "depth.png"), "--intrinsics", OPTION, "-o", str(out)]) == 0
@@ -148,6 +150,7 @@ def test_pictures_that_are_no_depths_or_masks(folder, tmp_path):
         symrefine.load_depth(folder / "depth.png", (1.0, 2.0))
 
 
+@pytest.mark.slow
 def test_a_picture_of_16_bits_may_be_a_depth_image(folder, capsys):
     assert invoke(["detect", str(folder / "depth.png")]) == 0
     told = "depth.png: 16 bits: if this is a depth image, give --intrinsics"

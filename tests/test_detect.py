@@ -542,6 +542,7 @@ def test_a_disc_is_round():
     assert [detect(disc(np.random.default_rng(seed))).point_group for seed in range(4)] == ["Dinfh"] * 4
 
 
+@pytest.mark.slow
 def test_filled_bodies_are_what_they_are_or_leave_a_doubt():
     """Points that fill a volume: a ball has no fold, and few points of it support nothing at all."""
     rng = np.random.default_rng(26)
@@ -628,6 +629,7 @@ def test_the_uncertainty_of_a_plane_is_what_samples_show():
     assert 0.33 < np.sqrt(np.mean(np.square(ratios))) < 1.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "body"), [("tower", "volume"), ("mug", "surface")])
 def test_noise_tells_nothing_of_where_a_plane_stands(name, body):
     """Points anywhere in a volume have a nearest one wherever they are moved, normals of a round wall lean to a side.

@@ -167,6 +167,7 @@ def test_the_page_on_poses_does_what_it_says() -> None:
     exec(program, {})
 
 
+@pytest.mark.slow
 def test_the_page_on_alignment_does_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     matplotlib = pytest.importorskip("matplotlib")
@@ -258,6 +259,7 @@ def test_tables_of_campaigns_are_put_there_by_commands(page: str, name: str, tmp
         pages.check(copy, "nothing")
 
 
+@pytest.mark.slow
 def test_a_campaign_of_few_cases_writes_its_table(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("x\n<!-- fuzz:begin -->\n<!-- fuzz:end -->\ny\n", encoding="utf-8")

@@ -139,6 +139,7 @@ def _evil(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 @POSIX
 def test_no_name_steers_a_terminal(tmp_path: Path, evil: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bad = evil.with_name(f"bad{EVIL}.xyz")

@@ -132,6 +132,7 @@ def test_workers_are_replaced_after_some_tasks(work: Any, monkeypatch: pytest.Mo
     assert pids[0] == pids[1] != pids[2] == pids[3] != pids[4]
 
 
+@pytest.mark.slow
 @linux
 def test_what_meets_a_limit_or_crashes_is_lost_alone(work: Any) -> None:
     told: list[str] = []

@@ -66,6 +66,7 @@ def test_neither_noise_nor_strays_hide_a_floor(noise, strays):
     assert 7900 < len(found.points) < 11000
 
 
+@pytest.mark.slow
 def test_a_wall_that_meets_the_floor_has_no_end_there():
     """A tower on a plinth, off its middle: where the floor cut the plinth was an open rim, beyond which it could be."""
     vertices, faces = revolve([(0, 0.1), (0.5, 0.1), (0.5, 1.5), (0, 1.5)], 64)
@@ -194,6 +195,7 @@ def test_what_lies_below_a_floor_was_seen_not_to_be_there():
     assert on_floor.unseen(cloud, moved, close, 1, 0.02)[close].all()
 
 
+@pytest.mark.slow
 def test_large_clouds_are_sampled_without_their_floor():
     points, stray, _ = standing(stool(3), 6, size=3.0)
     many = np.concatenate([points] * (1 + MANY // len(points)))
@@ -251,6 +253,7 @@ def test_a_length_is_a_share_of_the_object_without_its_floor():
     )
 
 
+@pytest.mark.slow
 def test_one_view_of_a_thing_on_a_table_shows_its_group():
     rows = [damaged.run(c) for c in damaged.cases(("tabletop",), ("bottle", "chair", "propeller3"), 12)]
     assert all(row.right for row in rows)
@@ -267,6 +270,7 @@ def test_weights_that_make_up_for_density_decide_whatever_the_largest_is():
     assert found.flaw == ""
 
 
+@pytest.mark.slow
 def test_what_is_written_of_an_object_is_without_its_floor(tmp_path, capsys):
     points, stray, _ = standing(stool(3), 17, size=2.0)
     np.savetxt(tmp_path / "on.xyz", points)
@@ -281,6 +285,7 @@ def test_what_is_written_of_an_object_is_without_its_floor(tmp_path, capsys):
     capsys.readouterr()
 
 
+@pytest.mark.slow
 def test_the_command_tells_the_floor(tmp_path, capsys):
     points, _, _ = standing(stool(3), 13)
     np.savetxt(tmp_path / "on.xyz", points)

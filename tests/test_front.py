@@ -479,6 +479,7 @@ def test_directions_have_the_sign_that_records_have(found):
             np.testing.assert_allclose(axis.axis.direction, told["direction"], atol=1e-11)
 
 
+@pytest.mark.slow
 def test_an_answer_saves_itself_by_its_suffix(found, tmp_path):
     beginnings = {".json": b"{", ".png": b"\x89PNG", ".html": b"<!doctype html>", ".rrd": b"RRF"}
     for suffix, beginning in beginnings.items():
@@ -494,6 +495,7 @@ def test_an_answer_saves_itself_by_its_suffix(found, tmp_path):
         assert b'src="data:image/png' in found[case]._repr_html_().encode()
 
 
+@pytest.mark.slow
 def test_a_figure_and_a_card(found):
     axes = found["detection"].plot()
     assert len(axes.images) == 1
@@ -546,6 +548,7 @@ def test_completion_takes_a_cloud_and_what_was_found_in_it():
         symrefine.complete((CORNERS, TRIANGLES))
 
 
+@pytest.mark.slow
 def test_what_is_made_tells_draws_and_writes_itself(found, tmp_path):
     exact, full = found["symmetrized"], found["completed"]
     assert repr(exact).splitlines()[0] == "array: D2h, made exact"
@@ -581,6 +584,7 @@ def test_what_is_made_tells_draws_and_writes_itself(found, tmp_path):
     ]
 
 
+@pytest.mark.slow
 def test_a_tolerance_may_be_a_length():
     long = symrefine.detect(POINTS, tolerance="0.05u")
     assert long.tolerance == pytest.approx(0.05 / long.diagonal, rel=0.02)

@@ -172,6 +172,7 @@ def test_contact_sheet_holds_every_tile_and_marks_the_wrong_one():
     assert (sheet[MARGIN + step_y : -MARGIN, MARGIN + step_x + MARGIN :] == 255).all()
 
 
+@pytest.mark.slow
 def test_the_command_paints_and_names_what_is_wrong(monkeypatch, tmp_path, capsys):
     few = {name: OBJECTS[name] for name in ("spoon", "crown")}
     few["crown"] = replace(few["crown"], group="C5v")

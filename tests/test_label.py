@@ -156,6 +156,7 @@ def test_the_command_of_the_page_takes_a_folder_that_begins_with_a_dash(
     assert command[-4:] == ["--decisions", "decisions.json", "--", "-models"]
 
 
+@pytest.mark.slow
 def test_equal_runs_give_equal_bytes_and_nothing_is_detected_twice(
     run: Run, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -314,6 +315,7 @@ def test_two_models_of_one_object_are_refused(run: Run, models: Path, tmp_path: 
     assert "no mesh and no cloud in it" in run(folder=empty)[2]
 
 
+@pytest.mark.slow
 def test_models_of_other_names_are_numbered_and_keep_their_numbers(run: Run, models: Path, tmp_path: Path) -> None:
     folder, to = tmp_path / "models", tmp_path / "new"
     folder.mkdir()
@@ -364,6 +366,7 @@ def test_workers_and_a_cluster_write_the_same_labels(models: Path, first: Path, 
         }
 
 
+@pytest.mark.slow
 def test_an_object_beyond_its_limit_is_open_with_the_reason_and_done_again_without(run: Run, tmp_path: Path) -> None:
     to = tmp_path / "new"
     status, said, _ = run("--time-limit", 0.001, to=to)
@@ -454,6 +457,7 @@ def test_a_picture_that_is_empty_is_made_again(run: Run, out: Path, first: Path)
     assert (out / name).read_bytes() == (first / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_of_a_file_of_several_objects_one_is_chosen(run: Run, models: Path, tmp_path: Path) -> None:
     """A label is of one object; what is chosen counts for files that hold several, and not for the others."""
     folder, to = tmp_path / "models", tmp_path / "new"
@@ -474,6 +478,7 @@ def test_of_a_file_of_several_objects_one_is_chosen(run: Run, models: Path, tmp_
     assert "frame is 2; the file has 2 frames, from 0 to 1" in run("--frame", 2, folder=folder, to=to)[1]
 
 
+@pytest.mark.slow
 def test_a_run_that_was_killed_goes_on(run: Run, out: Path, first: Path) -> None:
     """Half of a row, and a picture that is not there: those two are done again, and all is as it was."""
     lines = (out / "objects.jsonl").read_bytes()
@@ -501,6 +506,7 @@ def test_a_page_has_room_for_so_many(run: Run, out: Path, monkeypatch: pytest.Mo
     assert "3 objects to look at" in page
 
 
+@pytest.mark.slow
 def test_rows_are_not_held(run: Run, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Rows of 30 MB in all, of which half is settled, take a tenth of that."""
     monkeypatch.setattr(cards, "MOST", 3)

@@ -111,6 +111,7 @@ def test_the_answer_moves_with_a_surface(name: str, seed: int, det: int, scale: 
     check_moves(SURFACES[name], seed, det, scale, 0.02)
 
 
+@pytest.mark.slow
 @LAWFUL
 @given(points=OBJECTS, seed=SEEDS, power=st.integers(-166, 166))
 def test_order_and_units_that_are_powers_of_two_change_nothing(points: Array, seed: int, power: int) -> None:

@@ -401,6 +401,7 @@ def star(corners: int) -> np.ndarray:
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(corners)])
 
 
+@pytest.mark.slow
 def test_a_long_concave_outline_is_cut_and_a_longer_one_is_refused(tmp_path: Path) -> None:
     points = star(2000)
     long = load_bytes(tmp_path, "a.obj", obj(points, [range(2000)]))

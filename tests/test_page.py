@@ -168,6 +168,7 @@ def data_of(page: str) -> dict[str, Any]:
 # Words
 
 
+@pytest.mark.slow
 def test_page_is_whole_and_names_the_group(any_case: Case, pages: Pages) -> None:
     detection, _ = any_case
     text = text_of(pages(any_case))
@@ -215,6 +216,7 @@ def test_where_several_places_are_as_likely_the_group_is_told_to_be_surer_than_w
     assert words.elsewhere("Cs", 0.99, [0.33]).startswith("That it is Cs is surer than where")
 
 
+@pytest.mark.slow
 def test_a_near_miss_that_holds_is_told_to_be_excluded() -> None:
     assert words.turned_down(1.25, 0.02, "Cs") == "It was turned down: 1.25 times what a tolerance of 2 % allows."
     assert words.turned_down(0.004, 0.02, "C1").startswith("It was turned down: 0.00 times")
@@ -227,6 +229,7 @@ def test_a_near_miss_that_holds_is_told_to_be_excluded() -> None:
     assert words.turned_down(0.0, 0.02, "C4v").startswith("It holds as well as what was found")
 
 
+@pytest.mark.slow
 def test_a_cube_is_three_lines_that_open() -> None:
     cube = join([box((0, 0, 0), (1, 1, 1))])
     page = html_page(detect(cube), cube)
@@ -335,6 +338,7 @@ def test_projections_say_of_how_many_hyperplanes_they_are(others: list[tuple[Fou
 HOSTILE = "</script><script>alert(1)</script><b>a & b's\u202egpj.\x07\x85\u2028.ply"
 
 
+@pytest.mark.slow
 def test_names_cannot_act(atoms: Case, others: list[tuple[Found, Shape]]) -> None:
     for found, shape in (atoms, *others):
         page = html_page(found, replace(shape, source=HOSTILE))
@@ -493,6 +497,7 @@ def test_the_model_shows_the_classes(most: int, monkeypatch: pytest.MonkeyPatch)
     assert np.array_equal(tinted.all(axis=1)[clear], middles[clear] + found.center[2] > 0.25)
 
 
+@pytest.mark.slow
 def test_points_of_a_scan_have_the_colours_of_their_classes() -> None:
     points = cut(table(), 0.2, np.random.default_rng(6)).points
     shape = Shape(points=points, labels=(points[:, 2] > np.quantile(points[:, 2], 0.7)).astype(int))

@@ -118,6 +118,7 @@ def test_points_that_stand_for_themselves_are_asked_one_by_one() -> None:
 # --- the ways ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_few_points_onto_a_surface_are_shown_although_no_border_is_told_of_so_few(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     target = rng.normal(size=(5000, 3))
@@ -202,6 +203,7 @@ def test_the_picture_shows_before_and_after(parted: symrefine.Alignment, tmp_pat
 # --- in Python --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_an_alignment_speaks_as_a_detection_does(parted: symrefine.Alignment, tmp_path: Path) -> None:
     html = parted._repr_html_()
     assert "model.ply onto scan.ply" in html
@@ -244,6 +246,7 @@ def made(symmetric: symrefine.Alignment, tmp_path_factory: pytest.TempPathFactor
     return page(symmetric, tmp_path_factory.mktemp("page"))
 
 
+@pytest.mark.slow
 def test_the_page_holds_every_map(symmetric: symrefine.Alignment, made: str, tmp_path: Path) -> None:
     text = made
     data = island(text)
@@ -255,6 +258,7 @@ def test_the_page_holds_every_map(symmetric: symrefine.Alignment, made: str, tmp
     assert "symrefine align table.ply cloud.ply --tolerance 0.02" in text
 
 
+@pytest.mark.slow
 def test_a_misfit_is_no_answer(tmp_path: Path) -> None:
     found = symrefine.align(WHOLE, table())
     text = page(found, tmp_path)
@@ -362,6 +366,7 @@ def test_equal_input_gives_an_equal_recording(parted: symrefine.Alignment, tmp_p
 # --- elsewhere --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_drawings_and_molecules_are_shown_too(tmp_path: Path) -> None:
     flat = np.array([[1.0, 0.2], [0.3, 0.9], [-1.0, 0.2], [-0.3, 1.9], [0.0, -1.0]])
     made = molecule("ferrocene, staggered")
@@ -376,6 +381,7 @@ def test_drawings_and_molecules_are_shown_too(tmp_path: Path) -> None:
         assert has(picture, CONTRADICTED) + has(picture, OUTLIER) < 1e-3
 
 
+@pytest.mark.slow
 def test_the_command_writes_all_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     points = sample(WHOLE, 2500, 0.0, np.random.default_rng(5))
     np.savetxt(tmp_path / "a.xyz", points[::2])

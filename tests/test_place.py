@@ -181,6 +181,7 @@ def test_the_plane_of_a_slab_moves_what_was_seen_by_no_more_than_is_forgiven(nam
     assert element.coverage.supported < SUPPORTED
 
 
+@pytest.mark.slow
 def test_what_no_camera_saw_may_break_one_of_two_mirrors_and_leave_the_other():
     """Which of them is not known: each is as sure as the two together, and half of what one alone is."""
     made = damage.view(MAKES["slab"](), np.array(ABOVE), np.random.default_rng(3))
@@ -240,6 +241,7 @@ def test_the_axis_of_a_cone_that_is_nearly_a_cylinder_is_a_line_all_the_same():
     assert np.linalg.norm(np.cross(np.array([0.0, -0.6, 0.0]) - through, direction)) < 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("eye", [(0.0, 0.0, 5.0), (0.4, -0.2, 3.0)])
 def test_a_ball_that_one_camera_saw_is_one_turned_as_one_likes(eye):
     """Of its mirrors and axes each holds as well elsewhere; its own group does where it is turned, and not moved."""
@@ -272,6 +274,7 @@ def test_whole_objects_ask_nothing_of_the_sort():
     assert found.elsewhere == math.inf
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["mug", "bar", "star16"])
 def test_a_larger_tolerance_takes_no_group_away_that_a_smaller_one_tells(name):
     """Though it holds elsewhere as well at that tolerance: it is known to stand where it does at the one asked for."""

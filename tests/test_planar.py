@@ -129,6 +129,7 @@ def test_weights_count() -> None:
 # --- points -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fold", [3, 4, 5, 8])
 @pytest.mark.parametrize("noise", [0.0, 0.01])
 def test_samples_of_outlines(fold: int, noise: float) -> None:
@@ -142,6 +143,7 @@ def test_samples_of_outlines(fold: int, noise: float) -> None:
     assert all(min(angle_off(f.line.normal, a) for a in truth) < 1.0 for f in found.lines)
 
 
+@pytest.mark.slow
 @settings(max_examples=12, deadline=None)
 @given(st.integers(2, 9), st.booleans(), st.floats(0.0, 6.28), st.floats(-3.0, 3.0), st.integers(0, 10**6))
 def test_few_points_stand_for_themselves(fold: int, mirrored: bool, angle: float, size: float, seed: int) -> None:

@@ -18,6 +18,7 @@ def test_both_halves_have_drawings_of_all_kinds() -> None:
         assert {"D1", "C2", "C4" if half else "C3"} <= groups
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["heart", "letter Z", "octagon", "letter A", "pinwheel of 3"])
 @pytest.mark.parametrize("moved_rel", [0.01, 0.05])
 def test_a_part_that_is_moved_shows_and_has_no_images_where_it_was(name: str, moved_rel: float) -> None:

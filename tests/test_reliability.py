@@ -321,6 +321,7 @@ def test_the_misfit_is_that_of_the_posterior():
     assert reliability.misfit(reliability.SHIPPED, links) == pytest.approx(expected)
 
 
+@pytest.mark.slow
 def test_the_fit_finds_the_constants_that_made_the_links():
     constants = (0.5, 0.9, 5.0, 1.2, 1.5)
     links = list(drawn(20000, constants, np.random.default_rng(0)))

@@ -303,6 +303,7 @@ def test_outliers_have_a_colour_and_do_not_shrink_the_rest(shapeless: Case) -> N
     assert len(np.unique(make_surface(shape, scene).colours, axis=0)) == 2
 
 
+@pytest.mark.slow
 def test_a_picture_of_a_scan_tells_what_its_colours_mean(shapeless: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     points = np.concatenate([sample(table(), 2000, 0.0, np.random.default_rng(0)), [[2.0, 0, 0]]])
     strays = replace(shapeless[0], outliers=np.array([2000]), near_misses=(), at_least=False)

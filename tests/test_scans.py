@@ -70,6 +70,7 @@ def test_las(tmp_path: Path, name: str, version: str, fmt: int) -> None:
     assert len(np.unique(load(tmp_path / name, labels="color").labels)) > 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["a.las", "a.laz"])
 def test_las_is_refused_wherever_it_is_cut(tmp_path: Path, name: str) -> None:
     data = las(name == "a.laz")
@@ -91,6 +92,7 @@ def test_las_whose_header_lies(tmp_path: Path) -> None:
         assert told in refusal(tmp_path, changed, "a.laz")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["a.las", "a.laz"])
 def test_damaged_las_never_shows_as_a_foreign_error(tmp_path: Path, name: str) -> None:
     data = las(name == "a.laz")

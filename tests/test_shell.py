@@ -178,6 +178,7 @@ def test_a_picture_is_written(run: Run, folder: Path) -> None:
     assert (folder / "box.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["symmetrize", "complete"])
 def test_what_is_made_has_a_page_and_a_picture(run: Run, folder: Path, command: str) -> None:
     directions = np.random.default_rng(0).normal(size=(3000, 3))
@@ -281,6 +282,7 @@ def test_verbose_tells_stages_with_seconds_and_a_rate(run: Run) -> None:
         assert re.search(rf"^symrefine: {stage} \d+\.\d\d s, 4 points, [\d,]+ points/s$", err, re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_what_is_drawn_has_stages_of_its_own(run: Run) -> None:
     """Drawing takes longer than detecting as a rule, and was told as that."""
     shown = ("--report", "a.html", "--picture", "a.png", "--recording", "a.rrd")

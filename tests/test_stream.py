@@ -37,6 +37,7 @@ def chunked(points, weights, size):
     return ((points[i : i + size], weights[i : i + size]) for i in range(0, len(points), size))
 
 
+@pytest.mark.slow
 @settings(max_examples=20, phases=[Phase.explicit, Phase.generate])
 @given(SEEDS, st.sampled_from([1, 2, 17, 100, 1000]), st.sampled_from([0.0, 1.0, 1e6]))
 def test_moments_of_chunks_are_those_of_all(seed, size, away):
@@ -115,11 +116,13 @@ def test_answers_of_chunks_are_those_in_memory(name, noise):
     assert records[0] == records[1]  # whatever the length of the chunks
 
 
+@pytest.mark.slow
 def test_up_to_a_hundred_thousand_points_all_are_looked_at():
     assert symrefine.detect(cloud(count=MANY)).sample is None
     assert symrefine.detect(Stream.of(cloud(count=MANY))).shape.points.shape == (MANY, 3)
 
 
+@pytest.mark.slow
 def test_strays_and_clumps_are_found_among_all_points():
     rng = np.random.default_rng(4)
     body = cloud(count=3 * MANY, noise=0.002)
@@ -146,6 +149,7 @@ def unit_vectors(rng, count):
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
+@pytest.mark.slow
 def test_a_stray_that_no_sample_sees_does_not_decide():
     """One point of 300,000 at fifty diagonals would be all that moments of order 8 tell."""
     points = cloud(count=3 * MANY)
@@ -168,6 +172,7 @@ def test_weights_normals_and_labels_come_along():
         symrefine.detect(Shape(points, labels=labels), verify="all")
 
 
+@pytest.mark.slow
 def test_all_points_say_what_the_sample_cannot():
     """Of a table over which 20 points hang, on one side."""
     points = cloud(count=2 * MANY, noise=0.0)
@@ -346,6 +351,7 @@ def million(tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="there is no /proc to ask for memory")
 def test_the_command_reads_large_files_in_chunks(million):
     """In less memory than the points alone would take as a `Shape`, above what the command takes anyway."""

@@ -290,6 +290,7 @@ SAMPLES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SAMPLES)
 def test_all_hyperplanes_of_samples_with_noise(name: str) -> None:
     draw, count, order = SAMPLES[name]
@@ -321,6 +322,7 @@ def test_samples_whose_second_moments_coincide_without_symmetry(dim: int) -> Non
     assert "second moments coincide" in found.incomplete
 
 
+@pytest.mark.slow
 def test_round_samples_list_none_of_their_hyperplanes() -> None:
     rng = np.random.default_rng(5)
     ball = rng.normal(size=(120_000, 3))
@@ -332,6 +334,7 @@ def test_round_samples_list_none_of_their_hyperplanes() -> None:
     assert detect_nd(rng.normal(size=(2000, 4))).hyperplanes == ()
 
 
+@pytest.mark.slow
 def test_what_noise_may_turn_is_not_listed_in_one_place() -> None:
     """At this noise moments of order 6 see the hexagon in some of its lines only: all of these are listed, or none."""
     rng = np.random.default_rng(18)

@@ -73,6 +73,7 @@ def test_what_was_found_does_not_depend_on_the_pose() -> None:
     np.testing.assert_allclose(b.spread, 7 * a.spread, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_how_a_cloud_was_sampled() -> None:
     one = sphere(6000)
     found = survey(Shape(points=one)).cloud

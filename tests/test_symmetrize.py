@@ -466,6 +466,7 @@ def test_the_command_writes_the_mesh_and_tells_by_how_much_it_moved(
     assert out.read_bytes() != first
 
 
+@pytest.mark.slow
 def test_outliers_are_left_out_and_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shape = somewhere(table(4), 3)
     points, _, _ = sample_surface(shape, 4000, np.random.default_rng(1))

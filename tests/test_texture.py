@@ -310,6 +310,7 @@ def table_under(out: str, head: str) -> list[str]:
     return list(itertools.takewhile(str.strip, lines[first:]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [k if k == "glb" else pytest.param(k, marks=SLOW) for k in WRITERS])
 def test_the_command_tells_both_groups(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = WRITERS[kind](tmp_path, BOX, dot((0, 0, 0.2), 0.15))
@@ -475,6 +476,7 @@ def test_only_meshes_with_images_have_a_texture(tmp_path: Path) -> None:
         load(tmp_path / "a.ply", texture=True)
 
 
+@pytest.mark.slow
 def test_a_data_set_is_labelled_with_its_textures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Shape and texture side by side for a person, or the texture alone; another image is another object."""
     folder = tmp_path / "models"

@@ -55,6 +55,7 @@ with one_thread():
     subprocess.run([sys.executable, "-c", script], check=True, timeout=120, env=environment)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verb", ["detect(one)", "align(one, other)"])
 def test_an_answer_has_the_same_bytes_with_any_number_of_threads(verb: str) -> None:
     script = f"""

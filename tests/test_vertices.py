@@ -377,6 +377,7 @@ def tube(fold, rows):
     return 7.0 * points @ rotation([1.0, -2.0, 0.6], 1.1).T + 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("digits", [15, 5])
 def test_points_that_map_onto_one_another_have_their_group_at_any_tolerance(digits):
     """More atoms than stand for themselves, so far apart that no surface is known of them."""
