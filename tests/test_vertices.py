@@ -11,7 +11,7 @@ from experiments.objects.boundary import instance
 from experiments.objects.group_shapes import DESIGNS
 from experiments.objects.group_shapes import shape as mesh_of
 from experiments.objects.parts import placed_group
-from experiments.objects.shapes import bottle, sample, table
+from experiments.objects.shapes import bottle, box, join, sample, table
 from experiments.studies import boundary
 from symrefine.cli.tables import record_lines
 from symrefine.export.bop import decided
@@ -256,6 +256,17 @@ def test_a_hole_leaves_the_group_of_all_vertices_exact(missing):
     found = symrefine.detect(shape)
     assert (found.point_group, found.exact.faces) == ("Oh", False)
     assert found.exact.miss < 1e-13
+
+
+def test_what_of_a_group_is_exact_is_told_where_the_rest_holds_within_the_tolerance():
+    turn = random_orthogonal(np.random.default_rng(1))
+    cuboid = join([box((0, 0, 0), (1.0, 1.0, 1.003))])
+    shape = Shape(cuboid.points @ turn.T + 3.0, cuboid.faces)
+    found = symrefine.detect(shape)
+    assert (found.point_group, found.exact.point_group, found.exact.faces) == ("Oh", "D4h", True)
+    assert found.exact.miss < 1e-14
+    made = symrefine.symmetrize(shape, found=found)  # all of the group, not what is exact anyway
+    assert symrefine.detect(made.shape).exact.point_group == "Oh"
 
 
 def test_the_centre_is_that_of_the_surface_where_vertices_crowd_at_one_end():

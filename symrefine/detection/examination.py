@@ -92,6 +92,13 @@ class Examined:
         center, diagonal = moments.restored(found.placed.center), moments.scale * self.surface.diagonal
         return on_vertices(self.measured.shape, group, center, diagonal=diagonal)
 
+    def exact_part(self, found: Hypothesis) -> OnVertices | None:
+        """What of a group of the chain maps the vertices of a mesh onto one another, where not all of it does."""
+        known, group = self.exact, found.group
+        if known is None or known.group.name == "C1" or not group.is_finite:
+            return None
+        return known if is_subgroup(known.group, group, SAME_RAD) else None
+
     def decided(self, tolerance: float, *, shown: bool = False) -> Decision:
         """The likeliest group of the chain at a tolerance; with `shown` as if what no camera saw kept to the rest."""
         missing = 0.0 if shown else self.surface.unclosed

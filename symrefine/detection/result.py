@@ -89,14 +89,15 @@ class Candidate:
 class Exact:
     """That the group maps the vertices of a mesh onto one another: planes, axes and centre are those of the vertices.
 
-    Likewise the points of a cloud, which are only asked where noise leaves nothing to be told at the tolerance.
+    Of a group that holds within the tolerance only, what of it does so. Likewise the points of a cloud, which are only
+    asked where noise leaves nothing to be told at the tolerance.
 
     Attributes:
         miss: largest distance of an image to its counterpart, a fraction of the diagonal; rounding alone leaves 1e-15.
         faces: whether faces are mapped onto faces as well, triangles in one plane as one, and vertices are but the
             corners of those; if not, a triangulation chose its diagonals where four corners lie in no plane. None of a
             cloud.
-        point_group: what does so: the group, or the fold that a continuous one has in the vertices.
+        point_group: what does so: the group, a part of it, or the fold that a continuous one has in the vertices.
     """
 
     miss: float

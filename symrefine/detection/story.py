@@ -137,6 +137,7 @@ def _report(
     told = alternatives(names, needs, decision, -1 if reason else index)
     history, known = chosen.history, _covariance(surface, chosen)
     on = found.vertices_of(chosen)
+    exact = on or found.exact_part(chosen)
     chosen = chosen if on is None else _polished(chosen, on, measured)
     sure = {id(e): _confidence(e, links, decision) for e in chosen.elements}
     planes = [e for e in chosen.elements if e.operations.kind == "plane"]
@@ -207,7 +208,7 @@ def _report(
         floor=measured.floor,
         no_floor=found.no_floor,
         clumps=len(measured.clumps),
-        exact=None if on is None else _exact(on, measured.shape),
+        exact=None if exact is None else _exact(exact, measured.shape),
         sample=found.sample,
         even_sample=len(measured.shape.points) if measured.is_thinned else None,
         origin=moments.center,

@@ -60,7 +60,8 @@ def symmetrize(
     if found.point_group == "C1":
         raise InputError(f"{shape.source}: is C1, nothing to make symmetric{_nearest_miss(found)}")
     # Of a continuous group what the vertices have of it was told already.
-    wanted = found.exact.point_group if group is None and found.exact is not None else group
+    fold = None if found.exact is None or found.group.is_finite else found.exact.point_group
+    wanted = fold if group is None else group
     chosen = found.group if wanted is None else placed_subgroup(found.group, wanted)
     used, clock, seed = relative_tolerance(tolerance, shape, units=units), Clock(), whole_of("seed", seed)
     # Of what a sample alone was looked at, no others are known.
