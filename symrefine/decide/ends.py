@@ -52,14 +52,16 @@ def ends_too(surface: Surface, found: Hypothesis, hidden: Sequence[tuple[Isometr
 
     What is `hidden_by` the group may not go on from there. And a handle at a rim breaks what the rest keeps: it comes
     to lie where the rim ends, which all other operations carry onto the rim. Few operations do not tell by themselves
-    where it ends, but by how much they keep of the borders that it lies at: a cup has a rim, wherever its hole is.
+    where it ends, but by how much of the border they keep, and of that which it lies at: a cup has a rim, wherever its
+    hole is.
     """
     if surface.viewed:
         return False  # what cameras see to be free says it
     if not _goes_on(surface, hidden):
         return True
-    few = len(found.placed.motions()) < TELLING
-    return ends_there(surface, found, _borders_of(surface, hidden)) if few else seen_to_end(surface, found) > limit
+    if len(found.placed.motions()) >= TELLING:
+        return seen_to_end(surface, found) > limit
+    return ends_there(surface, found) and ends_there(surface, found, _borders_of(surface, hidden))
 
 
 def hides_surely(surface: Surface, found: Hypothesis, limit: float) -> bool:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 
 from symrefine.decide.ends import (
     ends_there,
@@ -26,7 +27,7 @@ from symrefine.decide.hypotheses import (
 from symrefine.decide.joins import better_parts, endless, generated, is_loose, join, size_of
 from symrefine.decide.looks import COARSE, exact_need, glances, hopeless, looked_at, start_error, unmet_by
 from symrefine.decide.place import SUPPORTED
-from symrefine.decide.pool import Pool
+from symrefine.decide.pool import Pool, is_at
 from symrefine.decide.posterior import ALIKE, LEAST, Link, certain, meant
 from symrefine.fit.placed import Placed, elements
 from symrefine.propose.candidates import (
@@ -68,26 +69,67 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
     evident = surface.openings.hide_much
     part = _of_part(surface, whole)
     more = size_of(part.largest.placed) > size_of(whole.largest.placed)
-    hidden = max((e.coverage.unseen for e in part.largest.elements), default=0.0)
-    # A group that a single hole leaves may keep its border because it keeps the border of almost any.
-    ends = ends and not (more and often_kept(surface, whole.largest, hidden))
-    # What may not be open at all is missing a part only where that explains more.
-    unseen = hidden_by(surface, part.largest) if more else []
-    missing = (evident or (more and hides_there(surface, unseen))) and not ends
-    missing = missing or often_left(whole.largest, part.largest)
-    missing = missing and not (more and ends_too(surface, part.largest, unseen, ALIKE * limit))
-    if missing and (not more or hides_surely(surface, part.largest, limit)):
+    is_missing = partial(_is_missing, surface, whole.largest, limit=limit, ends=ends)
+    missing = is_missing(part.largest)
+    if missing and not more:
         return replace(part, at_least=True)
+    for found in _larger(part, whole.largest):
+        if (missing if found is part.largest else is_missing(found)) and hides_surely(surface, found, limit):
+            return replace(_believed(surface, part, found), at_least=True)
     # What a border hides may be why a larger group is in doubt.
     doubted = (h for h in (part.largest, *part.small) if size_of(h.placed) > size_of(whole.largest.placed))
     hides = not ends and any(meant(Link(need=h.need), surface.tolerance) > LEAST for h in doubted)
     if not more:
         return replace(whole, at_least=hides or opens or surface.openings.floor is not None)
     whole = replace(whole, at_least=evident or hides or missing)
-    # To believe that what ends so evenly is missing a part takes as much as to believe in as much as was seen.
-    asked, known = belief_in_as_much(surface, part.largest.placed), part.largest
-    rival = replace(known, need=math.hypot(known.need, asked), believed=math.hypot(known.believed, asked))
-    return replace(whole, small=(*whole.small, rival))
+    return replace(whole, small=(*whole.small, _as_rival(surface, part.largest)))
+
+
+def _larger(part: Pool, than: Hypothesis) -> list[Hypothesis]:
+    """The largest group of a pool and a few parts of it that were found, largest first, where larger than another."""
+    every, found = (h for h in (part.largest, *part.small) if part.largest.holds(h.placed)), list[Hypothesis]()
+    for h in sorted(every, key=lambda known: -size_of(known.placed)):
+        if h.need <= part.limit and size_of(h.placed) > size_of(than.placed):
+            found += [] if any(is_at(h.placed, other.placed) for other in found) else [h]
+    return found[:FOLLOWED]
+
+
+def _believed(surface: Surface, part: Pool, found: Hypothesis) -> Pool:
+    """The pool where one of its groups is the largest that may be believed in, and what it has not asks for more."""
+    if found is part.largest:
+        return part
+
+    def asked(known: Hypothesis) -> Hypothesis:
+        return known if found.holds(known.placed) or not known.believed else _as_rival(surface, known)
+
+    failed = tuple(map(asked, (part.largest, *part.failed)))
+    return replace(part, largest=found, small=tuple(map(asked, part.small)), failed=failed)
+
+
+def _is_missing(surface: Surface, whole: Hypothesis, part: Hypothesis, limit: float, *, ends: bool) -> bool:
+    """Whether a part of a surface is missing if it has a group that it has not as it is: no object ends like that.
+
+    `ends` says whether what it has as it is keeps its borders.
+    """
+    assert surface.openings is not None
+    more = size_of(part.placed) > size_of(whole.placed)
+    hidden = max((e.coverage.unseen for e in part.elements), default=0.0)
+    # A group that a single hole leaves may keep its border because it keeps the border of almost any.
+    ends = ends and not (more and often_kept(surface, whole, hidden))
+    # What may not be open at all is missing a part only where that explains more.
+    unseen = hidden_by(surface, part) if more else []
+    missing = (surface.openings.hide_much or (more and hides_there(surface, unseen))) and not ends
+    missing = missing or often_left(whole, part)
+    return missing and not (more and ends_too(surface, part, unseen, ALIKE * limit))
+
+
+def _as_rival(surface: Surface, found: Hypothesis) -> Hypothesis:
+    """A group that asks for what may just end there.
+
+    To believe that what ends so evenly is missing a part takes as much as to believe in as much as was seen.
+    """
+    asked = belief_in_as_much(surface, found.placed)
+    return replace(found, need=math.hypot(found.need, asked), believed=math.hypot(found.believed, asked))
 
 
 def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float) -> Pool:

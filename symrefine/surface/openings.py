@@ -185,8 +185,11 @@ class Openings:
         if there_openings.doubted and there_openings.ends is not None:
             sure = at_border & ~there_openings.ends[target][back]
             # What ends before the others of its kind is where these go on to their ends, and not in the middle of them.
+            first = renumbered(begin[at_border], whole)[0]
             tips = np.bincount(patch[(away & self.border[::stride]).ravel()], minlength=whole)
-            free &= (most * np.bincount(own, sure, whole) >= begins) | (most * tips < begins)
+            free &= (most * np.bincount(own, sure, whole) >= begins) | (
+                most * tips < np.bincount(patch[first], minlength=whole)
+            )
         if len(group) >= TELLING and there.any():
             # What says nothing is asked where nothing else of a patch is at a border.
             asked = at_border | (there & (begins[own] == 0))
