@@ -759,7 +759,6 @@ def test_a_lone_mirror_is_weighed_as_far_as_its_curve_goes_whatever_tolerances_a
     assert (alone.point_group, alone.confidence) == (beside.point_group, pytest.approx(beside.confidence, abs=1e-9))
 
 
-@pytest.mark.slow
 def test_what_may_not_be_believed_of_a_group_may_be_of_a_part_of_it():
     """The four-fold axis through a hole keeps its border, and a three-fold one beside it does not."""
     mesh, truth = specimen("shape", "snub_balls")
@@ -769,6 +768,7 @@ def test_what_may_not_be_believed_of_a_group_may_be_of_a_part_of_it():
     assert is_subgroup(found.group, truth.group, np.radians(2.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tray", "paddles", "radiator"])
 def test_a_sample_sparser_than_walls_are_thick_tells_no_end_of_one_from_a_hole(name):
     """Sixteen neighbours are as wide: they see none of the ends, which what is not short shows to be some."""
