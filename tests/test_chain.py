@@ -408,6 +408,7 @@ def test_a_chain_ends_where_directions_part_what_together_makes_the_same_group_a
     assert len(set(names)) == len(names)
 
 
+@pytest.mark.slow
 def test_an_exact_group_stays_where_a_larger_one_that_it_is_no_part_of_is_found_first():
     """A ring of 100 atoms, which is D10h exactly and D100h nearly, at a tolerance between those."""
     made = instance("tolerances", "ring100 to D10h", 21)

@@ -678,6 +678,7 @@ def test_a_model_is_not_written_over_itself(tmp_path: Path, capsys: pytest.Captu
     assert path.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_what_others_put_into_a_folder_is_not_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A model is named by its number, which nobody typed; what export wrote itself, it writes anew."""
     shelf, part = tmp_path / "shelf", placed(tmp_path, prism(5), 1, "obj_000003.ply")
@@ -697,6 +698,7 @@ def test_what_others_put_into_a_folder_is_not_replaced(tmp_path: Path, capsys: p
     assert sorted(json.loads((tmp_path / "new" / "models_info.json").read_text())) == ["3"]
 
 
+@pytest.mark.slow
 def test_an_entry_that_is_replaced_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     info = tmp_path / "models_info.json"
     one, two = placed(tmp_path, prism(5), 1, "one.ply"), placed(tmp_path, prism(6), 2, "obj_000007.ply")
@@ -708,6 +710,7 @@ def test_an_entry_that_is_replaced_is_told(tmp_path: Path, capsys: pytest.Captur
     assert "object 1 was there, of a diameter of" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_folder_of_models_becomes_one_models_info(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

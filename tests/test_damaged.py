@@ -313,6 +313,7 @@ def test_a_clump_apart_is_told_and_a_part_apart_is_not():
     assert (one.point_group, one.clumps, one.outliers.min()) == ("C2v", 1, 12500)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "kind", "strength", "seed"),
     [
@@ -336,6 +337,7 @@ def test_a_few_strays_hide_no_group(name, kind, strength, seed):
     assert detect(made.points).point_group == truth.group.name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["swirl4", "skew_box"])
 def test_a_hole_whose_border_may_be_none_leaves_an_answer_that_may_be_less_than_all(name):
     case = damaged.Case(family="shape", name=name, kind="hole", strength=0.15, seed=777)
@@ -400,6 +402,7 @@ def test_a_clump_of_few_points_that_touches_the_body_is_found_by_what_it_speaks_
     assert made.strays[found.outliers].mean() > 0.9
 
 
+@pytest.mark.slow
 def test_what_is_taken_for_a_clump_may_be_a_part_and_the_answer_says_how_likely():
     """Noise as thick as a tap makes a ball of it: one of two may be missing, or somebody's finger is there."""
     faucet = [box((0, 0, 0), (0.6, 0.2, 0.06)), box((0, 0, 0.3), (0.09, 0.09, 0.6))]
@@ -641,6 +644,7 @@ def test_what_ends_all_along_misses_no_part(ends, group):
     assert found.point_group == group
 
 
+@pytest.mark.slow
 def test_a_border_that_hides_nothing_is_none():
     """Where hardly anything seems open what explains more has to lie there: not at the feet of a stool, a leg aside."""
     told = boundary.run(boundary.Case(family="furniture", name="stool broken", view=3, seed=93))
@@ -683,6 +687,7 @@ def test_beyond_a_short_border_a_detail_may_be_missing(name, seed):
     assert (found.point_group, found.at_least) == (truth.group.name, True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "strength", "seed"), [("hole", 0.15, 11), ("hole", 0.15, 12), ("cut", 0.1, 11)])
 def test_what_comes_to_lie_where_nothing_was_seen_tells_not_where_an_object_ends(kind, strength, seed):
     """Most of a foot is missing, so that turns take its border to where nothing is, next to that border."""
@@ -749,6 +754,7 @@ def test_what_details_tell_of_a_mirror_is_looked_at_whatever_was_seen_beside_it(
     assert found.point_group == "Cs" or [a.point_group for a in found.alternatives] == ["Cs"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 4])
 def test_a_lone_mirror_is_weighed_as_far_as_its_curve_goes_whatever_tolerances_are_told_besides(seed):
     rng = np.random.default_rng([seed, 10, 5])
@@ -830,6 +836,7 @@ def test_whether_a_place_was_looked_at_is_a_matter_of_the_place():
     assert not agreed(gap, unseen[1200:]).any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "strength"), [("crown_gear12", 0.05), ("crown_gear12", 0.15), ("crate", 0.05)])
 def test_what_most_operations_carry_to_a_hole_is_no_evidence_against_the_others(name, strength):
     made, truth = damaged.damaged(damaged.Case(family="shape", name=name, kind="hole", strength=strength, seed=1402))
@@ -973,6 +980,7 @@ def test_a_box_of_parallel_sides_with_a_corner_gone_keeps_its_inversion():
     assert right >= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("family", "name"), [("household", "sofa"), ("household", "chair"), ("shape", "chair")])
 def test_edges_tell_where_the_mirror_is_of_which_one_view_shows_one_side(family, name):
     """Of the sides that face along the normal one is seen; how far the mirror is from it, only the seat's edges say."""

@@ -357,6 +357,7 @@ def test_elements_of_atoms_count_as_labels_or_as_masses():
     assert detect(square, weights=[12.0, 14, 16, 19]).point_group == "Cs"
 
 
+@pytest.mark.slow
 def test_normals_given_or_not_and_their_signs():
     rng = np.random.default_rng(16)
     points, normals, _ = sample_surface(made("mug"), 8000, rng)

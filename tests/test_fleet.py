@@ -251,6 +251,7 @@ def test_what_is_no_row_is_told(text: str, message: str, tmp_path: Path, monkeyp
     assert path.read_text() == '{"x": 1}\n' + text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["t.csv", "t.parquet"])
 def test_a_table_holds_few_of_its_rows(name: str, tmp_path: Path) -> None:
     from pyarrow.parquet import read_table

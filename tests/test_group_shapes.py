@@ -148,6 +148,7 @@ def test_a_table_and_its_sibling_in_one_row_each():
     }
 
 
+@pytest.mark.slow
 def test_noise_as_thick_as_its_blades_draws_no_fit_of_a_rotor_away():
     """The moments knew the six-fold axis, fits went off it step by step, and C2h was told for sure."""
     row = run(Case(shape="rotor6", noise_rel=0.01, seed=36))

@@ -275,6 +275,7 @@ def test_a_scan_of_which_few_points_are_an_even_sample_is_judged_by_all(monkeypa
     assert len(measured.views) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["propeller9", "fan16"])
 def test_what_halves_blur_more_than_the_whole_hides_no_group(name):
     """Blades as thin as neighbourhoods, at the tolerance of 0.4 %, which noise between halves exceeds."""

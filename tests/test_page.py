@@ -239,6 +239,7 @@ def test_a_cube_is_three_lines_that_open() -> None:
         assert title in text
 
 
+@pytest.mark.slow
 def test_a_kind_is_open_only_if_those_above_it_are(any_case: Case, pages: Pages) -> None:
     opened = ["open" in tag for tag in re.findall("<details[^>]*>", pages(any_case))]
     assert opened == sorted(opened, reverse=True)
@@ -273,6 +274,7 @@ ASKED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("line", "part"), ASKED.values(), ids=ASKED)
 def test_the_lines_in_python_give_the_result_again(
     line: str, part: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

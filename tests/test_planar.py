@@ -47,6 +47,7 @@ def angle_off(normal: Array, direction_rad: float) -> float:
 # --- pictures ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "finish"), [(n, f) for k, n in enumerate(QUICK) for f in (FINISHES[k % 5], FINISHES[(k + 2) % 5])]
 )
@@ -158,6 +159,7 @@ def test_few_points_stand_for_themselves(fold: int, mirrored: bool, angle: float
     np.testing.assert_allclose(found.center, 10.0**size * np.array([0.3, -2.0]), atol=1e-4 * 10.0**size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["gauss", "wide gauss", "disc", "rectangle", "square"], ids=lambda name: name.replace(" ", "-")
 )
@@ -328,6 +330,7 @@ def test_detect_writes_json_of_two_columns(tmp_path: Path, capsys: pytest.Captur
     assert "threshold" not in record["options"]
 
 
+@pytest.mark.slow
 def test_detect_prints_round_and_undetermined(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rng = np.random.default_rng(0)
     angle = rng.uniform(0, 2 * np.pi, 1000)

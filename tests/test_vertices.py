@@ -367,6 +367,7 @@ def test_what_may_hold_for_all_that_samples_tell_is_no_answer(name):
     assert f"its vertices prove {proven}, and {truth.name} may hold as well" in found.undetermined
 
 
+@pytest.mark.slow
 def test_what_is_turned_has_the_fold_of_its_sides_where_that_matters():
     """Forty sides are out of round by 0.3 % of the radius; 180 by less than samples tell at any tolerance."""
     angles = 2.0 * np.pi * np.arange(40) / 40

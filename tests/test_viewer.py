@@ -191,6 +191,7 @@ def test_same_input_gives_same_content(tilted: Case, tmp_path: Path) -> None:
     assert rerun("rrd", "compare", path, tmp_path / "other.rrd").returncode != 0
 
 
+@pytest.mark.slow
 def test_a_scan_shows_what_was_seen_and_what_is_inferred(tmp_path: Path) -> None:
     made = damage.view(stool(5), unit(np.array([0.5, -0.8, 0.35])), np.random.default_rng(5))
     detection, shape, path = recorded(Shape(points=made.points, viewpoint=made.viewpoint), tmp_path)
