@@ -1,7 +1,7 @@
 """Where an object ends: an open border that a group carries onto itself is its own, and no hole in it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +10,7 @@ from symrefine.decide.hypotheses import Hypothesis, judged, seen_to_end
 from symrefine.decide.looks import few_motions
 from symrefine.geometry import Array, Isometry, Mask
 from symrefine.samples import GLANCE, LOOK
+from symrefine.shape import Index
 from symrefine.surface.misses import SURE
 from symrefine.surface.openings import MOST, TELLING, in_a_row
 from symrefine.surface.surface import Surface
@@ -106,15 +107,22 @@ def hides_there(surface: Surface, hidden: Sequence[tuple[Isometry, Mask]]) -> bo
 def _borders_of(surface: Surface, hidden: Sequence[tuple[Isometry, Mask]]) -> Mask:
     """Which local planes [M] make up the open borders that something lies at that is `hidden_by` a group."""
     assert surface.openings is not None
+    cloud, line = surface.cloud, surface.openings.line
+    row = np.full(len(line), -1)
+    row[line] = in_a_row(cloud.points[line], cloud.beside)
+    return np.isin(row, np.concatenate([row[border] for _, _, border in _at_borders(surface, hidden)]))
+
+
+def _at_borders(surface: Surface, hidden: Sequence[tuple[Isometry, Mask]]) -> Iterator[tuple[Isometry, Index, Index]]:
+    """Of each operation, which local planes of those `hidden_by` it come to lie at open borders, and at which there."""
+    assert surface.openings is not None
     cloud, line = surface.cloud, np.flatnonzero(surface.openings.line)
-    borders, row = Tree(cloud.points[line]), in_a_row(cloud.points[line], cloud.beside)
-    at = np.zeros(len(line), dtype=bool)
+    borders = Tree(cloud.points[line])
     for motion, some in hidden:
-        away, near = borders.nearest(motion.apply(cloud.points[some]))
-        at |= np.isin(row, row[near[away < cloud.beside]])
-    found = np.zeros(len(cloud.points), dtype=bool)
-    found[line[at]] = True
-    return found
+        own = np.flatnonzero(some)
+        away, near = borders.nearest(motion.apply(cloud.points[own]))
+        beside = away < cloud.beside
+        yield motion, own[beside], line[near[beside]]
 
 
 def _goes_on(surface: Surface, hidden: Sequence[tuple[Isometry, Mask]]) -> bool:
@@ -126,13 +134,10 @@ def _goes_on(surface: Surface, hidden: Sequence[tuple[Isometry, Mask]]) -> bool:
     """
     if surface.openings is None:
         return True
-    cloud, line, along = surface.cloud, surface.openings.line, []
-    borders, normals = Tree(cloud.points[line]), cloud.normals[line]
-    for motion, some in hidden:
-        away, near = borders.nearest(motion.apply(cloud.points[some]))
-        beside = away < cloud.beside
-        if beside.any():
-            cosines = np.einsum("ni,ni->n", motion.turn(cloud.normals[some]), normals[near])[beside]
+    normals, along = surface.cloud.normals, []
+    for motion, own, border in _at_borders(surface, hidden):
+        if own.size:
+            cosines = np.einsum("ni,ni->n", motion.turn(normals[own]), normals[border])
             along.append(float(np.mean(cosines**2) + SURE * math.sqrt(4.0 / 45.0 / len(cosines))))
     return not along or float(np.median(along)) >= 1.0 / 3.0
 
