@@ -168,6 +168,16 @@ def test_strays_beside_a_volume_stand_off_and_its_fuzzy_ends_do_not():
         assert len(sampling(cloud, np.random.default_rng(0), outliers=True).strays) == 0
 
 
+@pytest.mark.parametrize("dense", [12000, 14000])
+def test_walls_near_one_another_are_no_strays_however_dense_another_part_is(dense):
+    # The neighbours of a point lie in both walls of a cup, so that they are no plane: but they thin out as a surface.
+    rng = np.random.default_rng(11)
+    wall = [(0.0, 0.0), (0.5, 0.0), (0.5, 0.6), (0.47, 0.6), (0.47, 0.03), (0.0, 0.03)]
+    cup, handle = join([revolve(wall, 64)]), join([box((0.6, 0.0, 0.3), (0.06, 0.06, 0.3))])
+    points = np.concatenate([sample(cup, 20000 - dense, 0.002, rng), sample(handle, dense, 0.002, rng)])
+    assert len(sampling(points, np.random.default_rng(0), outliers=True, groups=False).strays) < 0.02 * len(points)
+
+
 @pytest.mark.parametrize("ratio", [10.0, 100.0])
 def test_an_even_sample_undoes_a_density_that_falls_off(ratio):
     made = damage.uneven(BRICK, ratio, np.random.default_rng(5))

@@ -14,6 +14,7 @@ import numpy as np
 
 from symrefine.geometry import Array, Mask, hull_volume
 from symrefine.rounding import START_ERROR
+from symrefine.samples import LOOK
 from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import clumps, filled
 from symrefine.surface.misses import SHARES
@@ -166,7 +167,7 @@ def _alone(around: Surroundings) -> Mask:
         loose |= reach[sparse] > FAR**2 * np.median(reach[around.near[sparse]], axis=1)
         # As random points are among themselves, or far from what is dense around: parts that are sampled sparsely are
         # in planes, most of them, or thin.
-        if 2 * loose.sum() <= len(loose) or not _scattered(points[sparse[loose]], points):
+        if 2 * loose.sum() <= len(loose) or not _scattered(points[sparse[loose]], around.tree):
             loose &= reach[sparse] > FAR * reach[around.near[sparse]].min(axis=1)
         found[sparse] = loose
     return found
@@ -196,14 +197,33 @@ def _in_no_plane(points: Array, others: Array, near: Index, away: Array) -> Mask
     return np.asarray((thickness_of(variances) > FLAT) | (across > FLAT * away[:, -1]))
 
 
-def _scattered(points: Array, body: Array) -> bool:
-    """Whether most of points [N, 3] lie no closer together than random ones in the hull of a body [M, 3] would."""
+def _scattered(points: Array, body: Tree) -> bool:
+    """Whether most of points [N, 3] lie as random ones do in the hull of the body that they are points of.
+
+    No closer together, and not as along a surface: the distance to the k-th neighbour grows as the third root of k in a
+    volume, and as the second along a surface, however near another lies.
+    """
     neighbours = AROUND // 2
     if len(points) <= neighbours:
         return False
     away = Tree(points).query(points, 1, skip=neighbours)[0]
     # The ball to the eighth neighbour should then hold eight; of thin parts that are sampled sparsely a tenth of one.
-    return bool(4.0 / 3.0 * np.pi * np.median(away) ** 3 * len(points) > hull_volume(body))
+    if 4.0 / 3.0 * np.pi * np.median(away) ** 3 * len(points) <= hull_volume(body.points):
+        return False
+    few, many = AROUND, len(points) // neighbours
+    if many < 2 * few:
+        return True  # so few tell no growth
+    # Where a box ends it grows faster as well, as random points in it tell.
+    centred = points - points.mean(axis=0)
+    along = centred @ np.linalg.eigh(centred.T @ centred)[1]
+    peers = np.random.default_rng(0).uniform(along.min(axis=0), along.max(axis=0), along.shape)
+
+    def growth(of: Array, among: Tree) -> float:
+        asked = of[:: -(-len(of) // LOOK)]
+        least, most = (np.median(among.query(asked, 1, skip=k)[0]) for k in (few, many))
+        return math.log(most / least) if least > 0.0 else math.inf
+
+    return growth(points, body) < 0.5 * (growth(peers, Tree(peers)) + 0.5 * math.log(many / few))
 
 
 def _is_uneven(around: Surroundings, points: Array) -> bool:
