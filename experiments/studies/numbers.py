@@ -151,7 +151,7 @@ KIND_OF = {
     "told": {
         "decide.posterior": "NEAR LEAST",
         "detection.story": "LADDER",
-        "detection.verification": "MOST BINS",
+        "detection.verification": "BINS",
         "front.answers": "SIZE",
         "front.lines": "LABEL TOLD",
         "ntuples.notation": "_WIDTH _READABLE",

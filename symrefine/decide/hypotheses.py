@@ -257,7 +257,7 @@ def _closely_judged(surface: Surface, found: tuple[Element, ...], need: float) -
         about = Axis(direction=axis.operations.direction, point=axis.center)
         fold = _fold(surface.skin, about)
         if fold and (len(found) > 1 or math.isinf(highest)) and not surface.looked_about(about, fold):
-            # Turns alone tell their axis best.
+            # Turns alone tell their axis best: judged, the surface is folded about where they are fitted.
             start = PointGroup(name=f"C{fold}", frame=frame_with_z(about.direction))
             fitted(surface, Placed(group=start, center=about.point))
         exact = axis.need <= exact_need(surface.floor) and math.isfinite(highest)

@@ -14,10 +14,12 @@ from symrefine.fit.placed import elements
 from symrefine.geometry import Array, Isometry
 from symrefine.stream import Stream
 from symrefine.surface.misses import LIMITS, Deviation, disc_distances
+from symrefine.surface.surface import HOPELESS
 from symrefine.threads import one_thread
 
-# Misses end at so many tolerances, and are counted in so many bins up to there: percentiles to 3 % of the tolerance.
-MOST, BINS = 3.0 * LIMITS[-1], 200
+# Misses end where nothing is told apart any more, and are counted in so many bins up to there: percentiles to 3 % of
+# the tolerance.
+BINS = 200
 
 
 @one_thread()
@@ -35,7 +37,7 @@ def verified(found: Detection, points: Stream) -> Detection:
     if not motions:
         return found
     sums = [_Tally() for _ in motions]
-    bound, own, done = MOST * found.tolerance * found.surface.diagonal, 0, 0
+    bound, own, done = HOPELESS * LIMITS[-1] * found.tolerance * found.surface.diagonal, 0, 0
     with clock("verify"):
         floor = found.floor
         for every in points:

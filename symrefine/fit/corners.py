@@ -12,11 +12,11 @@ import numpy as np
 
 from symrefine.fit.distinct import Distinct
 from symrefine.fit.facets import Facets
-from symrefine.fit.ordered import ordered
 from symrefine.fit.triangles import Triangles
 from symrefine.geometry import Array
 from symrefine.rounding import SINGLE
 from symrefine.shape import Index, Shape
+from symrefine.surface.ordered import ordered
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.fit.ordered import ordered
 from symrefine.geometry import Array, unit
 from symrefine.groups.standard import GOLDEN
 from symrefine.shape import Index, Shape
 from symrefine.surface.neighbourhoods import connected_parts
+from symrefine.surface.ordered import ordered
 from symrefine.surface.tree import pairs_within
 
 

@@ -10,11 +10,11 @@ from typing import cast
 
 import numpy as np
 
-from symrefine.fit.ordered import ordered
 from symrefine.fit.triangles import Triangles
 from symrefine.geometry import Array, Mask, dots
 from symrefine.shape import Index
 from symrefine.surface.neighbourhoods import connected_parts, renumbered
+from symrefine.surface.ordered import ordered
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -123,7 +123,9 @@ class Facets:
         told = np.zeros(len(self.labels), dtype=np.uint64)
         np.add.at(told, self.of, self.often.astype(np.uint64) * (one[here] * two[there] - one[there] * two[here]))
         told = np.minimum(told, np.negative(told))  # seen from either side
-        return cast(Index, np.unique(told ^ of_kind[kinds]))
+        # What `unique` tells apart by a table takes ten times as long.
+        told = np.sort(told ^ of_kind[kinds])
+        return cast(Index, told[np.append(np.ones(min(1, len(told)), dtype=bool), told[1:] != told[:-1])])
 
 
 def _longer(facets: Facets, points: Array, within: float) -> Facets:

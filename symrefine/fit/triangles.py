@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.fit.ordered import ordered
 from symrefine.geometry import Array, Mask, column_dots
 from symrefine.shape import Index
 from symrefine.surface.neighbourhoods import smallest_eigenvectors
+from symrefine.surface.ordered import ordered
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -94,7 +94,7 @@ def mesh_nodes(shape: Shape, degree: int) -> tuple[Array, Array]:
     faces, areas, normals = _triangles(shape)
     bary, weights = triangle_rule(degree)
     corners = (shape.points - shape.points[0])[faces]
-    nodes = np.einsum("qk,fkd->fqd", bary, corners)
+    nodes = bary @ corners
     if shape.measure == "solid":
         areas = areas * np.einsum("fd,fd->f", corners[:, 0], normals)
     return nodes.reshape(-1, 3), np.multiply.outer(areas, weights).ravel()

@@ -8,7 +8,7 @@ from symrefine.geometry import Array, ReadOnly, frame_with_z, rotation
 from symrefine.groups.names import CLOSED_FOLD
 from symrefine.rounding import DOUBLE
 
-# Bins of the circle for each order: what a bin blurs is then below a thousandth, and is put right.
+# Bins of the circle for each order: what a bin blurs is then below a hundredth, and is put right.
 BINS_PER_ORDER = 16
 # Share of the azimuthal energy that may be no multiple of a fold.
 LEAK = 0.35

@@ -94,8 +94,10 @@ def parts_among(around: Surroundings) -> Index:
     """Number of the part that each of some points belongs to: they hang together if each is near the other."""
     count = len(around.points)
     one, other = np.repeat(np.arange(count), AROUND), around.near.ravel()
-    mutual = (around.near[other] == one[:, None]).any(axis=1)
-    return connected_parts(one[mutual], other[mutual], count)
+    # A pair that is told twice is told from either side.
+    told = np.sort(np.minimum(one, other) * count + np.maximum(one, other))
+    mutual = told[1:][told[1:] == told[:-1]]
+    return connected_parts(mutual // count, mutual % count, count)
 
 
 def filled(points: Array, around: Surroundings, rng: np.random.Generator) -> list[Index]:

@@ -19,6 +19,7 @@ from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import clumps, filled
 from symrefine.surface.misses import SHARES
 from symrefine.surface.neighbourhoods import FLAT, WIDEST, fills_volume, planes_of, thickness_of
+from symrefine.surface.ordered import ordered
 from symrefine.surface.surroundings import AROUND, Surroundings, around_some, some_of
 from symrefine.surface.tree import Tree
 
@@ -68,9 +69,11 @@ def distinct(points: Array, labels: Index | None) -> tuple[Index, Index]:
     along = np.sort(points[:, 0])
     if not (along[1:] == along[:-1]).any():
         return np.arange(len(points)), np.arange(len(points))
-    rows = points if labels is None else np.column_stack([points, labels])
-    _, first, own = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    return np.sort(first), np.argsort(np.argsort(first))[own.reshape(-1)]
+    order, begins = ordered([*points.T] if labels is None else [*points.T, labels])
+    first, which = order[begins], np.empty_like(order)
+    some = np.sort(first)
+    which[order] = np.repeat(np.searchsorted(some, first), np.diff(begins, append=len(order)))
+    return some, which
 
 
 def sampling(

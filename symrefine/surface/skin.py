@@ -203,6 +203,11 @@ class Skin:
         return Tree(self.points) if self.given is None else self.given
 
     @cached_property
+    def spread(self) -> tuple[Array, Array]:
+        """Mean [3] and covariance [3, 3] of the points."""
+        return self.points.mean(axis=0), np.cov(self.points.T, bias=True)
+
+    @cached_property
     def spacing(self) -> float:
         """Median distance from a point to the nearest other one."""
         return _spacing(self.tree.query(self._probes, AROUND)[0])

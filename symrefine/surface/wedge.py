@@ -5,6 +5,7 @@ mirror seems to hold that does not. But of n wedges that show the same each poin
 holds all points is known n times as densely, by neighbourhoods of as many points that are n times as small.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -50,7 +51,7 @@ class Wedge:
         """The wedge of a skin about an axis of so many folds."""
         rng, frame, pitch = np.random.default_rng(0), frame_with_z(axis.direction), 2.0 * np.pi / fold
         local = (skin.points - axis.point) @ frame.T
-        pick = drawn(len(local), round(min(_denser(skin, local, pitch) / fold, 1.0) * len(local)), rng)
+        pick = drawn(len(local), round(min(_denser(skin, axis, pitch) / fold, 1.0) * len(local)), rng)
         turned, turns = _into(local[pick], pitch)
         whole = Skin(
             points=turned,
@@ -72,7 +73,7 @@ class Wedge:
     @classmethod
     def is_needless(cls, skin: Skin, axis: Axis, fold: int) -> bool:
         """Whether the neighbourhoods of a skin are small enough to tell of so many folds about an axis."""
-        return _denser(skin, (skin.points - axis.point) @ frame_with_z(axis.direction).T, 2.0 * np.pi / fold) <= 1.0
+        return _denser(skin, axis, 2.0 * np.pi / fold) <= 1.0
 
     @property
     def pitch(self) -> float:
@@ -115,9 +116,11 @@ class Wedge:
         return Isometry(matrix=kept, shift=np.array([0.0, 0.0, shift[2]]))
 
 
-def _denser(skin: Skin, local: Array, pitch: float) -> float:
-    """How many times as densely a wedge has to be known as a skin is, of points [N, 3] about the third axis."""
-    width = pitch * float(np.sqrt((local[:, :2] ** 2).sum(axis=1).mean()))
+def _denser(skin: Skin, axis: Axis, pitch: float) -> float:
+    """How many times as densely a wedge about an axis has to be known as a skin is."""
+    across, (mean, covariance) = frame_with_z(axis.direction)[:2], skin.spread
+    from_axis = across @ (mean - axis.point)
+    width = pitch * math.sqrt(np.trace(across @ covariance @ across.T) + from_axis @ from_axis)
     return float((2.0 * ACROSS * skin.width / width) ** 2)
 
 
