@@ -25,8 +25,9 @@ from symrefine.surface.skin import Body, LocalPlanes
 # first two, a mailbox's flag the last) and every true one but a posed ant stays below.
 LIMITS = (0.22, 0.75, 1.15, 1.6, 1.85)
 SHARES = (0.05, 0.03, 0.01, 0.006)
-# A smaller detail, and what it may miss by as the limits go on from 5 to 0.6 %. Of 4,000 points so few are hardly a
-# sample: among noise they would be taken for a detail in one of seven draws, so that they count beyond all of it.
+# A smaller detail, and what it may miss by: a little more than the 2.2 to which the limits go on from 5 to 0.6 %. Of
+# 4,000 points so few are hardly a sample: among noise they would be taken for a detail in one of seven draws, so that
+# they count beyond all of it.
 SPECK, SPECK_LIMIT = 0.003, 2.5
 # The same for atoms, of mean, 95th percentile and the farthest: noise moves every one of them, and every one counts.
 ATOM_LIMITS = (0.9, 1.3, 1.6)

@@ -17,10 +17,11 @@ from symrefine.surface.tree import Tree
 NEIGHBOURS = (12, 24, 48, 96, 192)
 # Neighbourhoods wider than this (RMS radii) blur the shape itself, whatever the noise.
 WIDEST = 0.2
-# Thickness over width below which a neighbourhood counts as a plane.
+# Thickness over width, or over length, below which neighbourhoods count as planes; where noise may make them thick,
+# over that of a blob.
 FLAT = 0.3
 # Median flatness of neighbourhoods up to WIDEST_BLOB wide (RMS radii), over that of a blob, from which on points fill a
-# volume.
+# volume; the median thickness of large parts of a clump, over that of a ball.
 VOLUME = 0.8
 WIDEST_BLOB = 0.5
 # Cells that larger neighbourhoods are put together from: with half as many, the rims alone add a tenth to the noise.
