@@ -168,6 +168,12 @@ def test_strays_beside_a_volume_stand_off_and_its_fuzzy_ends_do_not():
         assert len(sampling(cloud, np.random.default_rng(0), outliers=True).strays) == 0
 
 
+@pytest.mark.parametrize("name", ["wheel5", "bossed_cube"])
+def test_what_is_sampled_sparsely_beside_a_dense_part_is_no_stray(name):
+    made = damage.dense(specimen("shape", name)[0], 30.0, np.random.default_rng(1))
+    assert len(sampling(made.points, np.random.default_rng(0), outliers=True).strays) < 0.02 * len(made.points)
+
+
 @pytest.mark.parametrize("dense", [12000, 14000])
 def test_walls_near_one_another_are_no_strays_however_dense_another_part_is(dense):
     # The neighbours of a point lie in both walls of a cup, so that they are no plane: but they thin out as a surface.

@@ -102,6 +102,14 @@ def _thinned(points: Array, ratio: float, rng: Rng) -> Array:
     return points[rng.choice(len(points), min(POINTS, len(points)), replace=False, p=chance / chance.sum())]
 
 
+def dense(mesh: Shape, ratio: float, rng: Rng) -> Damaged:
+    """A tenth of the surface, around some point, so many times as dense as the rest."""
+    points = _whole(mesh, rng, 10 * POINTS)
+    away = np.linalg.norm(points - points[rng.integers(len(points))], axis=1)
+    chance = np.where(away < np.quantile(away, 0.1), ratio, 1.0)
+    return _left(points[rng.choice(len(points), POINTS, replace=False, p=chance / chance.sum())])
+
+
 def hole(mesh: Shape, share: float, rng: Rng) -> Damaged:
     """A share of the points gone, those around some point of the surface."""
     points = _whole(mesh, rng)
@@ -212,6 +220,7 @@ KINDS: dict[str, tuple[Damage, tuple[float, ...]]] = {
     "mild": (mild, (0.05,)),
     "floor": (ground, (1.1, 1.5, 3.0)),
     "tabletop": (tabletop, (1.0, 2.0)),
+    "dense": (dense, (10.0, 30.0)),
 }
 # Kinds of which it is told that there is a floor.
 FLOORS = ("floor", "tabletop")

@@ -226,7 +226,8 @@ def _scattered(points: Array, body: Tree) -> bool:
         least, most = (np.median(among.query(asked, 1, skip=k)[0]) for k in (few, many))
         return math.log(most / least) if least > 0.0 else math.inf
 
-    return growth(points, body) < 0.5 * (growth(peers, Tree(peers)) + 0.5 * math.log(many / few))
+    # What is thin or has spokes goes a quarter of the way to a surface, and more; strays none, as a body is near them.
+    return growth(points, body) < 0.75 * growth(peers, Tree(peers)) + 0.25 * 0.5 * math.log(many / few)
 
 
 def _is_uneven(around: Surroundings, points: Array) -> bool:
