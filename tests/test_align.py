@@ -906,6 +906,7 @@ def test_cuts_from_opposite_sides(det: int) -> None:
     assert found.rms < 0.005
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("det", "factor"), [(1, 0.4), (-1, 3.0)])
 def test_the_scale_of_parts(det: int, factor: float) -> None:
     source, target, matrix = cut_pair(det, 0.7, 0)
@@ -1112,6 +1113,7 @@ def test_a_flat_part_in_common_says_that_it_slides_or_is_chance(seed: int) -> No
     assert found.confidence == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [21, 22, 24])
 @pytest.mark.parametrize("det", DETERMINANTS)
 def test_parts_end_where_no_slide_does_better(det: int, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:

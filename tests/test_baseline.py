@@ -510,6 +510,7 @@ def test_scale_and_shift_change_nothing_and_a_turn_only_what_the_cells_do():
         assert min(degrees(turn @ plane.normal, p.normal) for p in turned.planes) < 0.5
 
 
+@pytest.mark.slow
 def test_fewer_outer_iterations_are_the_beginning_of_more():
     points, normals = samples(table(), 3000, 0.005, 3)
     short = ecins(points, normals, settings=replace(SHIPPED, max_outer=4))
@@ -639,6 +640,7 @@ def test_nothing_is_left_at_two_percent_noise():
     assert (row["found"], row["false"], row["worst_deg"], row["iterations"]) == (0, 0, None, None)
 
 
+@pytest.mark.slow
 def test_the_trace_converges_on_what_is_found():
     case = Case(shape="pyramid5", points=5000)
     row, trace = baseline_check.run(case), baseline_check.trace(case)

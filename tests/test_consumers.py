@@ -534,6 +534,7 @@ def placed(tmp_path: Path, shape: Shape, seed: int, name: str = "part.ply") -> P
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sides", "top", "group", "order"), [(6, 1.0, "D6h", 12), (5, 0.6, "C5v", 5), (96, 1.0, "Dinfh", 0)]
 )

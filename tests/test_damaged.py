@@ -130,6 +130,7 @@ def test_a_volume_has_no_strays():
 SOLID = [("D6h-41", "outliers", 0.1), ("D3d-41", "uneven", 10.0), ("D5h-41", "clump", 0.05)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "kind", "strength"), SOLID)
 def test_what_is_solid_to_a_few_of_the_points_is_asked_of_all(name, kind, strength):
     """To 5,000 points many small parts are solid; strays, density and clumps are told all the same."""
@@ -614,6 +615,7 @@ def test_a_cut_that_one_of_many_mirrors_keeps_hides_no_other():
     assert found.point_group in ("Cs", truth.group.name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("make", "group"), [(table, "C4v"), (lambda: BRICK, "D2h"), (bottle, "Cinfv")])
 @pytest.mark.parametrize("kind", ["hole", "cut"])
 def test_missing_surface_is_no_evidence_against(make, group, kind):
@@ -1005,6 +1007,7 @@ def test_edges_tell_where_the_mirror_is_of_which_one_view_shows_one_side(family,
     assert row.told[0].error_deg < 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [5, 11, 12])
 def test_a_view_whose_points_are_told_twice_says_the_same(seed):
     mesh, _ = specimen("household", "sofa")

@@ -205,6 +205,7 @@ def test_printed_matrices_are_orthogonal_to_the_printed_digits():
     np.testing.assert_array_equal(np.array(solo.PRINTED["F"]) @ solo.PRINTED["R"], solo.PRINTED["R_F"])
 
 
+@pytest.mark.slow
 def test_mug_in_two_poses():
     row = solo.run(solo.Case(name="mug", points=8000))
     assert row["right"]

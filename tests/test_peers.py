@@ -125,6 +125,7 @@ def test_the_real_pymatgen_where_it_is_installed():
 # --- registration -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("det", [1, -1])
 @pytest.mark.parametrize("name", [name for name in PEERS if installed(name)])
 def test_registration_peers_are_asked_for_both_hands(name, det):

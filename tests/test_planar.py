@@ -410,6 +410,7 @@ def test_the_tone_of_an_area_may_be_any(tone):
     assert found.confidence > 0.95
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 8, 14])
 def test_a_fit_that_ends_beside_a_line_hides_no_better_start(seed):
     """One of twelve marks is larger; where grain puts the doublets' line off, its fit ends beside the mirror."""
@@ -427,6 +428,7 @@ def test_a_fit_that_ends_beside_a_line_hides_no_better_start(seed):
     assert angle_off(found.lines[0].line.normal, angles[0]) < 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fold", [37, 40, 60])
 def test_folds_of_many_points_are_no_divisors(fold):
     angles = 2.0 * np.pi * np.arange(fold) / fold + 0.3
@@ -435,6 +437,7 @@ def test_folds_of_many_points_are_no_divisors(fold):
     assert (found.point_group, found.confidence > 0.95) == (f"D{fold}", True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("grain", [0.0, 0.03])
 def test_what_stands_out_from_a_faint_object_counts(grain):
     """Black hands on a grey clock face cover less than a twentieth of it; grain alone stands out as well."""

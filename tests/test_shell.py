@@ -474,6 +474,7 @@ def test_bash_completes(run: Run, folder: Path, typed: str, offered: str) -> Non
 # --- readers that leave -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ def test_icons_of_64_pixels_are_right(icon: str, quality: int) -> None:
     assert answer(Case(icon=icon, side=64, quality=quality)).verdict == "right"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", [32, 48])
 @pytest.mark.parametrize("icon", [*NAMES, "A DejaVu Sans normal", "N DejaVu Serif normal"])
 def test_smaller_ones_are_never_sure_and_wrong(icon: str, side: int) -> None:

@@ -219,6 +219,7 @@ def test_points_that_coincide_stay_together() -> None:
 # --- clouds of a surface ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sides", "name", "noise_rel"), [(4, "C4v", 0.0), (3, "C3v", 0.004), (5, "Cs", 0.002)])
 def test_a_cloud_becomes_a_union_of_orbits(sides: int, name: str, noise_rel: float) -> None:
     rng = np.random.default_rng(sides)

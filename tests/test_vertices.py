@@ -344,6 +344,7 @@ def test_what_is_exact_holds_at_any_tolerance(name, tolerance):
     assert found.group.distance_rad(truth.operations()).max() < 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["skew_box", "gear12", "rotor3"])
 def test_what_is_broken_by_more_than_a_small_tolerance_is_not_told_there(name):
     shape, _, _, _ = posed(name, 6)
