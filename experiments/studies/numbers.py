@@ -61,7 +61,7 @@ KIND_OF = {
         "surface.misses": "LIMITS SHARES SPECK SPECK_LIMIT ATOM_LIMITS SURE RIM",
         "surface.neighbourhoods": "WIDEST FLAT VOLUME WIDEST_BLOB",
         "surface.openings": "ASIDE OPEN FAR_ASIDE BENDS WIRE EVIDENT MOST PARTED",
-        "surface.sampling": "FAR DENSER",
+        "surface.sampling": "ALONG FAR DENSER",
         "surface.skin": "FEW",
         "texture": "COLOUR_TOLERANCE RARE",
         "rounding": "TOLERANCE",

@@ -28,6 +28,9 @@ from symrefine.surface.tree import Tree
 FAR = 2.5
 # A round that finds fewer strays than this share is the last: what remains lies within the spacing of the surface.
 LAST = 0.001
+# How far neighbours thin out like those of a surface, on the way there from points strewn in a box: sparse parts of
+# most bodies with spokes, legs and thin walls by 0.2 to 0.9, strays by less than 0, as the body is near them.
+ALONG = 0.25
 # Density over the least up to which weights make up for it: there neighbourhoods are one step of sizes narrower.
 DENSER = 2.0
 
@@ -226,8 +229,8 @@ def _scattered(points: Array, body: Tree) -> bool:
         least, most = (np.median(among.query(asked, 1, skip=k)[0]) for k in (few, many))
         return math.log(most / least) if least > 0.0 else math.inf
 
-    # What is thin or has spokes goes a quarter of the way to a surface, and more; strays none, as a body is near them.
-    return growth(points, body) < 0.75 * growth(peers, Tree(peers)) + 0.25 * 0.5 * math.log(many / few)
+    strewn, spread = growth(peers, Tree(peers)), 0.5 * math.log(many / few)
+    return growth(points, body) < strewn + ALONG * (spread - strewn)
 
 
 def _is_uneven(around: Surroundings, points: Array) -> bool:
