@@ -19,6 +19,7 @@ from symrefine.ntuples.contract import ntuples
 from symrefine.ntuples.rank import fixed_subspace
 from symrefine.plane import detect_planar
 from symrefine.surface.misses import TOLERANCE
+from symrefine.surface.ordered import distinct
 from symrefine.surface.sampling import sampling
 
 RANKS = {"vanish": 0, "axis": 1, "plane": 2, "none": 3}
@@ -282,3 +283,20 @@ def test_what_halves_blur_more_than_the_whole_hides_no_group(name):
     made = instance("rotors", name, 24)
     points = sample(made.shape, 20_000, 0.0, np.random.default_rng(3))
     assert detect(points, tolerance=0.004).point_group == made.truth.group.name
+
+
+def test_places_far_from_another_are_as_many_as_they_are():
+    # 1e16 from the lowest coordinate 0.3 and 0.4 are as far from it, and the other columns are whole.
+    points = np.zeros((6, 3))
+    points[:, 0] = [-1e16, 0.3, 0.4, 0.3, 1.0, -0.0]
+    first, own = distinct(points, None)
+    assert first.tolist() == [0, 1, 2, 4, 5]
+    assert own.tolist() == [0, 1, 2, 1, 3, 4]
+
+
+@pytest.mark.parametrize("start", [0.0, -0.5, -1.0, 0.25, -0.1])
+def test_places_on_a_grid_are_as_many_as_they_are(start):
+    points = start + np.random.default_rng(1).integers(0, 3, (200, 3))
+    first, own = distinct(points, None)
+    assert len(first) == len(np.unique(points, axis=0)) == 27
+    assert np.array_equal(points[first][own], points)

@@ -29,7 +29,8 @@ from symrefine.surface.floor import Floor, floor_of
 from symrefine.surface.misses import TOLERANCE, disc_distances, noise_distances
 from symrefine.surface.neighbourhoods import fills_volume
 from symrefine.surface.openings import NEIGHBOURS, openings
-from symrefine.surface.sampling import Sampling, distinct, face_densities, sampling
+from symrefine.surface.ordered import distinct
+from symrefine.surface.sampling import Sampling, face_densities, sampling
 from symrefine.surface.skin import FEW, LocalPlanes, drawn, isolated_points, make_skin
 from symrefine.surface.surface import Surface
 from symrefine.surface.tree import Tree, morton_order

@@ -125,7 +125,7 @@ class Facets:
         told = np.minimum(told, np.negative(told))  # seen from either side
         # What `unique` tells apart by a table takes ten times as long.
         told = np.sort(told ^ of_kind[kinds])
-        return cast(Index, told[np.append(np.ones(min(1, len(told)), dtype=bool), told[1:] != told[:-1])])
+        return cast(Index, told[np.append(True, told[1:] != told[:-1])])
 
 
 def _longer(facets: Facets, points: Array, within: float) -> Facets:

@@ -12,6 +12,7 @@ from symrefine.load.labels import triangle_classes
 from symrefine.load.paint import texture_of
 from symrefine.load.polygons import negligible, triangulate
 from symrefine.shape import Index
+from symrefine.surface.ordered import distinct
 
 _LOG = logging.getLogger(__name__)
 
@@ -65,10 +66,5 @@ def _check_range(content: Content, faces: Polygons) -> None:
 
 def _merged(points: Array, triangles: Index) -> tuple[Array, Index]:
     """One vertex for each set of exactly equal ones, in the order of their first appearance."""
-    order = np.lexsort(points.T[::-1])
-    # Stable sorting: the first of equal vertices comes first. -0.0 equals 0.0 here, as it should.
-    new = np.concatenate([[True], (points[order[1:]] != points[order[:-1]]).any(axis=1)])
-    first = np.empty(len(points), dtype=np.int64)
-    first[order] = order[new][np.cumsum(new) - 1]
-    kept, compact = np.unique(first, return_inverse=True)
+    kept, compact = distinct(points, None)  # -0.0 equals 0.0 here, as it should
     return points[kept], compact[triangles]

@@ -31,6 +31,21 @@ def ordered(columns: Sequence[Array | Index]) -> tuple[Index, Index]:
     return order, np.flatnonzero(np.append(np.ones(min(1, count), dtype=bool), new))
 
 
+def distinct(points: Array, labels: Index | None) -> tuple[Index, Index]:
+    """Indices [M], ascending, of points [N, 3] without those of a label [N] that repeat another, and whose each is [N].
+
+    A place that is told more than once is no more surface, and no neighbours but its own copies would be around it.
+    """
+    along = np.sort(points[:, 0])
+    if not (along[1:] == along[:-1]).any():
+        return np.arange(len(points)), np.arange(len(points))
+    order, begins = ordered([*points.T] if labels is None else [*points.T, labels])
+    first, which = order[begins], np.empty_like(order)
+    some = np.sort(first)
+    which[order] = np.repeat(np.searchsorted(some, first), np.diff(begins, append=len(order)))
+    return some, which
+
+
 def _packed(columns: Sequence[Array | Index]) -> tuple[Index | None, int]:
     """One number [N] for each row, which stand in order as rows do, and how many there may be; None if it is too wide.
 
@@ -39,15 +54,16 @@ def _packed(columns: Sequence[Array | Index]) -> tuple[Index | None, int]:
     if not len(columns[0]):
         return None, 0
     lows = [column.min() for column in columns]
-    widths = [int(column.max()) - int(low) + 1 for column, low in zip(columns, lows, strict=True)]
+    # Halves are a whole step apart, too.
+    widths = [int(column.max().item() - low.item()) + 1 for column, low in zip(columns, lows, strict=True)]
     wide = math.prod(widths)
     if wide > 2**63:
         return None, wide
     key = np.zeros(len(columns[0]), dtype=np.int64)
     for column, low, width in zip(columns, lows, widths, strict=True):
         place = (column - low).astype(np.int64)
-        if column.dtype.kind == "f" and not np.array_equal(place, column - low):
-            return None, wide
+        if column.dtype.kind == "f" and not np.array_equal(low + place, column):
+            return None, wide  # far from the lowest what is no whole step away seems to be
         key *= width
         key += place
     return key, wide

@@ -19,7 +19,6 @@ from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import clumps, filled
 from symrefine.surface.misses import SHARES
 from symrefine.surface.neighbourhoods import FLAT, WIDEST, fills_volume, planes_of, thickness_of
-from symrefine.surface.ordered import ordered
 from symrefine.surface.surroundings import AROUND, Surroundings, around_some, some_of
 from symrefine.surface.tree import Tree
 
@@ -62,21 +61,6 @@ class Sampling:
         """So many points that are all kept as they are."""
         every = np.arange(count)
         return cls(kept=every, even=every, strays=every[:0])
-
-
-def distinct(points: Array, labels: Index | None) -> tuple[Index, Index]:
-    """Indices [M], ascending, of points [N, 3] without those of a label [N] that repeat another, and whose each is [N].
-
-    A place that is told more than once is no more surface, and no neighbours but its own copies would be around it.
-    """
-    along = np.sort(points[:, 0])
-    if not (along[1:] == along[:-1]).any():
-        return np.arange(len(points)), np.arange(len(points))
-    order, begins = ordered([*points.T] if labels is None else [*points.T, labels])
-    first, which = order[begins], np.empty_like(order)
-    some = np.sort(first)
-    which[order] = np.repeat(np.searchsorted(some, first), np.diff(begins, append=len(order)))
-    return some, which
 
 
 def sampling(
