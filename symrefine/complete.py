@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from symrefine.detection.masses import is_few
 from symrefine.detection.result import Detection
 from symrefine.errors import InputError
 from symrefine.fit.placed import Placed
@@ -78,7 +77,7 @@ def check_scan(shape: Shape) -> None:
     Raises:
         InputError: a mesh, atoms, or points that are not of space.
     """
-    if shape.faces is not None or shape.dim != 3 or is_few(shape):
+    if shape.faces is not None or shape.dim != 3 or shape.atoms:
         told = "completion is for clouds of the surface of an object in space"
         if shape.faces is not None:
             told += (

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from symrefine.detection.masses import heavy, is_few
+from symrefine.detection.masses import heavy
 from symrefine.detection.measure import Outliers, floor_under
 from symrefine.detection.sketch import MANY, is_large, sampled, sketched
 from symrefine.errors import InputError, about
@@ -91,6 +91,6 @@ def body(shape: Shape, *, outliers: Outliers = "auto") -> Array:
     points = heavy(shape).points
     if (floor := floor_under(shape, outliers)) is not None:
         points = points[~floor.covers(points)]
-    if shape.faces is not None or is_few(shape):
+    if shape.faces is not None or shape.atoms:
         return points
     return points[sampling(points, np.random.default_rng(0), outliers=outliers != "none").kept]

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symrefine.errors import DegenerateShapeError, InputError, about
 from symrefine.geometry import Array, numbers, read_only, unmasked
+from symrefine.options import flag_of
 from symrefine.texture import Texture
 
 Measure = Literal["points", "surface", "solid"]
@@ -17,6 +18,8 @@ Index = NDArray[np.integer[Any]]
 CAMERAS = 64
 # Masses of atoms that differ by more than this fraction are masses of different kinds.
 SAME_MASS = 0.01
+# Up to so many points of a cloud stand for themselves (atoms, markers, corners), if nothing else is said.
+FEW = 250
 # Squares of areas between such points are still numbers; no unit of length asks for more.
 LARGEST = 1e60
 
@@ -47,6 +50,8 @@ class Shape:
         texture: what colours the triangles of a mesh; the shape has a group without it, and one with it.
         unit: of its lengths, one of `symrefine.units.METRES`, where the source says so.
         elements: whether the labels are atomic numbers.
+        isolated: whether the points stand for themselves, as atoms, markers and corners do, and are no samples of a
+            surface; if None they do where they have elements, or are at most 250.
         source: where the data came from, for messages.
 
     Raises:
@@ -66,6 +71,7 @@ class Shape:
     texture: Texture | None = None
     unit: str | None = None
     elements: bool = False
+    isolated: bool | None = None
     source: str = "array"
 
     def __post_init__(self) -> None:
@@ -86,7 +92,9 @@ class Shape:
             yield "normals", _normals(self.normals, self.points)
         if self.faces is not None:
             yield "faces", _faces(self.faces, self.points)
-        for name in ("weights", "normals", "viewpoint"):
+        if self.isolated is not None:
+            yield "isolated", flag_of("isolated", self.isolated)
+        for name in ("weights", "normals", "viewpoint", "isolated"):
             if self.faces is not None and getattr(self, name) is not None:
                 raise InputError(f"{name} is for clouds; a mesh has faces, leave it out")
         if self.labels is not None:
@@ -130,6 +138,13 @@ class Shape:
     def dim(self) -> int:
         """Dimension of the ambient space."""
         return int(self.points.shape[1])
+
+    @property
+    def atoms(self) -> bool:
+        """Whether the points stand for themselves, and not for a surface."""
+        if self.isolated is None:
+            return self.faces is None and (self.elements or len(self.points) <= FEW)
+        return self.isolated
 
     @property
     def masses(self) -> Array:

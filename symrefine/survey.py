@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from symrefine.detection.masses import heavy, is_few
+from symrefine.detection.masses import heavy
 from symrefine.detection.measure import floor_under
 from symrefine.detection.sketch import is_large, sampled
 from symrefine.errors import DegenerateShapeError
@@ -122,7 +122,7 @@ def survey(shape: Shape) -> Survey:
         DegenerateShapeError: the points do not spread.
     """
     kind: Literal["mesh", "cloud", "points"] = "mesh" if shape.faces is not None else "cloud"
-    if kind == "cloud" and (shape.dim != 3 or is_few(shape)):
+    if kind == "cloud" and (shape.dim != 3 or shape.atoms):
         kind = "points"
     places = np.unique(shape.points, axis=0)
     return Survey(

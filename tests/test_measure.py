@@ -9,7 +9,6 @@ import pytest
 from experiments.objects.boundary import instance
 from experiments.objects.shapes import bottle, mug, sample, table
 from symrefine import Shape, detect
-from symrefine.detection.masses import is_few
 from symrefine.detection.measure import doubt, gather, measure
 from symrefine.geometry import random_orthogonal
 from symrefine.groups import point_group
@@ -203,7 +202,7 @@ def test_of_few_points_the_tuples_are_as_measured(name):
     rng = np.random.default_rng(7)
     group = point_group(name, random_orthogonal(rng))
     points = np.einsum("kij,pj->kpi", group.operations(), rng.standard_normal((4, 3))).reshape(-1, 3)
-    assert is_few(Shape.of(points))
+    assert Shape.of(points).atoms
     measured = measure(Shape.of(points))
     assert RANKS[measured.tuples.kind] == np.linalg.matrix_rank(group.operations().mean(axis=0), tol=1e-9)
     found = detect(points).tuples

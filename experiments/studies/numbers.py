@@ -62,10 +62,9 @@ KIND_OF = {
         "surface.neighbourhoods": "WIDEST FLAT VOLUME WIDEST_BLOB",
         "surface.openings": "ASIDE OPEN FAR_ASIDE BENDS WIRE EVIDENT MOST PARTED",
         "surface.sampling": "ALONG FAR DENSER",
-        "surface.skin": "FEW",
         "texture": "COLOUR_TOLERANCE RARE",
         "rounding": "TOLERANCE",
-        "shape": "SAME_MASS",
+        "shape": "FEW SAME_MASS",
         "propose.folds": "LEAK",
     },
     "looks": {

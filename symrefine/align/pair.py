@@ -22,7 +22,7 @@ from symrefine.shape import Shape
 from symrefine.surface.misses import disc_distances, needs
 from symrefine.surface.neighbourhoods import NEIGHBOURS
 from symrefine.surface.sampling import Sampling, sampling
-from symrefine.surface.skin import FEW, LocalPlanes, Patches, Skin, isolated_points, make_skin
+from symrefine.surface.skin import LocalPlanes, Patches, Skin, isolated_points, make_skin
 from symrefine.surface.surface import Surface
 
 # Flatness of thin sheets and edges without noise (0.13 at most at the lower quartile); noise of 0.2 % makes it 0.17.
@@ -274,4 +274,4 @@ def sampled(mesh: Shape, count: int, rng: np.random.Generator) -> Shape:
 
 def few(source: Shape, target: Shape) -> bool:
     """Whether both are sets of points that stand for themselves."""
-    return all(s.faces is None and len(s.points) <= FEW for s in (source, target))
+    return source.atoms and target.atoms

@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.csv",
         help="what to look at instead of PATH: a column `path`, relative to this file, and any of id, scale "
         "(millimetres in one unit), tolerance, units, measure, seed, frame, outliers, viewpoint, labels, weights, "
-        "which count before the options of the same name",
+        "isolated (yes or no), which count before the options of the same name",
     )
     parser.add_argument("--out", metavar="FILE.jsonl", help="append the rows to this file (default: print only)")
     parser.add_argument("--bop", metavar="FILE", help="put the symmetries of all into this models_info.json of BOP")

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # What is written for the path of a file that comes on stdin, and what it is called afterwards.
 STDIN, NAME = "-", "stdin"
 # Options that say what of a file is read, and how.
-_READING = ("intrinsics", "depth_scale", "mask", "viewpoint", "measure", "labels", "weights", "frame", "texture")
+_READING = tuple("intrinsics depth_scale mask viewpoint isolated measure labels weights frame texture".split())
 # The labels that are no field of a file, but the colours of its images.
 TEXTURE = "texture"
 # Objects of one file that are taken at once: their records, of some ten kilobytes each, are kept for one array.
@@ -200,13 +200,13 @@ def scans(path: str, options: dict[str, Any], *, in_chunks: bool = False, **pict
         return Frames("images", 1, lambda _: load_depth(path, camera, **depth))
     if depth:
         raise InputError(f"{path}: {_option(next(iter(depth)))} goes with --intrinsics, which make it a depth image")
-    viewpoint = said.pop("viewpoint", None)
+    told: dict[str, Any] = {name: said.pop(name) for name in ("viewpoint", "isolated") if name in said}
     if "frame" in said:
-        return Frames("objects", 1, lambda _: _seen(load(path, **said, **picture), viewpoint))
+        return Frames("objects", 1, lambda _: _told(load(path, **said, **picture), told))
     found = load_frames(path, **said, **picture)
     if len(found) > FRAMES:
         raise InputError(f"{path}: holds {len(found)} {found.what}, more than {FRAMES}; choose one with --frame")
-    return Frames(found.what, len(found), lambda k: _seen(found[k], viewpoint))
+    return Frames(found.what, len(found), lambda k: _told(found[k], told))
 
 
 def read_scan(path: str, options: dict[str, Any]) -> Any:
@@ -217,15 +217,13 @@ def read_scan(path: str, options: dict[str, Any]) -> Any:
     return frames[0]
 
 
-def _seen(shape: "Shape", viewpoint: Sequence[float] | None) -> "Shape":
-    """A cloud with the place of the camera that saw it, where that was told."""
-    if viewpoint is None:
-        return shape
-    if shape.dim != 3 or shape.faces is not None:
+def _told(shape: "Shape", told: dict[str, Any]) -> "Shape":
+    """A shape with what was told of its points besides: where the camera stood, whether they stand for themselves."""
+    if "viewpoint" in told and (shape.dim != 3 or shape.faces is not None):
         raise InputError(f"{shape.source}: --viewpoint is for clouds in space, leave it out")
-    import numpy as np
-
-    return replace(shape, viewpoint=np.array(viewpoint))
+    if "isolated" in told and shape.faces is not None:
+        raise InputError(f"{shape.source}: --isolated is for points, this is a mesh; leave it out")
+    return replace(shape, **told) if told else shape
 
 
 def _option(name: str) -> str:

@@ -104,6 +104,7 @@ _OPTIONS: Mapping[str, Callable[[str], Any]] = {
     "viewpoint": values.place,
     "labels": str,
     "weights": str,
+    "isolated": lambda text: _one_of("yes", "no")(text) == "yes",
 }
 
 

@@ -21,6 +21,7 @@ from symrefine.picture.words import (
     exactly,
     kind_name,
     meaning,
+    more_for,
     planar_meaning,
     sampled,
     taken_out,
@@ -93,8 +94,8 @@ def _verified(said: Record) -> str:
 
 def partial(record: Record) -> str:
     """What was not seen, and what of the surface speaks for what was found."""
-    if record["strewn"]:
-        return "strays that are left near the surface may hide more"
+    if record["strewn"] or record["sparse"]:
+        return more_for(strewn=record["strewn"], sparse=record["sparse"])
     seen = [e["coverage"] for e in (*record["planes"], *record["axes"])]
     if not seen:
         return "parts of the surface were not seen: there may be more"

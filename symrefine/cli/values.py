@@ -116,7 +116,7 @@ def detection_options(args: argparse.Namespace) -> dict[str, Any]:
 
 def reading_options(args: argparse.Namespace) -> dict[str, Any]:
     """What was chosen of the options that say how points were taken and what of the file counts, where given."""
-    how = "frame outliers viewpoint intrinsics depth_scale mask units labels weights verify texture"
+    how = "frame outliers viewpoint intrinsics depth_scale mask units labels weights isolated verify texture"
     return {name: given for name in how.split() if (given := getattr(args, name, None)) is not None}
 
 
@@ -143,6 +143,13 @@ def add_reading_options(parser: argparse.ArgumentParser, *, textured: str = _BES
         metavar="NAME",
         help="masses of the points of a cloud: a property, titled column or array of numbers (default: equal, or the "
         "array `weights` of .npz)",
+    )
+    parser.add_argument(
+        "--isolated",
+        action="store_true",
+        default=None,
+        help="the points stand for themselves, as markers and corners do, and are no samples of a surface, however "
+        "many there are (default: where they are atoms, or at most 250)",
     )
     parser.add_argument(
         "--frame",

@@ -12,7 +12,7 @@ from operator import attrgetter
 from symrefine.decide.hypotheses import NOTHING, Hypothesis, fitted, has_all, hidden_need, single
 from symrefine.decide.joins import better_parts, is_loose, join, size_of
 from symrefine.decide.looks import COARSE, by_chance
-from symrefine.decide.place import is_told, least_elsewhere
+from symrefine.decide.place import is_told, least_elsewhere, told_apart
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import ALIKE, ALONE, lenience
 from symrefine.fit.placed import joined
@@ -78,7 +78,13 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
             need, elsewhere = min(max(part.need, told[-1].need), link.need), least_elsewhere(surface, part.placed)
             told.append(replace(part, need=need, elsewhere=elsewhere))
         told.append(link)
-    return tuple(told)
+    return tuple(_beside_chance(surface, link) for link in told)
+
+
+def _beside_chance(surface: Surface, link: Hypothesis) -> Hypothesis:
+    """A link with how likely it is there by more than chance, where that says anything of it."""
+    apart = told_apart(surface, link.placed, link.need)
+    return link if apart == 1.0 else replace(link, apart=apart)
 
 
 def _unbroken(surface: Surface, found: Hypothesis) -> Hypothesis | None:

@@ -56,8 +56,9 @@ class Hypothesis:
     `history` holds the iterates of the fit; `before` counts those of the parts that it was put together from. `seen` is
     what it needs by what was seen alone, without belief in the rest, which denies nothing either; `believed` is the
     part, in squares, of what it needs that is belief. `rivals` are those that may be meant as well as it, and
-    instead of it. Where cameras are known, `told` says whether what they saw of its elements makes up the group, and
-    `elsewhere` what it needs at least where it does not stand. What is `proven` holds by what was not measured.
+    instead of it. Of atoms, `apart` says how likely they have it by more than standing densely. Where cameras are
+    known, `told` says whether what they saw of its elements makes up the group, and `elsewhere` what it needs at least
+    where it does not stand. What is `proven` holds by what was not measured.
     """
 
     placed: Placed
@@ -70,6 +71,7 @@ class Hypothesis:
     rivals: tuple[Placed, ...] = ()
     told: bool = True
     elsewhere: float = math.inf
+    apart: float = 1.0
     proven: bool = False
 
     @property

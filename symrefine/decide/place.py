@@ -5,21 +5,27 @@ back, and one through the axis of a round cup that carries its handle there turn
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
 from symrefine.decide.looks import GLANCED, exact_need, few_motions, start_error
+from symrefine.decide.posterior import Link, meant
 from symrefine.fit.matching import match
-from symrefine.fit.placed import Operations, Placed, joined
+from symrefine.fit.placed import Operations, Placed, elements, joined
 from symrefine.fit.refine import Framed, pair_gram
 from symrefine.fit.residual import SIZE, design_rows, frame_model, gram
 from symrefine.fit.vertices import ROUNDED
-from symrefine.geometry import Array
+from symrefine.geometry import Array, Isometry, rotation
 from symrefine.groups import is_subgroup
+from symrefine.groups.names import MAX_FOLD
+from symrefine.rounding import SINGLE
 from symrefine.samples import GLANCE, LOOK
-from symrefine.surface.skin import LocalPlanes
+from symrefine.shape import Index
+from symrefine.surface.neighbourhoods import connected_parts
+from symrefine.surface.skin import LocalPlanes, with_class
 from symrefine.surface.surface import Surface
+from symrefine.surface.tree import pairs_within
 
 # Share of a surface that has to be carried onto itself for anything to be said of an operation.
 SUPPORTED = 0.15
@@ -61,6 +67,36 @@ def slack(surface: Surface, placed: Placed) -> Array:
     space = np.kron(np.eye(2), state.frame)
     along = ways @ space
     return np.einsum("w,wi,wj->ij", (down**2 - down * up + up**2) / 3.0, along, along)
+
+
+def told_apart(surface: Surface, placed: Placed, need: float) -> float:
+    """How likely it is that atoms have a group, which needs so much, by more than standing densely; 1 of a surface.
+
+    Wherever images come to lie, some atom is near. So what a group needs counts beside what it needs elsewhere as it
+    does beside the tolerance, and the share of atoms that are no image of any beside 1 / e, that of maps at random. A
+    continuous group carries each atom along a curve, and so leaves it where it is; but for atoms that follow one
+    another so closely about its axes that no fold there has a name.
+    """
+    cloud = surface.cloud
+    if cloud.body != "atoms" or need <= 0.0:
+        return 1.0
+    # A file may tell an atom twice.
+    one, other = pairs_within(with_class(cloud.points, cloud.labels), SINGLE * surface.diagonal).T
+    at = connected_parts(one, other, len(cloud.points))
+    if placed.group.is_finite:
+        every = at.max() + 1
+        missed = max(1.0 - len(np.unique(at[near])) / every for near in _images(cloud, few_motions(placed)))
+        return meant(Link(need=missed), 1.0 / math.e) * meant(Link(need=need), least_elsewhere(surface, placed))
+    axes = [part for part in elements(placed.group) if math.isinf(part.order)]
+    turns = [m for part in axes for m in part.motions(placed.center)]
+    still = min(float((at[near] == at).mean()) for near in _images(cloud, turns))
+    least = [Isometry.about(placed.center, rotation(part.direction, math.pi / MAX_FOLD)) for part in axes]
+    return max(still, *(float((at[near] != at).mean()) for near in _images(cloud, least)))
+
+
+def _images(cloud: LocalPlanes, motions: Iterable[Isometry]) -> Iterator[Index]:
+    """Which atom is nearest to the image of each [N], operation by operation."""
+    return (cloud.nearest(m.apply(cloud.points), cloud.labels)[1] for m in motions)
 
 
 def _ways(surface: Surface, placed: Placed) -> tuple[Framed, Array]:

@@ -8,15 +8,9 @@ from symrefine.geometry import Array
 from symrefine.moments.moments import Moments, shape_moments
 from symrefine.moments.quadrature import mesh_nodes
 from symrefine.shape import Index, Shape, kinds_of_mass
-from symrefine.surface.skin import FEW
 
 # Order of the moments.
 ORDER = 8
-
-
-def is_few(shape: Shape) -> bool:
-    """Whether the points are few enough to stand for themselves."""
-    return shape.faces is None and len(shape.points) <= FEW
 
 
 def heavy(shape: Shape) -> Shape:
@@ -27,7 +21,7 @@ def heavy(shape: Shape) -> Shape:
 def classes_of(shape: Shape) -> Index | None:
     """Classes 0, 1, ... of the points (faces, for a mesh) that must match: labels, and masses where points are few."""
     kinds = [] if shape.labels is None else [shape.labels]
-    if is_few(shape) and shape.weights is not None:
+    if shape.atoms and shape.weights is not None:
         kinds.append(kinds_of_mass(shape.weights))
     if not kinds:
         return None

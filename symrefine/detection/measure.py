@@ -10,7 +10,7 @@ import numpy as np
 
 from symrefine.decide.doubts import on_a_line, set_by_strays
 from symrefine.decide.posterior import least_told
-from symrefine.detection.masses import class_moments, classes_of, heavy, is_few
+from symrefine.detection.masses import class_moments, classes_of, heavy
 from symrefine.errors import InputError
 from symrefine.fit.placed import Placed
 from symrefine.fit.vertices import OnVertices, exact_symmetry
@@ -21,7 +21,7 @@ from symrefine.ntuples.contract import NTuples, ntuples
 from symrefine.ntuples.rank import FixedSubspace, fixed_subspace
 from symrefine.propose.candidates import Evidence
 from symrefine.samples import COUNT
-from symrefine.shape import Index, Shape
+from symrefine.shape import FEW, Index, Shape
 from symrefine.surface.cameras import Camera, cameras, outwards
 from symrefine.surface.clumps import Clump
 from symrefine.surface.drift import Drift
@@ -31,7 +31,7 @@ from symrefine.surface.neighbourhoods import fills_volume
 from symrefine.surface.openings import NEIGHBOURS, openings
 from symrefine.surface.ordered import distinct
 from symrefine.surface.sampling import Sampling, face_densities, sampling
-from symrefine.surface.skin import FEW, LocalPlanes, drawn, isolated_points, make_skin
+from symrefine.surface.skin import LocalPlanes, drawn, isolated_points, make_skin
 from symrefine.surface.surface import Surface
 from symrefine.surface.tree import Tree, morton_order
 
@@ -133,10 +133,10 @@ def measure(
         massive = np.flatnonzero(shape.weights > 0)
         shape = shape.chosen(massive)  # points of no mass are no part of the object
     every, own = shape, cast(Index, np.arange(len(shape.points)))
-    if shape.faces is None and shape.weights is None and not is_few(shape):
+    if shape.faces is None and shape.weights is None and not shape.atoms:
         some, own = distinct(shape.points, shape.labels)
         shape = shape.chosen(some) if len(some) < len(own) else shape
-    as_given = shape.faces is not None or is_few(shape)
+    as_given = shape.faces is not None or shape.atoms
     seen = Sampling.as_given(len(shape.points))
     if not as_given:
         # What stands in front parts what a camera sees, and hides its counterparts.
@@ -160,7 +160,7 @@ def measure(
     if whole is not None and shape is every:
         moments = whole
     else:
-        parts = 0 if is_few(shape) or shape.faces is not None else PARTS
+        parts = 0 if shape.atoms or shape.faces is not None else PARTS
         moments = class_moments(shape, classes, parts=parts, density=density)
     vectors = ntuples(moments)
     return Measured(
@@ -190,7 +190,7 @@ def floor_under(shape: Shape, outliers: Outliers) -> Floor | None:
         raise InputError(f"outliers is {outliers!r}; expected one of {list(get_args(Outliers))}")
     if outliers != "floor":
         return None
-    if shape.faces is not None or is_few(shape):
+    if shape.faces is not None or shape.atoms:
         what = "a mesh" if shape.faces is not None else f"{len(shape.points)} points"
         raise InputError(
             f"{shape.source}: outliers is 'floor', for a cloud of what stands on one, of more than {FEW} points; "
@@ -209,7 +209,7 @@ def doubt(measured: Measured, surface: Surface, tolerance: float) -> str:
 
 def _on_a_line(measured: Measured) -> str:
     """Points on a line; but atoms there are a molecule."""
-    if is_few(measured.shape) and measured.shape.labels is not None:
+    if measured.shape.atoms and measured.shape.labels is not None:
         return ""
     said = on_a_line(measured.moments.covariance)
     return said and f"{said}; label them if they are the atoms of a molecule"
@@ -220,8 +220,8 @@ def _few_decide(measured: Measured) -> str:
     shape = measured.shape
     if shape.faces is not None:
         return ""
-    strays = set_by_strays(shape.points, few=is_few(shape))
-    if strays or is_few(shape) or shape.weights is None or measured.is_thinned:
+    strays = set_by_strays(shape.points, few=shape.atoms)
+    if strays or shape.atoms or shape.weights is None or measured.is_thinned:
         return strays
     count = float(shape.weights.sum() / shape.weights.max())
     if count > FEW:
@@ -271,9 +271,9 @@ def gather(measured: Measured, rng: np.random.Generator, tolerance: float = TOLE
         tuples=measured.tuples,
         points=local,
         weights=weights / weights.sum(),
-        atoms=is_few(shape),
+        atoms=shape.atoms,
     )
-    if is_few(shape):
+    if shape.atoms:
         return evidence, Surface(cloud=isolated_points(local, labels), diagonal=tight_diagonal(local))
     if measured.solid and normals is None and fills_volume(local, Tree(local)):
         return evidence, _volume(local, labels, tolerance, rng)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from symrefine.decide.posterior import Alternative
-from symrefine.detection.examination import Examined
+from symrefine.detection.examined import Examined
 from symrefine.detection.sketch import Sample
 from symrefine.fit.refine import Iterate
 from symrefine.geometry import Array, Axis, Plane, ReadOnly
@@ -150,10 +150,12 @@ class Detection(ReadOnly):
         candidates: what was proposed and given up before a full fit, the nearest misses first.
         outliers: indices, ascending, of the points that were taken as no part of the object; of a stream among those of
             its sample.
-        at_least: whether the surface has open borders beyond which nobody looked, or is `strewn`: the object may have
-            more symmetry.
+        at_least: whether the surface has open borders beyond which nobody looked, or is `strewn`, or `sparse`: the
+            object may have more symmetry.
         strewn: whether so many strays are left beside the surface that they may hide some, and all of it was seen, or
             a group of points that may be a clump, or a part of it, alone speaks against a larger group.
+        sparse: whether so few points were taken to stand for themselves, as they are carried onto one another, and may
+            have been made of samples of a surface, of which they tell too little.
         floor: what the object stands on, in input units, where that was told and found: outliers, too.
         no_floor: whether that was told and none found.
         clumps: how many groups of them stand apart from the body, the others being single strays.
@@ -200,6 +202,7 @@ class Detection(ReadOnly):
     even_sample: int | None
     at_least: bool
     strewn: bool
+    sparse: bool
     origin: Array
     scale: float
     verified: Verified | None = None
@@ -210,7 +213,7 @@ class Detection(ReadOnly):
     @property
     def is_partial(self) -> bool:
         """Whether there may be more for parts of the surface that were not seen."""
-        return self.at_least and not self.strewn
+        return self.at_least and not (self.strewn or self.sparse)
 
     def own(self, shape: Shape) -> Shape:
         """The shape it was found in without the outliers, if a floor is among them: what stands on it."""

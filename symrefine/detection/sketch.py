@@ -69,7 +69,7 @@ class Sketch:
 
 def is_large(shape: Shape) -> bool:
     """Whether a sample is to stand for the surface of a shape."""
-    return shape.faces is None and shape.dim == 3 and len(shape.points) > MANY
+    return shape.faces is None and shape.dim == 3 and len(shape.points) > MANY and not shape.atoms
 
 
 def sampled(shape: Shape, seed: int = 0) -> Shape:

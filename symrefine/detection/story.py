@@ -13,7 +13,8 @@ from symrefine.decide.hypotheses import Element, Hypothesis, fitted, judged
 from symrefine.decide.looks import COARSE, look_stride, start_error
 from symrefine.decide.place import slack
 from symrefine.decide.posterior import NEAR, Decision, alternatives
-from symrefine.detection.examination import Examined, examined
+from symrefine.detection.examination import examined
+from symrefine.detection.examined import Examined
 from symrefine.detection.measure import Measured, Outliers
 from symrefine.detection.result import Candidate, Detection, Exact, FoundAxis, FoundPlane, NearMiss, Step
 from symrefine.detection.sketch import Sketch
@@ -203,8 +204,9 @@ def _report(
         ),
         outliers=found.outliers,
         outlier_share=found.outlier_share,
-        at_least=(found.pool.at_least or strewn or hidden) and more,
+        at_least=(found.pool.at_least or strewn or hidden or found.sparse) and more,
         strewn=strewn and more,
+        sparse=found.sparse,
         floor=measured.floor,
         no_floor=found.no_floor,
         clumps=len(measured.clumps),

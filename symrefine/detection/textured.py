@@ -16,7 +16,8 @@ from symrefine.decide.hypotheses import MOVED_EACH, NOTHING, SAME_RAD, Element, 
 from symrefine.decide.looks import exact_need, few_motions
 from symrefine.decide.posterior import ALIKE
 from symrefine.decide.subgroups import subgroup_chain
-from symrefine.detection.examination import Examined, examined
+from symrefine.detection.examination import examined
+from symrefine.detection.examined import Examined
 from symrefine.detection.measure import PLANES, SAMPLES
 from symrefine.detection.result import Detection
 from symrefine.detection.story import told

@@ -48,6 +48,7 @@ def detection_record(
         **_answer(d),
         "at_least": bool(d.at_least),
         "strewn": bool(d.strewn),
+        "sparse": bool(d.sparse),
         "outliers": {
             "count": len(d.outliers),
             "clumps": int(d.clumps),

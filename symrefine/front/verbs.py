@@ -37,6 +37,7 @@ def detect(
     normals: ArrayLike | None = None,
     labels: ArrayLike | None = None,
     viewpoint: ArrayLike | None = None,
+    isolated: bool | None = None,
     outliers: "Outliers" = "auto",
     tolerance: float | str = TOLERANCE,
     units: str | None = None,
@@ -60,6 +61,8 @@ def detect(
         normals: [N, n] normals, any sign; estimated where absent.
         labels: [N] whole numbers, [F] for a mesh: classes (elements, colours, materials) that every symmetry must keep.
         viewpoint: [3] or [N, 3] place of the camera that saw the points, or each of them.
+        isolated: whether the points stand for themselves, as atoms, markers and corners do, and are no samples of a
+            surface; if None they do where they have elements, or are at most 250.
         outliers: "auto": points of a cloud that belong to no surface are set apart; "floor": so is the plane that the
             object stands on; "none": all points count.
         tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal, or as a
@@ -82,6 +85,7 @@ def detect(
     if verify not in ("sample", "all"):
         raise InputError(f"verify is {verify!r}; expected 'sample' or 'all'")
     beside: dict[str, Any] = {"weights": weights, "normals": normals, "labels": labels, "viewpoint": viewpoint}
+    beside["isolated"] = isolated
     large = stream_of(shape) if frame is None and all(given is None for given in beside.values()) else None
     shape = shape_of(shape, frame=frame, **beside) if large is None else large
     used = relative_tolerance(tolerance, shape, units=units, outliers=outliers)

@@ -281,11 +281,11 @@ def _shape(content: Content, file: Path, wanted: Wanted, *, source: str) -> Shap
             raise InputError("has no faces, so no texture; leave it out for clouds")
         passed(len(content.points), len(content.points))
         arrays = _arrays(content, wanted, None if "measure" in kind.takes else wanted.measure, source)
-    # Labels that count unasked are elements, and lengths between them angstroms.
-    elements = wanted.labels is None and content.labels is not None
-    return Shape(
-        source=source, unit=content.unit or kind.unit or ("A" if elements else None), elements=elements, **arrays
-    )
+    # Labels that count unasked are elements, of atoms whatever else is asked of these, and lengths then are angstroms.
+    atoms = content.labels is not None
+    elements = wanted.labels is None and atoms
+    unit = content.unit or kind.unit or ("A" if elements else None)
+    return Shape(source=source, unit=unit, elements=elements, isolated=atoms or None, **arrays)
 
 
 def _check_options(kind: _Format, wanted: Wanted, *, is_chosen: bool) -> None:

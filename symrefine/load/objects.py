@@ -35,6 +35,7 @@ def shape_of(
     normals: ArrayLike | None = None,
     labels: ArrayLike | None = None,
     viewpoint: ArrayLike | None = None,
+    isolated: bool | None = None,
 ) -> Shape:
     """The shape of whatever is given, a mesh treated as one from a file is.
 
@@ -48,12 +49,14 @@ def shape_of(
         normals: as of `Shape`.
         labels: as of `Shape`.
         viewpoint: as of `Shape`.
+        isolated: as of `Shape`, whatever the object says of that.
 
     Raises:
         InputError: an object that offers none of these, or what `load` and `Shape` refuse.
         DegenerateShapeError: fewer than two distinct points.
     """
     extra = {"weights": weights, "normals": normals, "labels": labels, "viewpoint": viewpoint}
+    extra |= {"isolated": isolated}
     told: dict[str, Any] = {key: value for key, value in extra.items() if value is not None}
     _check_values(given, told)
     if isinstance(given, str | PathLike):
@@ -75,7 +78,7 @@ def shape_of(
     if content is not None:
         bare = Shape(content.points, normals=content.normals, labels=content.labels, source=source)
         if content.labels is not None:
-            bare = replace(bare, unit="A", elements=True)
+            bare = replace(bare, unit="A", elements=True, isolated=True)
         return _completed(bare, told)
     if objects_of(given) is not None:
         raise InputError(f"{name}: holds several objects; give one of them at a time")
@@ -150,7 +153,7 @@ def _completed(shape: Shape, told: dict[str, Any]) -> Shape:
     Raises:
         InputError: it has that already.
     """
-    twice = [name for name in told if getattr(shape, name) is not None]
+    twice = [name for name in told if name != "isolated" and getattr(shape, name) is not None]
     if twice:
         raise InputError(f"{shape.source}: brings its own {twice[0]}; leave {twice[0]} out, or give the points alone")
     return replace(shape, **told) if told else shape

@@ -19,7 +19,6 @@ from symrefine.ntuples.contract import PAPER_ORDERS, ntuples
 from symrefine.ntuples.rank import FLOOR, FixedSubspace, fixed_subspace
 from symrefine.shape import Shape
 from symrefine.surface.misses import TOLERANCE
-from symrefine.surface.skin import FEW
 from symrefine.threads import one_thread
 
 # Dimensions up to which moments of order 5 are few enough.
@@ -88,7 +87,7 @@ def detect_nd(
         tolerance: what still counts as symmetric: points that stand for themselves may miss by this fraction of the
             diameter; the moments of samples, and n-tuples, by a tenth of it.
         sampled: whether the points are random samples of the object, whose noise hides what is smaller, or the object
-            itself; more than 250 points are samples if None.
+            itself; what the shape says if None.
         seed: of the random starts.
 
     Raises:
@@ -101,7 +100,7 @@ def detect_nd(
         what = "a mesh" if shape.faces is not None else f"{shape.dim} coordinates"
         rows = "; a row is a point, transpose them?" if len(shape.points) <= LARGEST_DIM < shape.dim else ""
         raise InputError(f"{shape.source}: {what}; detect_nd takes points of 2 to {LARGEST_DIM} coordinates{rows}")
-    sampled = len(shape.points) > FEW if sampled is None else sampled
+    sampled = not shape.atoms if sampled is None else sampled
     clock = Clock()
     with clock("moments"):
         moments = shape_moments(shape, 5, parts=PARTS if sampled else 0)

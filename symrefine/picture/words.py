@@ -162,6 +162,18 @@ def body_name(body: str) -> str:
     return "surface" if body == "surface" else "points"
 
 
+def more_for(*, strewn: bool, sparse: bool) -> str:
+    """Why there may be more symmetry than was found."""
+    if strewn:
+        return "strays that are left near the surface may hide more"
+    if sparse:
+        return (
+            "its points are carried onto one another, so they stand for themselves; if samples of a surface were "
+            "copied so, there may be more (--isolated says that none were)"
+        )
+    return "parts of the surface were not seen: there may be more"
+
+
 def scanned(detection: Detection) -> str:
     """What is to be said of the points: how exact vertices are, outliers, parts that were not seen; or nothing."""
     d = detection
@@ -169,9 +181,8 @@ def scanned(detection: Detection) -> str:
     exact = "" if d.exact is None else exactly(d.exact.miss, d.exact.faces, d.exact.point_group)
     apart = taken_out(len(d.outliers), d.outlier_share, d.clumps, floor=d.floor is not None)
     told = exact, apart, NO_FLOOR if d.no_floor else "", sampled(of), evened(d.even_sample)
-    unseen = "Parts of the surface were not seen: there may be more." if d.is_partial else ""
-    unseen = "Strays that are left near the surface may hide more." if d.strewn else unseen
-    return " ".join(said for said in (*(f"{t[:1].upper()}{t[1:]}." for t in told if t), unseen) if said)
+    more = more_for(strewn=d.strewn, sparse=d.sparse) if d.at_least else ""
+    return " ".join(f"{t[:1].upper()}{t[1:]}." for t in (*told, more) if t)
 
 
 def verdicts_told(detection: Detection) -> str:

@@ -10,10 +10,10 @@ import numpy as np
 from symrefine.geometry import Array, Isometry, corners
 from symrefine.plane.raster import Raster, between, coarser, outlines, raster_of
 from symrefine.samples import COUNT
-from symrefine.shape import Index, kinds_of_mass
+from symrefine.shape import FEW, Index, kinds_of_mass
 from symrefine.surface.misses import LIMITS, SHARES, Deviation, disc_distances, miss_distances, noise_distances
 from symrefine.surface.neighbourhoods import NEIGHBOURS
-from symrefine.surface.skin import FEW, LocalPlanes, drawn, isolated_points, local_planes, make_skin
+from symrefine.surface.skin import LocalPlanes, drawn, isolated_points, local_planes, make_skin
 from symrefine.surface.surface import Surface
 
 # Levels, as fractions of the weight that only one cell in twenty exceeds. Halfway to the next a level may move, by so
@@ -87,12 +87,19 @@ def _limited(misses: Array) -> Array:
 
 
 def make_outlines(
-    points: Array, weights: Array | None, center: Array, scale: float, rng: np.random.Generator
+    points: Array,
+    weights: Array | None,
+    center: Array,
+    scale: float,
+    rng: np.random.Generator,
+    *,
+    isolated: bool | None = None,
 ) -> Outlines:
-    """Outlines of points [N, 2] in input units, normalised with `center` and `scale`."""
-    raster = raster_of(points, weights)
+    """Outlines of points [N, 2] in input units, normalised with `center` and `scale`; `isolated` as of `Shape`."""
+    raster = None if isolated else raster_of(points, weights)
     if raster is None:
-        return _of_points((points - center) / scale, weights, rng)
+        few = len(points) <= FEW if isolated is None else isolated
+        return _of_points((points - center) / scale, weights, rng, few=few)
     raster = replace(raster, origin=(raster.origin - center) / scale, step=raster.step / scale)
     return _of_raster(raster, len(points), rng)
 
@@ -194,8 +201,7 @@ def _tells(line: Array) -> bool:
     return len(line) > NEIGHBOURS[0]
 
 
-def _of_points(points: Array, weights: Array | None, rng: np.random.Generator) -> Outlines:
-    few = len(points) <= FEW
+def _of_points(points: Array, weights: Array | None, rng: np.random.Generator, *, few: bool) -> Outlines:
     masses = np.ones(len(points)) if weights is None else weights
     kept = masses > 0
     points, masses = points[kept], masses[kept]

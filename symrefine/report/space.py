@@ -42,7 +42,7 @@ from symrefine.surface.misses import LIMITS
 
 # Values of options that are as if they were not given, and options that `symrefine.detect` has too.
 _UNSAID = {"seed": 0, "outliers": "auto"}
-_IN_PYTHON = ("tolerance", "units", "seed", "outliers", "viewpoint", "verify")
+_IN_PYTHON = ("tolerance", "units", "seed", "outliers", "viewpoint", "isolated", "verify")
 # Options that functions have which read a file, and the labels that are the colours of images.
 _IN_LOAD = tuple("measure labels weights frame threshold invert texture intrinsics depth_scale mask".split())
 _TEXTURE = "texture"

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Literal, cast
 
 from symrefine.errors import one_line
-from symrefine.picture.words import percent, symbol
+from symrefine.picture.words import more_for, percent, sentence, symbol
 from symrefine.report.markup import Page, plain, prose
 from symrefine.report.page import filled
 from symrefine.review.decisions import SCHEMA, Decisions
@@ -148,8 +148,7 @@ def _likely(row: Row) -> list[list[float] | None]:
 def _remarks(row: Row) -> Iterator[str]:
     """What one should know before one decides."""
     if row["at_least"]:
-        strewn = row.get("strewn", False)
-        yield "Strays that are left near it may hide more." if strewn else "Not all of it was seen: there may be more."
+        yield sentence(more_for(strewn=row.get("strewn", False), sparse=row.get("sparse", False)))
     if row["textured"] not in (None, row["answer"]):
         yield f"With its texture it is {symbol(str(row['textured']))}."
 

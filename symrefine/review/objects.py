@@ -43,6 +43,7 @@ class Row(TypedDict):
         answer: the group that was found, None where nothing was decided for the reason in `doubt`.
         at_least: whether there may be more than was seen.
         strewn: whether that is for strays that are left.
+        sparse: whether that is for points being so few.
         textured: the group of the shape with its texture, where one was read beside the shape.
         tolerances: at which the groups are told how likely they are.
         choices: groups each inside the next, C1 first.
@@ -60,6 +61,7 @@ class Row(TypedDict):
     doubt: str
     at_least: bool
     strewn: NotRequired[bool]
+    sparse: NotRequired[bool]
     textured: str | None
     tolerance: float
     tolerances: list[float]
@@ -93,6 +95,7 @@ def examined(found: Detection, shape: Shape, *, scale: float) -> Examined:
         "doubt": found.undetermined,
         "at_least": bool(found.at_least),
         "strewn": bool(found.strewn),
+        "sparse": bool(found.sparse),
         "textured": None if found.textured is None else found.textured.point_group,
         "tolerance": number(found.tolerance),
         "tolerances": [number(t) for t in steps],

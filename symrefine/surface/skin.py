@@ -20,8 +20,6 @@ from symrefine.surface.neighbourhoods import (
 )
 from symrefine.surface.tree import Tree
 
-# Up to so many points of a cloud stand for themselves (atoms), not for a surface.
-FEW = 250
 # Points whose distances tell the spacing and the reach of discs, the first of them the point itself.
 AROUND = 6
 # Classes stand so far apart along a fourth coordinate (RMS radii) that no query finds a point of another class first.
