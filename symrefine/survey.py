@@ -15,7 +15,7 @@ from symrefine.lengths import object_diagonal
 from symrefine.moments.moments import shape_moments
 from symrefine.moments.quadrature import triangle_areas_and_normals
 from symrefine.rounding import SINGLE
-from symrefine.shape import Index, Shape
+from symrefine.shape import FEW, Index, Shape
 from symrefine.surface.clumps import parts_among
 from symrefine.surface.misses import SHARES
 from symrefine.surface.neighbourhoods import connected_parts, fills_volume
@@ -216,7 +216,7 @@ def doubts(found: Survey) -> Iterator[str]:
     if found.repeated and found.kind != "mesh":
         said = "they count once" if found.kind == "cloud" and not found.weighted else "these places weigh more"
         yield f"{found.repeated:,} points stand where others do: {said}"
-    if found.kind == "points" and len(found.spread) == 3:
+    if found.kind == "points" and len(found.spread) == 3 and found.points <= FEW:
         yield "so few points stand for themselves, as atoms do; of a surface give more than 250"
     flat = int((found.spread**2 < SINGLE**2 * found.spread[0] ** 2).sum())
     if flat:

@@ -11,6 +11,7 @@ import numpy as np
 
 from experiments.objects import molecule_geometry as made
 from symrefine.geometry import Array, read_only
+from symrefine.surface.tree import pairs_within
 
 NUMBERS = {
     s: z
@@ -45,9 +46,9 @@ class Molecule:
     def mean_bond(self) -> float:
         """Mean length of the bonds: pairs of atoms nearer than 1.25 times the sum of their covalent radii."""
         radii = np.array([RADII[s] for s in self.symbols])
-        distance = np.linalg.norm(self.positions[:, None] - self.positions, axis=2)
-        bonded = np.triu(distance < 1.25 * (radii[:, None] + radii), k=1)
-        return float(distance[bonded].mean())
+        one, other = pairs_within(self.positions, 2.5 * radii.max()).T
+        distance = np.linalg.norm(self.positions[one] - self.positions[other], axis=1)
+        return float(distance[distance < 1.25 * (radii[one] + radii[other])].mean())
 
 
 def molecule(name: str) -> Molecule:

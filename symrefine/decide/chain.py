@@ -83,8 +83,8 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
 
 def _beside_chance(surface: Surface, link: Hypothesis) -> Hypothesis:
     """A link with how likely it is there by more than chance, where that says anything of it."""
-    apart = told_apart(surface, link.placed, link.need)
-    return link if apart == 1.0 else replace(link, apart=apart)
+    apart = told_apart(surface, link.placed, link.need) if link.group.is_finite else link.apart
+    return link if apart == link.apart else replace(link, apart=apart)
 
 
 def _unbroken(surface: Surface, found: Hypothesis) -> Hypothesis | None:

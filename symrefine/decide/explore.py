@@ -58,6 +58,8 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
         limit: what the largest group may need, as a fraction of the diagonal.
         finest: the smallest tolerance that is asked for.
     """
+    if surface.cloud.body == "atoms":  # what is half way to a neighbour is that as well
+        finest = min(finest, 0.5 * surface.cloud.spacing / surface.diagonal)
     nothing = max(ALIKE * hidden_need(surface), certain(finest))
     whole = replace(_of_whole(surface.closed, evidence, limit, nothing), whole=True)
     if surface.openings is None or (not surface.is_open and surface.openings.floor is None):

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from symrefine.decide.looks import COARSE, Look, exact_need, least_around, mended, seems, slid
-from symrefine.decide.place import is_told, least_elsewhere
+from symrefine.decide.place import is_told, least_elsewhere, told_apart
 from symrefine.decide.posterior import certain, lenience
 from symrefine.fit.placed import FITTED, Operations, Placed, elements
 from symrefine.fit.refine import SHORT, Iterate, refine
@@ -242,7 +242,14 @@ def _placed(
         if closely > need:  # a wedge shows what was seen, too
             need, seen, believed = closely, max(seen, closely), 0.0
     return Hypothesis(
-        placed=placed, elements=found, need=need, history=history, before=before, seen=seen, believed=believed
+        placed=placed,
+        elements=found,
+        need=need,
+        history=history,
+        before=before,
+        seen=seen,
+        believed=believed,
+        apart=1.0 if placed.group.is_finite else told_apart(surface, placed, need),
     )
 
 

@@ -61,8 +61,11 @@ def generated(
 
 
 def is_loose(surface: Surface, found: Hypothesis) -> bool:
-    """Whether what was seen does not tell that a group holds, or where: as likely as not it holds elsewhere as well."""
-    return not found.told or found.elsewhere <= EVEN * surface.tolerance
+    """Whether what was seen does not tell that a group holds, or where: as likely as not it holds elsewhere as well.
+
+    Of atoms that are no more likely than not to have it, whatever it needs, nothing was.
+    """
+    return not found.told or found.elsewhere <= EVEN * surface.tolerance or found.apart < 0.5
 
 
 def size_of(placed: Placed) -> float:

@@ -191,10 +191,10 @@ def floor_under(shape: Shape, outliers: Outliers) -> Floor | None:
     if outliers != "floor":
         return None
     if shape.faces is not None or shape.atoms:
-        what = "a mesh" if shape.faces is not None else f"{len(shape.points)} points"
+        what = "a mesh" if shape.faces is not None else f"{len(shape.points)} that stand for themselves"
         raise InputError(
             f"{shape.source}: outliers is 'floor', for a cloud of what stands on one, of more than {FEW} points; "
-            f"this is {what}, leave it out"
+            f"{'this is' if shape.faces is not None else 'these are'} {what}, leave it out"
         )
     own = heavy(shape)  # of these without strays, which lie on both sides of any plane, and beside what stands on it
     kept = sampling(own.points, np.random.default_rng(0), outliers=True, groups=False).kept

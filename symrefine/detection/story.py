@@ -49,8 +49,8 @@ def detect(
 
     Args:
         shape: a `Shape`, points [N, 3], or the `Sketch` of a cloud too large to hold; of a cloud of more than 100,000
-            points a sketch is made, too. Of up to 250 points those of different weight are different things, which no
-            symmetry exchanges; of more, weights are a sampling density.
+            points a sketch is made, too. Of points that stand for themselves (`Shape.atoms`) those of different weight
+            are different things, which no symmetry exchanges; of others weights are a sampling density.
         outliers: "auto": points of a cloud that belong to no surface are set apart and told as `Detection.outliers`;
             "floor": so is the plane that the object stands on, as `Detection.floor`; "none": all points count.
         tolerance: largest miss that still counts as symmetric, as a fraction of the bounding-box diagonal: 95 % of the

@@ -56,8 +56,8 @@ def detect(
             trimesh, Open3D, pyvista, ASE, pymatgen or torch (see `symrefine.load.objects.shape_of`). What else a file
             has, labels, a texture, is asked of `symrefine.load`, and the shape given.
         frame: which of several molecules, models or volumes in a file, from 0; None where there is one.
-        weights: [N] masses of the points. Of up to 250 points those of different mass are different things, which no
-            symmetry exchanges; of more, masses are a sampling density.
+        weights: [N] masses of the points. Of points that stand for themselves those of different mass are different
+            things, which no symmetry exchanges; of a surface masses are a sampling density.
         normals: [N, n] normals, any sign; estimated where absent.
         labels: [N] whole numbers, [F] for a mesh: classes (elements, colours, materials) that every symmetry must keep.
         viewpoint: [3] or [N, 3] place of the camera that saw the points, or each of them.

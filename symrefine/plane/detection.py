@@ -99,8 +99,8 @@ def detect_planar(
     """Point group, mirror lines and turns of an object in the plane, with what it misses each of them by.
 
     Points on a square grid are the pixels of a picture, known to a fraction of a pixel; up to 250 others stand for
-    themselves; more are random samples of an outline or of an area, whose noise is estimated (jackknife) and allowed
-    for.
+    themselves (see `Shape.atoms`); more are random samples of an outline or of an area, whose noise is estimated
+    (jackknife) and allowed for.
 
     Args:
         shape: a `Shape`, or points [N, 2].

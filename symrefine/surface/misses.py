@@ -29,7 +29,8 @@ SHARES = (0.05, 0.03, 0.01, 0.006)
 # 4,000 points so few are hardly a sample: among noise they would be taken for a detail in one of seven draws, so that
 # they count beyond all of it.
 SPECK, SPECK_LIMIT = 0.003, 2.5
-# The same for atoms, of mean, 95th percentile and the farthest: noise moves every one of them, and every one counts.
+# The same for atoms, of mean, 95th percentile and the farthest of a hundred: noise moves every one of them, and every
+# one counts.
 ATOM_LIMITS = (0.9, 1.3, 1.6)
 # Standard deviations by which what samples show of noise may be off: with one, true elements need 0.4 of the tolerance
 # at 1 % noise; three hide details of 2 % of the surface at 8,000 points.
@@ -118,10 +119,19 @@ def _beyond_all(count: Index | int, noise: int, tests: int) -> Array:
     return np.asarray(math.log(math.erfc(SURE / math.sqrt(2.0)) / tests) / np.log(count / (count + noise)))
 
 
-def needs_of_atoms(misses: Array) -> Array:
-    """The same [...] of points that stand for themselves: mean, 95th percentile and maximum have limits."""
+def needs_of_atoms(misses: Array, tests: int = 1) -> Array:
+    """The same [...] of points that stand for themselves: mean, 95th percentile and maximum have limits.
+
+    The farthest of more misses is farther by chance: where there are many, of all tests together, it may be as far as
+    Gaussian noise puts it of which the 95th percentile is at its limit.
+    """
+    from scipy.special import gammaincinv
+
+    ordinary, farthest = np.sqrt(gammaincinv(1.5, [0.95, 1.0 - 1.0 / (tests * misses.shape[-1])]))
+    mean, most, last = ATOM_LIMITS
+    limits = (mean, most, max(last, most * float(farthest / ordinary)))
     statistics = (misses.mean(axis=-1), np.quantile(misses, 0.95, axis=-1), misses.max(axis=-1))
-    return np.asarray(reduce(np.maximum, [v / limit for v, limit in zip(statistics, ATOM_LIMITS, strict=True)]))
+    return np.asarray(reduce(np.maximum, [v / limit for v, limit in zip(statistics, limits, strict=True)]))
 
 
 def miss_distances(

@@ -226,7 +226,7 @@ class Surface:
         `tests` as of `needs`.
         """
         if self.cloud.body == "atoms":
-            return needs_of_atoms(misses)
+            return needs_of_atoms(misses, tests)
         found = needs(misses, self.noise, tests)
         if self.cloud.body == "surface":
             return found

@@ -107,7 +107,7 @@ def symmetrize(
     if few:
         raise DegenerateShapeError(
             f"{shape.source}: {int((~action.closed).sum())} of {len(work.own.rows)} points have no counterpart under "
-            f"{work.place.group.name}; so few points stand for themselves, not for a surface: choose a subgroup "
+            f"{work.place.group.name}; they stand for themselves, not for a surface: choose a subgroup "
             "(--group)"
         )
     return work.by_orbits() if shape.faces is None else work.by_surface(action)
