@@ -182,7 +182,7 @@ def make_scene(detection: Detection, shape: Shape) -> Scene:
     stage, solid = make_stage(detection, shape), None
     if shape.faces is None and detection.surface.cloud.body == "atoms":  # points that stand for themselves
         solid = balls(replace(shape, points=shape.points - detection.center))
-        stage = replace(stage, points=solid.points)
+        stage = stage if solid is None else replace(stage, points=solid.points)
     missed_planes, missed_axes = _missed(detection, stage)
     return Scene(
         stage=stage,
