@@ -116,9 +116,10 @@ class Shape:
         normals: ArrayLike | None = None,
         labels: ArrayLike | None = None,
         viewpoint: ArrayLike | None = None,
+        isolated: bool | None = None,
     ) -> "Shape":
         """A cloud from anything numpy can read as an array [N, n]."""
-        given = {"weights": weights, "normals": normals, "labels": labels, "viewpoint": viewpoint}
+        given = {"weights": weights, "normals": normals, "labels": labels, "viewpoint": viewpoint, "isolated": isolated}
         return cls(points=points, **{k: v for k, v in given.items() if v is not None})  # type: ignore[arg-type]
 
     def chosen(self, rows: Index) -> "Shape":

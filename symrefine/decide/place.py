@@ -5,7 +5,7 @@ back, and one through the axis of a round cup that carries its handle there turn
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,16 +16,14 @@ from symrefine.fit.placed import Operations, Placed, elements, joined
 from symrefine.fit.refine import Framed, pair_gram
 from symrefine.fit.residual import SIZE, design_rows, frame_model, gram
 from symrefine.fit.vertices import ROUNDED
-from symrefine.geometry import Array, Isometry, rotation
+from symrefine.geometry import Array, Isometry, Mask, rotation
 from symrefine.groups import is_subgroup
 from symrefine.groups.names import MAX_FOLD
-from symrefine.rounding import SINGLE
-from symrefine.samples import GLANCE, LOOK
+from symrefine.samples import COUNT, GLANCE, LOOK
 from symrefine.shape import Index
-from symrefine.surface.neighbourhoods import connected_parts
-from symrefine.surface.skin import LocalPlanes, with_class
+from symrefine.surface.misses import DISCS
+from symrefine.surface.skin import LocalPlanes
 from symrefine.surface.surface import Surface
-from symrefine.surface.tree import pairs_within
 
 # Share of a surface that has to be carried onto itself for anything to be said of an operation.
 SUPPORTED = 0.15
@@ -80,23 +78,33 @@ def told_apart(surface: Surface, placed: Placed, need: float) -> float:
     cloud = surface.cloud
     if cloud.body != "atoms" or need <= 0.0:
         return 1.0
-    # A file may tell an atom twice.
-    one, other = pairs_within(with_class(cloud.points, cloud.labels), SINGLE * surface.diagonal).T
-    at = connected_parts(one, other, len(cloud.points))
+    some = np.arange(0, len(cloud.points), surface.stride(COUNT))
     if placed.group.is_finite:
-        every = at.max() + 1
-        missed = max(1.0 - len(np.unique(at[near])) / every for near in _images(cloud, few_motions(placed)))
-        return meant(Link(need=missed), 1.0 / math.e) * meant(Link(need=need), least_elsewhere(surface, placed))
+        elsewhere = least_elsewhere(surface, placed)
+        missed = max(1.0 - _met(cloud, m, some).mean() for m in few_motions(placed))
+        return meant(Link(need=missed), 1.0 / math.e) * meant(Link(need=need), elsewhere) if elsewhere > 0.0 else 0.0
     axes = [part for part in elements(placed.group) if math.isinf(part.order)]
-    turns = [m for part in axes for m in part.motions(placed.center)]
-    still = min(float((at[near] == at).mean()) for near in _images(cloud, turns))
-    least = [Isometry.about(placed.center, rotation(part.direction, math.pi / MAX_FOLD)) for part in axes]
-    return max(still, *(float((at[near] != at).mean()) for near in _images(cloud, least)))
+    still = min(float(_stays(cloud, m, some).mean()) for part in axes for m in part.motions(placed.center))
+    least = (Isometry.about(placed.center, rotation(part.direction, math.pi / MAX_FOLD)) for part in axes)
+    return max(still, *(1.0 - float(_stays(cloud, m, some).mean()) for m in least))
 
 
-def _images(cloud: LocalPlanes, motions: Iterable[Isometry]) -> Iterator[Index]:
-    """Which atom is nearest to the image of each [N], operation by operation."""
-    return (cloud.nearest(m.apply(cloud.points), cloud.labels)[1] for m in motions)
+def _stays(cloud: LocalPlanes, motion: Isometry, some: Index) -> Mask:
+    """Which of some atoms are the nearest to their own images."""
+    return np.asarray(cloud.place[_nearest(cloud, motion, some)] == cloud.place[some])
+
+
+def _met(cloud: LocalPlanes, motion: Isometry, some: Index) -> Mask:
+    """Which of some atoms are the nearest to the image of another: of one of the few that come nearest to them."""
+    back = motion.inverse.apply(cloud.points[some])
+    sources = cloud.around(back, cloud.classes(some), min(DISCS, len(cloud.points)))[1]
+    there = cloud.place[_nearest(cloud, motion, sources.ravel())].reshape(sources.shape)
+    return np.asarray((there == cloud.place[some][:, None]).any(axis=1))
+
+
+def _nearest(cloud: LocalPlanes, motion: Isometry, some: Index) -> Index:
+    """The atom nearest to the image of each."""
+    return cloud.nearest(motion.apply(cloud.points[some]), cloud.classes(some))[1]
 
 
 def _ways(surface: Surface, placed: Placed) -> tuple[Framed, Array]:

@@ -45,7 +45,7 @@ def examined(
             shape = sketched(shape, seed)
     examine = partial(_examined, shape, floor, outliers != "none", tolerance, ladder, seed, clock)
     found = _likeliest(shape, examine, tolerance, outliers=outliers != "none")
-    found = _as_atoms(shape, found, tolerance, ladder, seed, clock) or found
+    found = _as_atoms(shape, floor, found, tolerance, ladder, seed, clock) or found
     if left is None:
         return replace(found, no_floor=outliers == "floor")
     return found.among(left)
@@ -98,7 +98,13 @@ def _likeliest(
 
 
 def _as_atoms(
-    shape: Shape | Sketch, found: Examined, tolerance: float, ladder: Sequence[float], seed: int, clock: Clock
+    shape: Shape | Sketch,
+    floor: Floor | None,
+    found: Examined,
+    tolerance: float,
+    ladder: Sequence[float],
+    seed: int,
+    clock: Clock,
 ) -> Examined | None:
     """What points show that stand for themselves, where they are too few of a surface to be told; None if nothing.
 
@@ -115,7 +121,7 @@ def _as_atoms(
         return None
     own = shape.without(np.concatenate(measured.apart)) if any(map(len, measured.apart)) else shape
     alone = replace(own, isolated=True)
-    read = _examined(alone, None, False, tolerance, ladder, seed, clock, apart=False)
+    read = _examined(alone, floor, False, tolerance, ladder, seed, clock, apart=False)
     if read.doubt(tolerance) or not read.decided(tolerance).index:
         return None
     return replace(read, outliers=found.outliers, outlier_share=found.outlier_share, sparse=True)

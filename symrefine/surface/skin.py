@@ -9,16 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.geometry import Array, Mask, ReadOnly, rows
+from symrefine.rounding import SINGLE
 from symrefine.samples import GLANCE
 from symrefine.shape import Index
 from symrefine.surface.neighbourhoods import (
     NEIGHBOURS,
     Neighbourhoods,
     choose_neighbours,
+    connected_parts,
     fit_planes,
     flatness_of,
 )
-from symrefine.surface.tree import Tree
+from symrefine.surface.tree import Tree, pairs_within
 
 # Points whose distances tell the spacing and the reach of discs, the first of them the point itself.
 AROUND = 6
@@ -125,6 +127,13 @@ class LocalPlanes(Patches):
     def offsets(self) -> Array:
         """[M] where each plane lies along its normal."""
         return np.einsum("ij,ij->i", self.points, self.normals)
+
+    @cached_property
+    def place(self) -> Index:
+        """[M] number of the place that each point stands at: a file may tell an atom twice."""
+        size = float(np.ptp(self.points, axis=0).max())
+        one, other = pairs_within(with_class(self.points, self.labels), SINGLE * size).T
+        return connected_parts(one, other, len(self.points))
 
     def faced(self, points: Array, normals: Array) -> Mask:
         """Which surfaces at points [..., 3], with normals [..., 3] out of the body, turn to where it was seen from."""
