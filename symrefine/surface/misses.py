@@ -171,7 +171,7 @@ def disc_distances(
         discs: how many are looked at around each; one is twice as quick, and at edges may not be the nearest.
     """
     skip = int(skip_self)
-    count = min(discs + skip, len(cloud.points))
+    count = min((1 if cloud.isolated else discs) + skip, len(cloud.points))
     away, near = cloud.around(queries, classes, count - skip, skip=skip, bound=bound)
     rows = [slice(first, first + BLOCK) for first in range(0, len(queries), BLOCK)]
     apart = [_to_discs(cloud, queries[r], away[r], near[r], None if classes is None else classes[r]) for r in rows]
