@@ -12,6 +12,7 @@ from symrefine.geometry import Isometry, Plane, householder, random_orthogonal, 
 from symrefine.groups import PointGroup
 from symrefine.moments.moments import shape_moments
 from symrefine.moments.quadrature import sample_surface
+from symrefine.surface.clumps import clump_among
 from symrefine.surface.misses import (
     ATOM_LIMITS,
     LIMITS,
@@ -27,8 +28,10 @@ from symrefine.surface.misses import (
     noise_distances,
     spread_distance,
 )
+from symrefine.surface.neighbourhoods import planes_of
 from symrefine.surface.skin import isolated_points
 from symrefine.surface.surface import Surface
+from symrefine.surface.tree import Tree
 from tests.surfaces import half_of, local_planes
 
 Z = np.array([0.0, 0, 1])
@@ -532,3 +535,22 @@ def test_one_atom_out_of_place_breaks_the_symmetry():
         atoms[0, 1] += moved
         surface = Surface(cloud=isolated_points(atoms), diagonal=tight_diagonal(atoms))
         assert (surface.need([mirror(0.0)]) <= TOLERANCE) == holds
+
+
+def test_a_neighbour_that_there_is_not_is_refused():
+    """What lies behind an array in memory is no point."""
+    points = np.random.default_rng(0).random((10, 3))
+    near = Tree(points).query(points, 12)[1]
+    assert near.max() == len(points)
+    with pytest.raises(IndexError, match="member 10 of 10"):
+        planes_of(points, near)
+
+
+def test_a_clump_of_fewer_points_than_a_neighbourhood_is_asked_as_it_is():
+    """Ten points, of which twelve would be a neighbourhood."""
+    ball = np.random.default_rng(1).normal(size=(10, 3))
+    beside = np.concatenate([np.random.default_rng(2).uniform(-9, 9, (700, 3)) * [1, 1, 1e-3], ball + [0, 0, 9.0]])
+    assert len(clump_among(beside, np.arange(710) >= 700)) in (0, 10)
+    sheet = ball * [1.0, 1.0, 0.0]
+    flat = np.concatenate([beside[:700], sheet + [0, 0, 9.0]])
+    assert not len(clump_among(flat, np.arange(710) >= 700))

@@ -152,14 +152,15 @@ def _filled_at(size: int, within: Mask, points: Array, tree: Tree, around: Surro
     asked[near] = near % step == 0
     asked[near[~asked[near].any(axis=1), 0]] = True
     thick = np.zeros(len(within))
-    thick[asked] = _blobness(points, tree, around.points[asked], min(size, len(points)))
+    thick[asked] = _blobness(points, tree, around.points[asked], size)
     found = within.copy()
     found[within] = thick[near].sum(axis=1) > FILLED * asked[near].sum(axis=1)
     return found
 
 
 def _blobness(points: Array, tree: Tree, queries: Array, size: int) -> Array:
-    """Thickness [Q] of what is around queries [Q, 3] among points [N, 3], over that of random points in a ball."""
+    """Thickness [Q] of so many points [N, 3] around queries [Q, 3], or all, over that of random ones in a ball."""
+    size = min(size, len(points))
     return thickness_of(planes_of(points, tree.query(queries, size)[1])[2]) / ball_thickness(size)
 
 

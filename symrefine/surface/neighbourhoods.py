@@ -75,9 +75,16 @@ def sums_of(points: Array) -> Array:
 
 
 def _added(sums: Array, members: Index, ends: Index) -> Array:
-    """Rows of sums [N, .] added up over groups: the i-th has the members from `ends[i]` up to `ends[i + 1]`."""
+    """Rows of sums [N, .] added up over groups: the i-th has the members from `ends[i]` up to `ends[i + 1]`.
+
+    Raises:
+        IndexError: a member that there is not, such as the neighbour that a tree says is missing; scipy would read
+            whatever lies behind the sums.
+    """
     from scipy.sparse import csr_array
 
+    if len(members) and members.max() >= len(sums):
+        raise IndexError(f"member {members.max()} of {len(sums)}")
     groups = csr_array((np.ones(len(members)), members, ends), shape=(len(ends) - 1, len(sums)))
     return np.asarray(groups @ sums)
 
