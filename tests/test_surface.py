@@ -12,7 +12,7 @@ from symrefine.geometry import Isometry, Plane, householder, random_orthogonal, 
 from symrefine.groups import PointGroup
 from symrefine.moments.moments import shape_moments
 from symrefine.moments.quadrature import sample_surface
-from symrefine.surface.clumps import clump_among
+from symrefine.surface.clumps import clumps
 from symrefine.surface.misses import (
     ATOM_LIMITS,
     LIMITS,
@@ -31,6 +31,7 @@ from symrefine.surface.misses import (
 from symrefine.surface.neighbourhoods import planes_of
 from symrefine.surface.skin import isolated_points
 from symrefine.surface.surface import Surface
+from symrefine.surface.surroundings import Surroundings
 from symrefine.surface.tree import Tree
 from tests.surfaces import half_of, local_planes
 
@@ -547,10 +548,8 @@ def test_a_neighbour_that_there_is_not_is_refused():
 
 
 def test_a_clump_of_fewer_points_than_a_neighbourhood_is_asked_as_it_is():
-    """Ten points, of which twelve would be a neighbourhood."""
-    ball = np.random.default_rng(1).normal(size=(10, 3))
-    beside = np.concatenate([np.random.default_rng(2).uniform(-9, 9, (700, 3)) * [1, 1, 1e-3], ball + [0, 0, 9.0]])
-    assert len(clump_among(beside, np.arange(710) >= 700)) in (0, 10)
-    sheet = ball * [1.0, 1.0, 0.0]
-    flat = np.concatenate([beside[:700], sheet + [0, 0, 9.0]])
-    assert not len(clump_among(flat, np.arange(710) >= 700))
+    """Ten points, of which twelve would be a neighbourhood, far from a sheet; they are too few to fill anything."""
+    rng = np.random.default_rng(2)
+    sheet = rng.uniform(-9, 9, (700, 3)) * [1, 1, 1e-3]
+    points = np.concatenate([sheet, 0.3 * rng.normal(size=(10, 3)) + [0, 0, 14.0]])
+    assert [len(c) for c in clumps(points, Surroundings.of(points))] in ([], [10])
