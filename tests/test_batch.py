@@ -18,7 +18,6 @@ from typing import Any
 import pytest
 
 from experiments.studies.kills import COMMANDS, EXECUTORS, campaign, lay_out
-from symrefine.cli import invoke
 from symrefine.cli.fleet import memory, shard
 from symrefine.cli.sources import manifest, sources
 from symrefine.errors import InputError
@@ -29,18 +28,6 @@ Run = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).resolve().parents[1]
 linux = pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are for Linux")
 posix = pytest.mark.skipif(os.name != "posix", reason="needs a system with signals")
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Run:
-    """A command line in this process: status, stdout, stderr."""
-
-    def call(*words: object) -> tuple[int, str, str]:
-        status = invoke([str(word) for word in words])
-        out, err = capsys.readouterr()
-        return status, out, err
-
-    return call
 
 
 @pytest.fixture

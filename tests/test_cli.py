@@ -55,17 +55,6 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Run:
-    """Status, stdout and stderr of a command line in this process."""
-
-    def call(*argv: object) -> tuple[int, str, str]:
-        status = invoke([str(a) for a in argv])
-        return status, *capsys.readouterr()
-
-    return call
-
-
 @pytest.fixture(scope="module")
 def record(data: Path) -> dict[str, Any]:
     """The report of the box, made once."""

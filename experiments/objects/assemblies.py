@@ -5,10 +5,11 @@ an assembly with a chain that is folded otherwise.
 """
 
 from collections.abc import Callable
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 
+from experiments.objects.molecule_geometry import images
 from experiments.objects.molecule_sets import Molecule
 from symrefine.geometry import Array, rotation, unit
 from symrefine.groups import PointGroup
@@ -20,13 +21,8 @@ BOND, STEP = 1.45, 1.8
 
 def cage(frequency: int) -> Array:
     """Carbons of an icosahedral fullerene, 20 f^2: the centres of the small triangles on the faces, on a sphere."""
-    corners = _icosahedron()
-    length = np.linalg.norm(corners[0] - corners[1:], axis=1).min()
-    faces = [
-        f for f in product(range(12), repeat=3) if f[0] < f[1] < f[2] and _are_near(corners[list(f)], 1.01 * length)
-    ]
     found = []
-    for a, b, c in corners[np.array(faces)]:
+    for a, b, c in _faces():
         for i, j in product(range(frequency), repeat=2):
             if i + j < frequency:
                 found.append((frequency - i - j - 2 / 3) * a + (i + 1 / 3) * b + (j + 1 / 3) * c)
@@ -55,15 +51,10 @@ def octahedron(size: int) -> Array:
 
 def shells(count: int) -> Array:
     """A Mackay icosahedron: an atom within so many shells of icosahedra."""
-    corners = _icosahedron()
-    length = np.linalg.norm(corners[0] - corners[1:], axis=1).min()
-    found = [np.zeros((1, 3))]
+    faces, found = _faces(), [np.zeros((1, 3))]
     for shell in range(1, count + 1):
-        faces = (f for f in product(range(12), repeat=3) if f[0] < f[1] < f[2])
-        for f in faces:
-            if _are_near(corners[list(f)], 1.01 * length):
-                steps = [(i, j, shell - i - j) for i, j in product(range(shell + 1), repeat=2) if i + j <= shell]
-                found.append(np.array(steps) @ corners[list(f)])
+        steps = [(i, j, shell - i - j) for i, j in product(range(shell + 1), repeat=2) if i + j <= shell]
+        found += [np.array(steps) @ face for face in faces]
     every = np.concatenate(found)
     return STEP * every[np.unique(every.round(6), axis=0, return_index=True)[1]]
 
@@ -88,7 +79,8 @@ def assembly(group: str, length: int, *, seed: int = 0, odd: bool = False) -> Mo
     def apart(own: Array) -> Array:
         return own - own.mean(axis=0) + np.ptp(own, axis=0).max() * place
 
-    copies = [apart(chain(length, seed)) @ g.T for g in operations]
+    own = apart(chain(length, seed))
+    copies = [own @ g.T for g in operations]
     if odd:
         copies[-1] = apart(chain(length, seed + 1)) @ operations[-1].T
     symbols = np.random.default_rng(seed).choice(list("CCCNO"), length)
@@ -101,7 +93,7 @@ def _one(places: Array, symbol: str = "C") -> Molecule:
 
 def _salt(places: Array) -> Molecule:
     """Every other place of a lattice is of another element."""
-    odd = np.rint(places.sum(axis=1) / (STEP)).astype(int) % 2
+    odd = np.rint(places.sum(axis=1) / STEP).astype(int) % 2
     return Molecule(symbols=tuple("F" if k else "Al" for k in odd), positions=places)
 
 
@@ -110,14 +102,12 @@ def _marked(places: Array, index: int) -> Molecule:
     return Molecule(symbols=tuple("N" if k == index else "C" for k in range(len(places))), positions=places)
 
 
-def _icosahedron() -> Array:
-    signs = np.array(list(product((-1.0, 1.0), repeat=2)))
-    flat = np.column_stack([np.zeros(4), signs[:, 0], GOLDEN * signs[:, 1]])
-    return unit(np.concatenate([np.roll(flat, k, axis=1) for k in range(3)]))
-
-
-def _are_near(corners: Array, most: float) -> bool:
-    return bool(max(np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)) < most)
+def _faces() -> Array:
+    """The corners [20, 3, 3] of the faces of an icosahedron."""
+    corners = np.array([place for _, place in images([("C", unit([0.0, 1.0, GOLDEN]))], "I")])
+    triples = corners[list(combinations(range(12), 3))]
+    sides = np.linalg.norm(triples - np.roll(triples, 1, axis=1), axis=2).max(axis=1)
+    return np.asarray(triples[sides < 1.01 * sides.min()])
 
 
 def _bonded(places: Array) -> Array:

@@ -94,16 +94,14 @@ def _verified(said: Record) -> str:
 
 def partial(record: Record) -> str:
     """What was not seen, and what of the surface speaks for what was found."""
-    if record["strewn"] or record["sparse"]:
-        return more_for(strewn=record["strewn"], sparse=record["sparse"])
+    more = more_for(strewn=record["strewn"], sparse=record["sparse"])
     seen = [e["coverage"] for e in (*record["planes"], *record["axes"])]
-    if not seen:
-        return "parts of the surface were not seen: there may be more"
+    if record["strewn"] or record["sparse"] or not seen:
+        return more
     most = max(seen, key=lambda c: c["unseen"])
     told = (
-        "parts of the surface were not seen: there may be more; at least "
-        f"{100 * min(c['supported'] for c in seen):.0f} % of what was seen supports each element, at most "
-        f"{100 * max(c['contradicted'] for c in seen):.2g} % contradicts it"
+        f"{more}; at least {100 * min(c['supported'] for c in seen):.0f} % of what was seen supports each element, "
+        f"at most {100 * max(c['contradicted'] for c in seen):.2g} % contradicts it"
     )
     if not most["unseen"]:
         return told

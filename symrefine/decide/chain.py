@@ -83,6 +83,7 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
 
 def _beside_chance(surface: Surface, link: Hypothesis) -> Hypothesis:
     """A link with how likely it is there by more than chance, where that says anything of it."""
+    # Of a continuous group it was asked before, lest it be joined; of others it takes as long as a look.
     apart = told_apart(surface, link.placed, link.need) if link.group.is_finite else link.apart
     return link if apart == link.apart else replace(link, apart=apart)
 

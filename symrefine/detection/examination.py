@@ -119,8 +119,7 @@ def _as_atoms(
         return None
     if least_told(surface.floor) <= tolerance or surface.cloud.spacing <= tolerance * surface.diagonal:
         return None
-    own = shape.without(np.concatenate(measured.apart)) if any(map(len, measured.apart)) else shape
-    alone = replace(own, isolated=True)
+    alone = replace(shape.without(np.concatenate(measured.apart)), isolated=True)
     read = _examined(alone, floor, False, tolerance, ladder, seed, clock, apart=False)
     if read.doubt(tolerance) or not read.decided(tolerance).index:
         return None

@@ -125,7 +125,7 @@ def detect_planar(
     with clock("moments", len(shape.points)):
         frame = shape_moments(shape, 2)
         rng = np.random.default_rng(seed)
-        outlines = make_outlines(shape.points, shape.weights, frame.center, frame.scale, rng, isolated=shape.isolated)
+        outlines = make_outlines(shape, frame.center, frame.scale, rng)
         moments = shape_moments(shape, ORDER, parts=PARTS if outlines.sampled else 0)
         doublets = classify_doublets(moments, tolerance, outlines.pixel_noise)
     flaw = _flaw(shape, frame, outlines)

@@ -10,7 +10,7 @@ import numpy as np
 from symrefine.geometry import Array, Isometry, corners
 from symrefine.plane.raster import Raster, between, coarser, outlines, raster_of
 from symrefine.samples import COUNT
-from symrefine.shape import FEW, Index, kinds_of_mass
+from symrefine.shape import FEW, Index, Shape, kinds_of_mass
 from symrefine.surface.misses import LIMITS, SHARES, Deviation, disc_distances, miss_distances, noise_distances
 from symrefine.surface.neighbourhoods import NEIGHBOURS
 from symrefine.surface.skin import LocalPlanes, drawn, isolated_points, local_planes, make_skin
@@ -86,20 +86,12 @@ def _limited(misses: Array) -> Array:
     return np.stack([misses.mean(axis=-1), *np.quantile(misses, 1.0 - np.array(SHARES), axis=-1)], axis=-1)
 
 
-def make_outlines(
-    points: Array,
-    weights: Array | None,
-    center: Array,
-    scale: float,
-    rng: np.random.Generator,
-    *,
-    isolated: bool | None = None,
-) -> Outlines:
-    """Outlines of points [N, 2] in input units, normalised with `center` and `scale`; `isolated` as of `Shape`."""
-    raster = None if isolated else raster_of(points, weights)
+def make_outlines(shape: Shape, center: Array, scale: float, rng: np.random.Generator) -> Outlines:
+    """Outlines of a shape in the plane, normalised with `center` and `scale`."""
+    points, weights = shape.points, shape.weights
+    raster = None if shape.isolated else raster_of(points, weights)
     if raster is None:
-        few = len(points) <= FEW if isolated is None else isolated
-        return _of_points((points - center) / scale, weights, rng, few=few)
+        return _of_points((points - center) / scale, weights, rng, few=shape.atoms)
     raster = replace(raster, origin=(raster.origin - center) / scale, step=raster.step / scale)
     return _of_raster(raster, len(points), rng)
 

@@ -22,7 +22,7 @@ from symrefine.geometry import Array, ReadOnly, tight_diagonal, unit
 from symrefine.groups import PointGroup
 from symrefine.groups.names import TURNS
 from symrefine.rounding import TOLERANCE
-from symrefine.shape import FEW, Index, Shape
+from symrefine.shape import Index, Shape
 from symrefine.symmetrize.counterparts import Action, act, with_leftovers
 from symrefine.symmetrize.surface import Closest, closest_on
 from symrefine.threads import one_thread
@@ -101,7 +101,7 @@ def symmetrize(
         raise InputError(f"{shape.source}: C1 has no operation but the identity: there is nothing to make symmetric")
     work = _start(shape, center, group, copied=shape.faces is None, seed=seed)
     work, action = _counterparts(work, REACH * tolerance)
-    few = shape.atoms or (shape.isolated is None and shape.faces is None and len(work.own.rows) <= FEW)
+    few = shape.faces is None and shape.chosen(work.own.rows).atoms
     if _corresponds(work.own.points, action, few):
         return work.by_vertices(action)
     if few:
