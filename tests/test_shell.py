@@ -303,6 +303,22 @@ def test_whoever_watches_is_told_of_stages_and_nobody_else_is() -> None:
     assert list(clock.seconds) == ["a", "b"]
 
 
+def test_a_stage_that_comes_again_counts_again() -> None:
+    """An object measured twice, as where something is set apart, told the seconds of its second time alone."""
+    told: dict[str, float] = {"a": 0.0, "b": 0.0}
+
+    def add(stage: str, seconds: float | None) -> None:
+        told[stage] += seconds or 0.0
+
+    clock = Clock()
+    with watched(add):
+        for stage in ("a", "b", "a"):
+            with clock(stage):
+                time.sleep(0.002)
+    assert clock.seconds == pytest.approx(told)
+    assert clock.seconds["a"] >= 2 * 0.002
+
+
 def test_a_line_now_and_then_where_nobody_looks_on(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
