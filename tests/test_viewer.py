@@ -122,8 +122,13 @@ def answers(address: str) -> bool:
         return link.connect_ex((host, int(port))) == 0
 
 
-def test_a_recording_is_served_until_it_is_interrupted(tilted: Case) -> None:
+def test_a_recording_is_served_until_it_is_interrupted(
+    tilted: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     served: list[str] = []
+    monkeypatch.setenv("HOME", str(tmp_path))
+    for name in ("CI", "XDG_CONFIG_HOME", "XDG_DATA_HOME"):
+        monkeypatch.delenv(name, raising=False)
 
     def interrupt(address: str) -> None:
         served.append(address)
@@ -137,6 +142,7 @@ def test_a_recording_is_served_until_it_is_interrupted(tilted: Case) -> None:
     deadline = time.monotonic() + 20.0
     while answers(served[0]):
         assert time.monotonic() < deadline, "the server outlives the command"
+    assert not list(tmp_path.iterdir()), "rerun wrote down that it was used, to tell its makers"
     with pytest.raises(InputError, match="no such file"):
         serve_recording(tilted[2].parent / "none.rrd", interrupt)
 
