@@ -42,12 +42,13 @@ from symrefine.propose.maps import maps_onto_itself
 from symrefine.propose.votes import AGREE_RAD, FEET, _mirrored, mirror_votes, revolution
 from symrefine.shape import CAMERAS, Shape
 from symrefine.surface.cameras import cameras, outwards
-from symrefine.surface.clumps import Clump, clump_among
+from symrefine.surface.clumps import Clump, _spreads_in_space, clump_among
 from symrefine.surface.misses import TOLERANCE
 from symrefine.surface.openings import agreed
 from symrefine.surface.sampling import sampling
 from symrefine.surface.surface import Surface
 from symrefine.surface.surroundings import Surroundings
+from symrefine.surface.tree import Tree
 
 BRICK = join([box((0, 0, 0), (1.0, 0.7, 0.5))])
 # One corner off, so that it has no symmetry.
@@ -435,6 +436,28 @@ def test_what_is_taken_for_a_clump_may_be_a_part_and_the_answer_says_how_likely(
     assert found.planes[0].confidence < 0.95
     sharp, _ = posed(sample(join(faucet + tap), 8000, 0.003, np.random.default_rng(1)), 3)
     assert (detect(sharp).point_group, detect(sharp).clumps) == ("C1", 0)
+
+
+@pytest.mark.parametrize("name", ["disc fins", "plate pins", "case spool"])
+def test_thin_parts_side_by_side_are_no_clump(name):
+    """As thick as a ball to neighbourhoods that reach from one to the next: without them all was whole, at .9."""
+    made = instance("finned", name, seed=5)
+    points, _ = posed(sample(made.shape, 20000, 0.0, np.random.default_rng(5)), 12)
+    found = detect(points)
+    assert (found.point_group, found.clumps) == (made.truth.group.name, 0)
+
+
+def test_neighbours_say_of_how_many_dimensions_points_are():
+    """Of sheets as near one another as points within them the first neighbours do not tell any more."""
+    rng = np.random.default_rng(2)
+    ball = rng.normal(size=(4000, 3))
+    flat = np.column_stack([rng.random((4000, 2)), np.zeros(4000)])
+    # A sheet of 400 points to the square: they are .025 apart, so that the fourth neighbour lies .06 away.
+    sheets = flat * [1.0, 1.0, 0.0] + [[0.0, 0.0, 1.0]] * (0.1 * rng.integers(0, 10, 4000)[:, None])
+    near = sheets * [1.0, 1.0, 0.1]
+    known = {"ball": ball, "flat": flat, "sheets": sheets, "near": near, "twice": np.repeat(flat, 2, axis=0)}
+    told = {name: _spreads_in_space(points, Tree(points)) for name, points in known.items()}
+    assert told == {"ball": True, "flat": False, "sheets": False, "near": True, "twice": True}
 
 
 def test_only_what_hangs_together_and_fills_a_volume_is_a_clump():

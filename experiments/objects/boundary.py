@@ -5,7 +5,7 @@
 prints them. Families: rotors without mirrors and gears, surfaces of revolution with something to them, meshes of uneven
 area, scans with defects and their siblings, prisms for sparse clouds, objects without symmetry, clouds with something
 extreme, molecules for a ladder of tolerances, thin-walled open vessels, furniture of thin boards and rods, thin
-blades of which one is shorter. Names are keys; a seed varies all dimensions.
+blades of which one is shorter, bodies with fins or pins at one place. Names are keys; a seed varies all dimensions.
 """
 
 import zlib
@@ -14,6 +14,7 @@ import numpy as np
 
 from experiments.objects.blobs import BLOBS
 from experiments.objects.extremes import FAR
+from experiments.objects.finned import FINNED
 from experiments.objects.furniture import FURNITURE
 from experiments.objects.instances import Build, Instance
 from experiments.objects.ladders import LADDERS
@@ -38,6 +39,7 @@ FAMILIES: dict[str, dict[str, Build]] = {
     "vessels": VESSELS,
     "furniture": FURNITURE,
     "vanes": VANES,
+    "finned": FINNED,
 }
 
 

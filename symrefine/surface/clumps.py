@@ -87,7 +87,22 @@ def _is_filled(points: Array) -> bool:
     """Whether points [N, 3] fill a volume, as neighbourhoods say that are large parts of it."""
     tree, queries = Tree(points), points[:: max(1, len(points) // GLANCE)]
     sizes = (max(len(points) // k, NEIGHBOURS[0]) for k in FRACTIONS)
-    return all(np.median(_blobness(points, tree, queries, size)) > VOLUME for size in sizes)
+    filled = all(np.median(_blobness(points, tree, queries, size)) > VOLUME for size in sizes)
+    return filled and _spreads_in_space(points, tree)
+
+
+def _spreads_in_space(points: Array, tree: Tree) -> bool:
+    """Whether neighbours of points [N, 3] become more with the cube of the distance, and not with its square.
+
+    Fins side by side look as thick as a ball to neighbourhoods that reach from one to the next, and the first few
+    neighbours still lie on one of them. Of points strewn in d dimensions the fourth neighbour is farther than the first
+    by (1 + 1/2 + 1/3) / d in the mean of logarithms (Levina, Bickel, 2004). Noise as wide as points are apart makes
+    three dimensions of two.
+    """
+    away = tree.query(points, 4, skip=1)[0]
+    nearest, fourth = away[away[:, 0] > 0.0][:, [0, 3]].T
+    surface, volume = (11.0 / 6.0 / d for d in (2.0, 3.0))
+    return not nearest.size or float(np.log(fourth / nearest).mean()) < 0.5 * (surface + volume)
 
 
 def parts_among(around: Surroundings) -> Index:
@@ -125,7 +140,8 @@ def filled(points: Array, around: Surroundings, rng: np.random.Generator) -> lis
     # One that fills a volume may hold more than one of surface, as long as the rest is no counterpart of it.
     most = COUNTERPART / (1.0 + COUNTERPART)
     grown = (_grown(m, around) for m in _lone(part, most))
-    return _members(points, around, [m for m in grown if m.mean() <= most])
+    found = _members(points, around, [m for m in grown if m.mean() <= most])
+    return [c for c in found if _spreads_in_space(points[c], tree)]
 
 
 def _parts_of(within: Mask, around: Surroundings, enough: float) -> Index:
