@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import math
 import re
 from dataclasses import replace
 from itertools import combinations
@@ -436,6 +437,18 @@ def test_what_is_taken_for_a_clump_may_be_a_part_and_the_answer_says_how_likely(
     assert found.planes[0].confidence < 0.95
     sharp, _ = posed(sample(join(faucet + tap), 8000, 0.003, np.random.default_rng(1)), 3)
     assert (detect(sharp).point_group, detect(sharp).clumps) == ("C1", 0)
+
+
+def test_of_what_nothing_tells_that_was_seen_no_number_says_how_far_off_it_is():
+    """Half of a hexagonal prism and its top: three mirrors slide all that was seen on itself, and missed it vastly."""
+    prism = join([revolve([(0, -0.3), (1, -0.3), (1, 0.3), (0, 0.3)], 6)])
+    points = sample(prism, 20000, 0.001, np.random.default_rng(0))
+    side = (np.abs(points[:, 2]) < 0.295) & (points @ [0.5, 0.3, 0.0] > 0.2)
+    found = detect(points[side | (points[:, 2] > 0.29)])
+    told = [miss.excess for miss in found.near_misses]
+    assert found.at_least
+    assert sum(map(math.isinf, told)) == 3
+    assert max(e for e in told if math.isfinite(e)) < 10.0
 
 
 @pytest.mark.parametrize("name", ["disc fins", "plate pins", "case spool"])

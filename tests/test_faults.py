@@ -190,6 +190,18 @@ def test_streams_that_are_closed_or_full(tmp_path: Path, streams: str, status: i
         assert json.loads((tmp_path / "a.json").read_text())["point_group"] == "D2h"
 
 
+@POSIX
+@pytest.mark.parametrize(("more", "status"), [("", 2), ("-q", 0)])
+def test_a_table_that_nobody_can_read_is_no_success(tmp_path: Path, more: str, status: int) -> None:
+    """With nothing else asked for; silence is what -q asks for."""
+    np.savetxt(tmp_path / "a.xyz", CUBE * [1, 2, 3])
+    line = f"'{sys.executable}' -m symrefine detect a.xyz {more} >&-"
+    path = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
+    done = subprocess.run(["bash", "-c", line], cwd=tmp_path, stderr=subprocess.PIPE, text=True, check=False, env=path)
+    assert done.returncode == status
+    assert ("standard output is closed" in done.stderr) == (status == 2)
+
+
 def gltf(change: Callable[[dict], object]) -> str:
     """A triangle as glTF, with a change to its text."""
     import base64

@@ -529,7 +529,8 @@ def test_verbs_take_what_detect_takes_and_what_it_found(tmp_path):
     [
         (1.44, False, "a mirror plane, misses by 1.4 times what a tolerance of 2 % allows: choose a larger tolerance"),
         (1.44, True, "times what a tolerance of 2 % allows; parts of the surface were not seen: choose"),
-        (0.8, False, "by 0.8 times what a tolerance of 2 % allows, more than what was meant so mostly does: choose"),
+        (0.8, False, "2 % allows, more than objects mostly do that are meant to have it: choose"),
+        (np.inf, False, "; nothing that was seen tells of any: choose"),
     ],
 )
 def test_what_has_nothing_to_make_symmetric_tells_by_how_much_the_nearest_misses(excess, at_least, said):

@@ -192,7 +192,7 @@ def test_an_inversion_alone_has_its_row() -> None:
     assert "Under it, 95 % of the points meet their images" in text
 
 
-MORE = "more than what was meant so mostly does."
+MORE = "more than objects mostly do that are meant to have it."
 
 
 @pytest.mark.parametrize(
@@ -201,6 +201,7 @@ MORE = "more than what was meant so mostly does."
         ([1.2, 3.0], "Cs", []),
         ([0.31, 3.0], "Cs", [f"Those below 1 exclude what was found, or miss by {MORE}"]),
         ([0.31, 3.0], "C1", [f"Those below 1 miss by {MORE}"]),
+        ([3.0, math.inf], "Cs", ["Of what is `unseen` nothing tells that was seen: all would have to be believed."]),
         ([0.0, 0.31], "Cs", ["One of 0.00 holds as well as what was found: the two exclude one another."]),
     ],
 )
@@ -218,6 +219,7 @@ def test_where_several_places_are_as_likely_the_group_is_told_to_be_surer_than_w
 
 @pytest.mark.slow
 def test_a_near_miss_that_holds_is_told_to_be_excluded() -> None:
+    assert words.turned_down(math.inf, 0.02, "Cs") == "It was turned down: nothing that was seen tells of it."
     assert words.turned_down(1.25, 0.02, "Cs") == "It was turned down: 1.25 times what a tolerance of 2 % allows."
     assert words.turned_down(0.004, 0.02, "C1").startswith("It was turned down: 0.00 times")
     assert words.turned_down(0.31, 0.02, "Cs").endswith("allows; it excludes what was found, or misses by " + MORE)

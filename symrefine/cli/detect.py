@@ -216,8 +216,8 @@ def _floor(shape: "Shape", detection: Any) -> Iterator[str]:
 
         if points := points_of_floor(shape):
             yield (
-                f"{shape.source}: {points:,} points lie in a plane that all others stand on; if it is a floor, try "
-                "--outliers floor"
+                f"{shape.source}: {points:,} points lie in a plane that all others stand on; if that is a floor, not a "
+                "face of it, try --outliers floor"
             )
 
 

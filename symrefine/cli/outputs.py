@@ -39,13 +39,11 @@ def check_outputs(outputs: dict[str, str | None], inputs: Iterable[Path]) -> Non
     for name in outputs.values():
         if name not in (None, STDOUT):
             check_target(Path(name))
+    _check_stdout(outputs)
     given = {place_of(Path(name)) for name in outputs.values() if name not in (None, STDOUT)}
     taken = {place: "the input" for path in inputs if (place := place_of(path)) in given}
     for option, name in outputs.items():
-        if option == "--json" and name == STDOUT:
-            check_stdout()
-            continue
-        if name is None:
+        if name is None or (option == "--json" and name == STDOUT):
             continue
         path = Path(name)
         if name == STDOUT or (option != "--json" and path.exists() and not path.is_file()):
@@ -57,6 +55,13 @@ def check_outputs(outputs: dict[str, str | None], inputs: Iterable[Path]) -> Non
         _check_name(option, path)
         if (suffix := SHOWN.get(option[2:])) and path.suffix.lower() != suffix:
             raise InputError(f"{option} {name}: expected a name that ends in {suffix}")
+
+
+def _check_stdout(outputs: dict[str, str | None]) -> None:
+    """Refuse a closed stdout where the result goes there: as JSON, or as a table and nowhere else."""
+    as_table = "--json" in outputs and not any(outputs.values()) and not is_quiet()
+    if as_table or outputs.get("--json") == STDOUT:
+        check_stdout()
 
 
 def _check_name(option: str, path: Path) -> None:

@@ -19,6 +19,7 @@ from symrefine.picture.words import (
     elsewhere,
     evened,
     exactly,
+    exceeds,
     kind_name,
     meaning,
     more_for,
@@ -72,7 +73,7 @@ def detection_lines(record: Record) -> Iterator[Table | str]:
     if record["planes"] or record["axes"] or record["inversion"] or record["near_misses"]:
         yield "Offsets in units of the file, misses in % of the diagonal; axes go through the centre."
     if record["near_misses"]:
-        yield from all_turned_down([miss["excess"] for miss in record["near_misses"]], record["point_group"])
+        yield from all_turned_down([float(miss["excess"]) for miss in record["near_misses"]], record["point_group"])
     each = [e["confidence"] for e in (*record["planes"], *record["axes"])]
     if told := elsewhere(record["point_group"], record["confidence"], each):
         yield told
@@ -184,7 +185,7 @@ def planar_lines(record: Record) -> Iterator[Table | str]:
     yield ""
     yield "Offsets in units of the file (of a picture: pixels, y up), misses in % of the diagonal."
     if record["near_misses"]:
-        yield from all_turned_down([miss["excess"] for miss in record["near_misses"]], record["point_group"])
+        yield from all_turned_down([float(miss["excess"]) for miss in record["near_misses"]], record["point_group"])
     yield f"{seconds(record)} s"
 
 
@@ -358,10 +359,10 @@ def _elements(
     With `marks`, one for each, also what its texture keeps of it.
     """
     table = _table(*heads, *_RESIDUALS, last, *(["texture"] if marks else []))
-    score = "excess" if last == "x limit" else "confidence"
+    score, shown = ("excess", exceeds) if last == "x limit" else ("confidence", "{:.2f}".format)
     for k, (named, element) in enumerate(rows):
         misses = [percentage(element["residual"][name]) for name in _RESIDUALS]
-        table.add_row(*named, *misses, f"{element[score]:.2f}", *marks[k : k + 1])
+        table.add_row(*named, *misses, shown(float(element[score])), *marks[k : k + 1])
     return table
 
 

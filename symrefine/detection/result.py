@@ -62,7 +62,11 @@ class Step:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NearMiss:
-    """A candidate that was refined and turned down, with what it misses by, for a person to judge."""
+    """A candidate that was refined and turned down, with what it misses by, for a person to judge.
+
+    `excess` is the smallest tolerance at which it would hold, over the one asked for; infinite if nothing that was seen
+    tells of it.
+    """
 
     kind: str
     direction: Array

@@ -179,7 +179,8 @@ def _report(
                 point=moments.restored(e.center),
                 order=e.operations.order,
                 residual=e.deviation,
-                excess=e.need / tolerance,
+                # Cameras say what they could not see, which then asks for no belief.
+                excess=math.inf if e.coverage.tells_nothing and not surface.viewed else e.need / tolerance,
             )
             for e in turned_down
         ),

@@ -124,6 +124,8 @@ def _near(record: Record) -> str:
     if not missed:
         return "none"
     best = missed[0].get("excess")
+    if best == "inf":
+        return f"{len(missed)}, of which nothing tells that was seen"
     return str(len(missed)) + ("" if best is None else f", the best {best:.2g} times what the tolerance allows")
 
 

@@ -1,5 +1,6 @@
 """What can be made of any object with its symmetry: `symmetrize`, `complete`, `export`."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -177,6 +178,7 @@ def _nearest_miss(found: "Detection") -> str:
         return ""
     miss, allowed = found.near_misses[0], f"what a tolerance of {100 * found.tolerance:.3g} % allows"
     told = f"; the nearest, a {kind_name(miss.kind, miss.order)}, misses by {miss.excess:.2g} times {allowed}"
+    told = "; nothing that was seen tells of any" if math.isinf(miss.excess) else told
     told += f", {MORE}" if miss.excess < 1.0 else ""
     told += "; parts of the surface were not seen" if found.is_partial else ""
     return f"{told}: choose a larger tolerance if that counts as symmetric"

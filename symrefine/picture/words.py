@@ -11,7 +11,7 @@ from symrefine.plane.detection import PlanarDetection
 from symrefine.surface.misses import LIMITS
 
 # By what something is turned down that the tolerance allows.
-MORE = "more than what was meant so mostly does"
+MORE = "more than objects mostly do that are meant to have it"
 _NAMED = {
     "C1": "no symmetry",
     "Cs": "one mirror plane",
@@ -224,8 +224,15 @@ def as_well(excess: float) -> bool:
     return round(excess, 2) == 0.0
 
 
+def exceeds(excess: float) -> str:
+    """How many times something exceeds what the tolerance allows; of what nothing tells that was seen, that."""
+    return "unseen" if math.isinf(excess) else f"{excess:.2f}"
+
+
 def turned_down(excess: float, tolerance: float, group: str) -> str:
     """Why something was turned down where a group was found, in a sentence."""
+    if math.isinf(excess):
+        return "It was turned down: nothing that was seen tells of it."
     if as_well(excess) and group != "C1":
         return "It holds as well as what was found, and the two exclude one another."
     told = f"It was turned down: {excess:.2f} times what a tolerance of {percent(tolerance)} allows"
@@ -238,6 +245,8 @@ def turned_down(excess: float, tolerance: float, group: str) -> str:
 def all_turned_down(excesses: Sequence[float], group: str) -> Iterator[str]:
     """The same of all near misses, in sentences about a column `x limit`."""
     yield "Near misses were refined and turned down: they miss by `x limit` times what the tolerance allows."
+    if any(map(math.isinf, excesses)):
+        yield "Of what is `unseen` nothing tells that was seen: all would have to be believed."
     if group != "C1" and any(map(as_well, excesses)):
         yield "One of 0.00 holds as well as what was found: the two exclude one another."
     elif min(excesses) < 1.0:

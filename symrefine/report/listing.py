@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from symrefine.picture.palette import Colour
-from symrefine.picture.words import percent
+from symrefine.picture.words import exceeds, percent
 from symrefine.report.markup import code, copy_button, plain, prose
 from symrefine.surface.misses import Deviation
 
@@ -143,7 +143,7 @@ def _row(row: Row) -> str:
         f"{100 * m.mean:.2f}",
         f"{100 * m.p95:.2f}<br>{_bar(row.share)}",
         *(f"{100 * v:.2f}" for v in (m.p99, m.max)),
-        f"{row.score:.2f}",
+        exceeds(row.score),
         copy_button(row.index, row.name) if row.copies else "",
     )
     return "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"

@@ -53,8 +53,16 @@ class Coverage:
 
         Where all that was seen but for a detail slides on itself, there is nothing to believe it for.
         """
-        told = self.supported if self.told > SHARES[0] else 0.0
-        return math.sqrt(self.unseen / max(told, 1e-9))
+        return math.sqrt(self.unseen / max(self._telling, 1e-9))
+
+    @property
+    def tells_nothing(self) -> bool:
+        """Whether it was not seen whole, and nothing of what was seen says anything for it."""
+        return self.unseen > 0.0 and self._telling == 0.0
+
+    @property
+    def _telling(self) -> float:
+        return self.supported if self.told > SHARES[0] else 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
