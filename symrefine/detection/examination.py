@@ -183,7 +183,8 @@ def _examined(
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed), tolerance)
     exact = proof = None
-    if measured.shape.faces is not None or (least_told(surface.floor) > tolerance and measured.shape.weights is None):
+    # Masses and densities of points are no part of what is mapped; those of faces are.
+    if measured.shape.faces is not None or measured.shape.weights is None:
         with clock("vertices"):
             exact, proof, evidence = by_vertices(measured, surface.diagonal, evidence)
     # What is proven holds at any tolerance; what else there may be is read from the first that can be.
