@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from experiments.objects import damage
 from experiments.objects.built_symmetry import specimen
 from experiments.objects.household import camera
-from experiments.objects.shapes import asymmetric, bottle, box, join, mug, sample, table
+from experiments.objects.shapes import asymmetric, bottle, box, join, mug, revolve, sample, table
 from experiments.studies import partial_alignment
 from symrefine.align import story
 from symrefine.align.alignment import Verdict
@@ -37,6 +37,7 @@ from symrefine.decide.maps import as_good as as_well
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.fit.refine import SHORT
 from symrefine.geometry import Array, householder, line_angle_rad, random_orthogonal, rotation, unit
+from symrefine.groups import point_group
 from symrefine.groups.orthogonal import chord_angles
 from symrefine.moments.moments import PARTS, central_moments
 from symrefine.ntuples.contract import ntuples
@@ -1010,6 +1011,26 @@ def test_turns_of_a_whole_source_leave_equivalents_of_a_part(name: str, seed: in
     assert found.status == "ok"
     for operation in truth.group.operations():
         assert min(angle_deg(m, matrix @ operation) for m in found.equivalents) < 1.0
+
+
+@pytest.mark.parametrize("view_first", [False, True])
+def test_all_that_carries_a_whole_object_onto_itself_leaves_equivalents_of_a_view(view_first: bool) -> None:
+    """Of 24 maps of a hexagonal prism onto its top and three of its sides the search told 16."""
+    prism, rng = join([revolve([(0, -0.3), (1, -0.3), (1, 0.3), (0, 0.3)], 6)]), rng_of(71)
+    points = sample(prism, 20000, 0.002, rng)
+    side = (np.abs(points[:, 2]) < 0.29) & (points @ [0.5, 0.3, 0.0] > 0.2)
+    matrix, shift = rotation([1.0, 2.0, 0.5], 0.8), np.array([3.0, -1.0, 0.5])
+    view = points[side | (points[:, 2] > 0.29)] @ matrix.T + shift
+    found = align(view, prism) if view_first else align(prism, view)
+    for operation in point_group("D6h").operations():
+        wanted = operation @ matrix.T if view_first else matrix @ operation
+        moved = -wanted @ shift if view_first else shift
+        angles = [angle_deg(m, wanted) for m in found.equivalents]
+        best = int(np.argmin(angles))
+        assert angles[best] < 2.0
+        np.testing.assert_allclose(found.coset.translations[best], moved, atol=0.1)
+    turns = align(prism, view, allow_reflection=False).equivalents
+    assert (np.linalg.det(turns) > 0.0).all()
 
 
 def test_what_nothing_tells_of_the_hand_is_a_half_and_no_less() -> None:

@@ -4,13 +4,16 @@ If the target has the symmetry group G, then R and g R, g in G, map the source o
 tell them apart. A continuous group leaves a whole subspace free: every orthogonal map within it does as well.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from symrefine.geometry import Array, ReadOnly, householder, unit
 from symrefine.groups import PointGroup
 from symrefine.groups.plane import PointGroup2D
+from symrefine.rounding import SINGLE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -119,6 +122,26 @@ def coset_of_maps(matrices: Array, translations: Array) -> Coset:
         symmetry="",
         observable=_in_words(f"{len(matrices)} maps that lay what is seen on one another about as well", matrices),
     )
+
+
+def with_copies(
+    maps: Sequence[tuple[Array, Array]], group: PointGroup, center: Array, scale: float, *, of_target: bool
+) -> list[tuple[Array, Array]]:
+    """Maps ([3, 3], [3]) of a size, and behind them what they are before or after the operations of a finite group.
+
+    One of the two objects has that group about a point [3]: what carries it onto itself makes maps that do as well. A
+    copy that is nearer to a map before it than two operations are to each other is that map, found by itself.
+    """
+    operations = group.operations()
+    apart = np.linalg.norm(operations - np.eye(3), axis=(1, 2))
+    nearest = 0.5 * float(apart[apart > SINGLE].min(initial=np.inf))
+    kept = list(maps)
+    for (matrix, shift), operation in product(maps, operations):
+        copy = operation @ matrix if of_target else matrix @ operation
+        if all(np.linalg.norm(copy - known) >= nearest for known, _ in kept):
+            moved = operation @ (shift - center) + center
+            kept.append((copy, moved if of_target else shift + scale * (matrix @ (center - operation @ center))))
+    return kept
 
 
 def lifted(

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symrefine.align.alignment import OK, Alignment, Nearness, Verdict
-from symrefine.align.coset import Coset, coset_of_group, coset_of_maps
+from symrefine.align.coset import Coset, coset_of_group, coset_of_maps, with_copies
 from symrefine.align.elsewhere import align_in_span
 from symrefine.align.kinds import nearness, with_one_set_of_classes
 from symrefine.align.landscape import least_misfit
@@ -224,14 +224,20 @@ def _in_part(evidence: Evidence, reflections: bool, clock: Clock, *, scale: bool
     with clock("partial"):
         size = size_of_parts(evidence) if scale else Size(factor=1.0, sigma=0.0)
         meeting = size and partial_meeting(evidence, reflections=reflections, factor=size.factor)
-    return _met_in_part(meeting, evidence, size, clock) if size and meeting and meeting.status else None
+    if not (size and meeting and meeting.status):
+        return None
+    return _met_in_part(meeting, evidence, size, clock, reflections=reflections)
 
 
-def _met_in_part(meeting: Meeting, evidence: Evidence, size: Size, clock: Clock) -> Alignment:
+def _met_in_part(meeting: Meeting, evidence: Evidence, size: Size, clock: Clock, *, reflections: bool) -> Alignment:
     """The answer for surfaces that share a part only, the source at this size."""
     maps = [_placed(evidence, m.motion, size.factor) for m in (meeting.best, *meeting.equals)]
     (matrix, translation), best = maps[0], meeting.best
-    coset = coset_of_maps(*(np.array(parts) for parts in zip(*maps, strict=True)))
+
+    def coset() -> Coset:
+        every = _with_copies(evidence, maps, size.factor, reflections=reflections)
+        return coset_of_maps(*(np.array(parts) for parts in zip(*every, strict=True)))
+
     rms = best.rms * evidence.target.moments.scale / evidence.target.shape.diagonal
     verdict = Verdict(
         status=meeting.status,
@@ -248,7 +254,7 @@ def _met_in_part(meeting: Meeting, evidence: Evidence, size: Size, clock: Clock)
         covariance=_of_transform(best.covariance, evidence, matrix, size.factor),
         exact=False,
         timings=clock.seconds,
-        _coset=lambda: coset,
+        _coset=coset,
         _verdict=lambda: verdict,
         _nearness=lambda: Nearness(rms=rms, overlap=best.overlap),
     )
@@ -278,6 +284,18 @@ def _symmetry(evidence: Evidence, motion: Similarity) -> tuple[PointGroup, Array
     matrix, translation, factor = _in_input_units(evidence, motion, evidence.scale)
     frame = found.group.frame @ matrix.T * np.sign(np.linalg.det(matrix))
     return PointGroup(name=found.group.name, frame=frame), factor * (matrix @ found.center) + translation
+
+
+def _with_copies(
+    evidence: Evidence, maps: list[tuple[Array, Array]], factor: float, *, reflections: bool
+) -> list[tuple[Array, Array]]:
+    """Maps, and what else does as well because one of the two was seen whole and is carried onto itself."""
+    for side in (evidence.source, evidence.target):
+        found = detect(side.shape, tolerance=evidence.tolerance, seed=evidence.seed)
+        if not found.undetermined and not found.at_least and found.group.is_finite:
+            of_target = side is evidence.target
+            maps = with_copies(maps, found.group, found.center, factor, of_target=of_target)
+    return [m for m in maps if reflections or np.linalg.det(m[0]) > 0.0]
 
 
 def _in_input_units(evidence: Evidence, motion: Similarity, scale: bool) -> tuple[Array, Array, float]:
