@@ -604,7 +604,7 @@ def test_merge_writes_both_files_or_none(run: Run, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems take names in UTF-8 only")
-@pytest.mark.parametrize("kind", ["csv", "parquet"])
+@pytest.mark.parametrize("kind", [pytest.param("csv", marks=pytest.mark.slow), "parquet"])
 @pytest.mark.usefixtures("lab")
 def test_names_of_other_bytes_stand_in_tables(run: Run, kind: str) -> None:
     Path("objects/box000.xyz").rename(os.fsdecode(b"objects/box\xff.xyz"))

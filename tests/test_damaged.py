@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from matplotlib.path import Path as MatplotlibPath
 from scipy.spatial import cKDTree
 
+import symrefine
 from experiments.objects import damage, household, tangles
 from experiments.objects.boundary import instance
 from experiments.objects.built_symmetry import Truth, specimen
@@ -23,6 +24,7 @@ from experiments.objects.poses import Pose
 from experiments.objects.shapes import bottle, box, join, mug, revolve, sample, stool, table
 from experiments.studies import boundary, damaged, groups, single_views
 from symrefine.cli import invoke
+from symrefine.cli.tables import record_lines
 from symrefine.complete import complete
 from symrefine.decide import chain, joins
 from symrefine.decide.ends import often_kept
@@ -195,7 +197,7 @@ def test_an_even_sample_undoes_a_density_that_falls_off(ratio):
     assert np.linalg.norm(np.average(made.points[seen.even], axis=0, weights=seen.shares)) < 0.25 * spread
 
 
-@pytest.mark.parametrize("make", [table, lambda: stool(5), lambda: BRICK])
+@pytest.mark.parametrize("make", [table, pytest.param(lambda: stool(5), marks=pytest.mark.slow), lambda: BRICK])
 def test_a_density_that_falls_off_hides_nothing_and_is_told(make):
     clean = detect(damage.clean(make(), 0.0, np.random.default_rng(6)).points)
     points, _ = posed(damage.uneven(make(), 100.0, np.random.default_rng(6)).points, 7)
@@ -367,7 +369,14 @@ def test_a_hole_whose_border_may_be_none_leaves_an_answer_that_may_be_less_than_
     assert not detect(sample(specimen("shape", name)[0], 20000, 0.003, np.random.default_rng(777))).at_least
 
 
-@pytest.mark.parametrize(("name", "seed"), [("rotor4", 1801), ("rotor4", 1803), ("fan3", 1801)])
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [
+        pytest.param("rotor4", 1801, marks=pytest.mark.slow),
+        ("rotor4", 1803),
+        pytest.param("fan3", 1801, marks=pytest.mark.slow),
+    ],
+)
 def test_a_border_that_is_kept_by_chance_or_in_doubt_leaves_an_answer_that_may_be_less_than_all(name, seed):
     """The stub of a blade is its own mirror image, as the hole goes through; one at the hub misses C3 by a little."""
     case = damaged.Case(family="shape", name=name, kind="hole", strength=0.15, seed=seed)
@@ -409,7 +418,9 @@ def test_a_group_of_an_open_surface_that_a_strict_limit_turned_down_is_fitted_un
     assert len(again.elements) == 1
 
 
-@pytest.mark.parametrize("name", ["chair", "starfish", "swirl4", pytest.param("plastic_cup", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name", ["chair", *(pytest.param(name, marks=pytest.mark.slow) for name in ("starfish", "swirl4", "plastic_cup"))]
+)
 def test_a_clump_of_few_points_that_touches_the_body_is_found_by_what_it_speaks_against(name):
     family = "catalogue" if name in damaged.REAL else "shape"
     if family == "catalogue" and name not in damaged.catalogue():
@@ -444,11 +455,14 @@ def test_of_what_nothing_tells_that_was_seen_no_number_says_how_far_off_it_is():
     prism = join([revolve([(0, -0.3), (1, -0.3), (1, 0.3), (0, 0.3)], 6)])
     points = sample(prism, 20000, 0.001, np.random.default_rng(0))
     side = (np.abs(points[:, 2]) < 0.295) & (points @ [0.5, 0.3, 0.0] > 0.2)
-    found = detect(points[side | (points[:, 2] > 0.29)])
+    found = symrefine.detect(points[side | (points[:, 2] > 0.29)])
     told = [miss.excess for miss in found.near_misses]
     assert found.at_least
     assert sum(map(math.isinf, told)) == 3
     assert max(e for e in told if math.isfinite(e)) < 10.0
+    record = found.to_dict()
+    assert [miss["excess"] for miss in record["near_misses"]].count("inf") == 3
+    assert any("Of what is `unseen` nothing tells" in str(line) for line in record_lines(record))
 
 
 @pytest.mark.parametrize("name", ["disc fins", "plate pins", "case spool"])
@@ -626,7 +640,7 @@ PLATES = {
 
 
 @pytest.mark.parametrize("noise_rel", [pytest.param(0.0, marks=pytest.mark.slow), 0.003])
-@pytest.mark.parametrize("outline", PLATES)
+@pytest.mark.parametrize("outline", [pytest.param(o, marks=pytest.mark.slow) if n else o for n, o in enumerate(PLATES)])
 def test_a_plane_that_slides_on_itself_tells_nothing_of_what_is_not_there(outline, noise_rel):
     """Any turn carries what was seen of a plate onto its plane; where it ends is all that it says."""
     rng = np.random.default_rng(28)
@@ -796,6 +810,7 @@ def test_the_rim_of_a_cup_says_nothing_of_a_hole_elsewhere():
     assert (found.point_group, found.at_least) == ("Cs", True)
 
 
+@pytest.mark.slow
 def test_no_thin_part_ends_in_the_middle_of_others():
     """Sixteen neighbours tell no border in such noise, and nothing that ends is carried to where the wall is gone."""
     found = detect(mug_with_a_hole(2, 0.15))
@@ -871,7 +886,7 @@ def test_a_rim_that_a_group_keeps_hides_no_handle_and_a_hole_hides_what_it_took(
     assert unseen(with_hole) > 0.02
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3))])
 def test_a_part_without_counterpart_is_hardly_explained_away(seed):
     """Where the cut took just what would have contradicted, the answer is not sure."""
     made = damage.cut(NOTCHED, 0.1, np.random.default_rng(seed))
@@ -973,10 +988,10 @@ def test_pairs_vote_for_the_mirrors_that_exchange_their_normals(outwards):
     ("name", "damage_of", "share"),
     [
         ("skew_box", damage.hole, 0.15),  # Ci: neither mirrors nor turns
-        ("swirl4", damage.cut, 0.2),  # S4
+        pytest.param("swirl4", damage.cut, 0.2, marks=pytest.mark.slow),  # S4
         ("fan3", damage.hole, 0.05),  # C3
-        ("propeller3", damage.cut, 0.2),  # D3
-        ("swirl6", damage.cut, 0.2),  # S6
+        pytest.param("propeller3", damage.cut, 0.2, marks=pytest.mark.slow),  # D3
+        pytest.param("swirl6", damage.cut, 0.2, marks=pytest.mark.slow),  # S6
         ("table", damage.cut, 0.2),  # C4v
     ],
 )
@@ -1053,6 +1068,7 @@ def test_a_view_whose_points_are_told_twice_says_the_same(seed):
     assert line_angle_rad(once.planes[0].plane.normal, twice.planes[0].plane.normal) < np.radians(1.0)
 
 
+@pytest.mark.slow
 def test_a_third_of_a_goblet_is_seen_to_be_round():
     """A half turn takes nearly all of it to where nobody looked, and a small one hardly any."""
     row = single_views.run(single_views.Case(family="shape", name="goblet", clean=False, seed=17))
@@ -1452,8 +1468,8 @@ def test_the_handle_tells_the_mirror_of_a_mug_that_is_missing_a_part():
     assert (found.point_group, found.at_least) == ("Cs", True)
 
 
-@pytest.mark.parametrize("diagonals", [3.0, 1e2, 1e4])
-@pytest.mark.parametrize("count", [1, 5, 20])
+@pytest.mark.parametrize("diagonals", [3.0, 1e4])
+@pytest.mark.parametrize("count", [1, 20])
 def test_strays_however_far_are_set_apart_though_some_lie_in_the_plane_of_others(count, diagonals):
     """From so far the body is a speck, and with a stray or two its points make a plane, which some other one is in."""
     part = extruded(polygon(5), -0.5, 0.5)

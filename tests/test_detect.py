@@ -239,7 +239,12 @@ MOTIONS = {
 
 @pytest.mark.parametrize(
     ("name", "motion"),
-    [*(("table", m) for m in MOTIONS), ("chiral", "kilometres"), ("chiral", "far away"), ("mug", "reflection")],
+    [
+        *(pytest.param("table", m, marks=pytest.mark.slow) for m in MOTIONS),
+        ("chiral", "kilometres"),
+        ("chiral", "far away"),
+        ("mug", "reflection"),
+    ],
 )
 def test_the_answer_moves_with_the_object(name, motion):
     det, scale, shift = MOTIONS[motion]
@@ -561,6 +566,7 @@ def test_a_sphere_is_round_wherever_its_centre_is_thought_to_be():
         assert detect(points / np.linalg.norm(points, axis=1, keepdims=True)).point_group == "Kh"
 
 
+@pytest.mark.slow
 def test_too_few_points_of_a_surface_leave_a_doubt_or_the_truth():
     for count in (300, 700):
         found = [detect(sample(table(), count, 0.0, np.random.default_rng(seed))) for seed in range(4)]

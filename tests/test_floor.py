@@ -145,7 +145,13 @@ def test_a_floor_in_another_frame_holds_the_same_points():
 
 
 @pytest.mark.parametrize(
-    ("name", "group"), [("stool3", "C3v"), ("bottle", "Cinfv"), ("clutter", "C1"), ("bossed_cube", "Oh")]
+    ("name", "group"),
+    [
+        ("stool3", "C3v"),
+        pytest.param("bottle", "Cinfv", marks=pytest.mark.slow),
+        ("clutter", "C1"),
+        pytest.param("bossed_cube", "Oh", marks=pytest.mark.slow),
+    ],
 )
 def test_an_object_has_its_group_on_a_floor_that_is_told(name, group):
     points, stray, _ = standing(specimen("shape", name)[0], 4)
@@ -170,7 +176,9 @@ def test_a_thing_that_stands_clear_of_the_floor_by_the_noise_may_have_more():
     assert found.at_least or found.point_group == "Dinfh"
 
 
-@pytest.mark.parametrize("name", ["stool3", "clutter", "chair", "bossed_cube"])
+@pytest.mark.parametrize(
+    "name", ["chair", *(pytest.param(name, marks=pytest.mark.slow) for name in ("stool3", "clutter", "bossed_cube"))]
+)
 def test_a_picture_shows_a_thing_as_it_stands(name):
     points, _, pose = standing(specimen("shape", name)[0], 14)
     found = detect(points, outliers="floor")

@@ -193,7 +193,7 @@ def test_the_farthest_of_many_is_farther_by_chance() -> None:
 # Points that nobody said anything of
 
 
-@pytest.mark.parametrize("group", ["C7v", "D2", pytest.param("Ci", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("group", ["C7v", *(pytest.param(name, marks=pytest.mark.slow) for name in ("D2", "Ci"))])
 def test_few_points_that_map_onto_one_another_are_told_wherever_they_are(group: str) -> None:
     """Not by the luck of rounding: in any pose, far away, and in any units."""
     places = images(group, 330, 2)
@@ -211,7 +211,7 @@ def test_they_need_not_be_exact() -> None:
     assert (found.point_group, found.sparse) == ("D3d", True)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_points_at_random_are_not_told(seed: int) -> None:
     assert detect(posed(strewn(300 + 100 * seed, seed), seed)).undetermined
 
@@ -245,6 +245,7 @@ def test_a_lattice_of_markers_is_no_picture() -> None:
 # The command line
 
 
+@pytest.mark.slow
 def test_the_command_says_what_it_was_told(run: Run, tmp_path: Path) -> None:
     file = tmp_path / "nodes.csv"
     places = grain(6, 6, 9) + np.random.default_rng(0).normal(size=(324, 3), scale=1e-3)

@@ -163,7 +163,7 @@ def test_a_group_is_told_by_what_elements_that_were_seen_generate(name, shares, 
 
 @pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("direction", [(0.3, 0.2, 0.93), pytest.param((0.7, 0.3, 0.6), marks=pytest.mark.slow)])
-@pytest.mark.parametrize("name", ["slab", "sheet"])
+@pytest.mark.parametrize("name", ["slab", pytest.param("sheet", marks=pytest.mark.slow)])
 def test_one_side_of_a_slab_tells_nothing_of_the_other(name, direction, seed):
     """Its own plane is no mirror that anybody saw; of the groups that hold with it, its other mirrors are told."""
     made = damage.view(MAKES[name](), np.array(direction), np.random.default_rng(seed))

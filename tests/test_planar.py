@@ -75,7 +75,14 @@ def test_resolution(name: str, side: int) -> None:
 
 
 @pytest.mark.parametrize("defect", ["bump", "bite"])
-@pytest.mark.parametrize("name", ["rectangle", "heart", "letter Z", "star", "pinwheel of 3", "ring"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "rectangle",
+        "letter Z",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("heart", "star", "pinwheel of 3", "ring")),
+    ],
+)
 def test_siblings_lose_the_symmetry(name: str, defect: str) -> None:
     row = run(Case(drawing=name, defect=defect, seed=5))
     assert row["truth"] == ("D1" if name == "ring" else "C1")

@@ -86,7 +86,7 @@ def test_a_surface_that_neighbourhoods_resolve_is_not_folded():
         ("rotors", "ratchet16", NOISY),
         pytest.param("rotors", "turbine60", View(form="cloud", points=20000, tolerance=0.004), marks=pytest.mark.slow),
         pytest.param("rotors", "impeller48", CLEAN, marks=pytest.mark.slow),
-        ("rotors", "propeller41", CLEAN),
+        pytest.param("rotors", "propeller41", CLEAN, marks=pytest.mark.slow),
     ],
 )
 def test_a_rotor_whose_blades_noise_blurs_is_not_told_for_sure_as_its_mirror_image(family, name, view):

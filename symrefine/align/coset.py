@@ -4,12 +4,14 @@ If the target has the symmetry group G, then R and g R, g in G, map the source o
 tell them apart. A continuous group leaves a whole subspace free: every orthogonal map within it does as well.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
+from symrefine.decide.hypotheses import SAME_RAD
 from symrefine.geometry import Array, ReadOnly, householder, unit
 from symrefine.groups import PointGroup
 from symrefine.groups.plane import PointGroup2D
@@ -130,11 +132,12 @@ def with_copies(
     """Maps ([3, 3], [3]) of a size, and behind them what they are before or after the operations of a finite group.
 
     One of the two objects has that group about a point [3]: what carries it onto itself makes maps that do as well. A
-    copy that is nearer to a map before it than two operations are to each other is that map, found by itself.
+    copy near a map before it is that map, found by itself.
     """
     operations = group.operations()
     apart = np.linalg.norm(operations - np.eye(3), axis=(1, 2))
-    nearest = 0.5 * float(apart[apart > SINGLE].min(initial=np.inf))
+    # Matrices that are a small angle apart differ by the square root of two times that.
+    nearest = min(0.5 * float(apart[apart > SINGLE].min(initial=np.inf)), math.sqrt(2.0) * 2.0 * SAME_RAD)
     kept = list(maps)
     for (matrix, shift), operation in product(maps, operations):
         copy = operation @ matrix if of_target else matrix @ operation
