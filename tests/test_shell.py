@@ -277,7 +277,7 @@ def test_verbose_tells_stages_with_seconds_and_a_rate(run: Run) -> None:
     assert nothing == ""
     assert json.loads(out) | {"timings": 0} == json.loads(plain) | {"timings": 0}
     told = [line.split()[1] for line in err.splitlines()]
-    assert told == ["load", "moments", "local", "search", "decide", "4", "detecting"]
+    assert told == ["load", "moments", "local", "vertices", "search", "decide", "4", "detecting"]
     for stage in ("load", "moments"):
         assert re.search(rf"^symrefine: {stage} \d+\.\d\d s, 4 points, [\d,]+ points/s$", err, re.MULTILINE)
 
