@@ -436,6 +436,17 @@ def test_voxels_have_the_group_of_their_grid(keep, group):
     assert (found.point_group, found.exact.point_group) == (group, group)
 
 
+def test_of_voxels_that_some_are_missing_of_nothing_is_sure_that_is_not_there():
+    """Of 21,909 voxels 20,000 were looked at: what had no counterpart among them was two percent off, and C1 sure."""
+    rng = np.random.default_rng(0)
+    grid = np.stack(np.meshgrid(*3 * [np.arange(28.0) - 13.5], indexing="ij"), axis=-1).reshape(-1, 3)
+    found = symrefine.detect(grid[rng.random(len(grid)) > 0.002] @ rotation([0.3, 1.0, 0.2], 0.5).T)
+    assert found.exact is None
+    assert {found.point_group: found.confidence, **{a.point_group: a.probability for a in found.alternatives}}[
+        "Oh"
+    ] > 0.4
+
+
 def test_noisy_meshes_and_clouds_are_not_exact():
     mesh, rng = table(), np.random.default_rng(0)
     noisy = Shape(mesh.points + 1e-3 * mesh.diagonal * rng.standard_normal(mesh.points.shape), mesh.faces)
