@@ -331,7 +331,7 @@ def _surface(measured: Measured, local: Array, tolerance: float, rng: np.random.
 
 
 def _volume(points: Array, labels: Index | None, tolerance: float, rng: np.random.Generator) -> Surface:
-    # All of them, as to leave some out is noise, and such that any stride takes an even part: files order voxels by rows.
+    # All of them: to leave some out is noise. Any stride takes an even part then, while files order voxels by rows.
     order = morton_order(points)
     points, labels = points[order], None if labels is None else labels[order]
 
