@@ -308,7 +308,7 @@ def test_the_command_tells_the_floor(tmp_path, capsys):
     assert invoke(["detect", str(tmp_path / "off.xyz"), "--outliers", "floor"]) == 0
     assert NO_FLOOR in capsys.readouterr().out
     assert invoke(["detect", str(tmp_path / "on.xyz"), "--json", "-"]) == 0
-    assert "if it is a floor, try --outliers floor" in capsys.readouterr().err
+    assert "if that is a floor, not a face of it, try --outliers floor" in capsys.readouterr().err
     assert invoke(["detect", str(tmp_path / "off.xyz")]) == 0
     assert "floor" not in capsys.readouterr().err
     assert invoke(["detect", str(tmp_path / "on.xyz"), str(tmp_path / "off.xyz"), "--outliers", "floor"]) == 0
