@@ -235,7 +235,7 @@ def _met_in_part(meeting: Meeting, evidence: Evidence, size: Size, clock: Clock,
     (matrix, translation), best = maps[0], meeting.best
 
     def coset() -> Coset:
-        every = _with_copies(evidence, maps, size.factor, reflections=reflections)
+        every = _with_copies(evidence, maps, meeting, size.factor, reflections=reflections)
         return coset_of_maps(*(np.array(parts) for parts in zip(*every, strict=True)))
 
     rms = best.rms * evidence.target.moments.scale / evidence.target.shape.diagonal
@@ -287,14 +287,20 @@ def _symmetry(evidence: Evidence, motion: Similarity) -> tuple[PointGroup, Array
 
 
 def _with_copies(
-    evidence: Evidence, maps: list[tuple[Array, Array]], factor: float, *, reflections: bool
+    evidence: Evidence, maps: list[tuple[Array, Array]], meeting: Meeting, factor: float, *, reflections: bool
 ) -> list[tuple[Array, Array]]:
-    """Maps, and what else does as well because one of the two was seen whole and is carried onto itself."""
-    for side in (evidence.source, evidence.target):
+    """Maps, and what else does as well because one of the two was seen whole and is carried onto itself.
+
+    That is the one of which less meets the other, if either is.
+    """
+    sides = zip(meeting.best.overlap, (evidence.source, evidence.target), strict=True)
+    for _, side in sorted(sides, key=lambda met: met[0]):
         found = detect(side.shape, tolerance=evidence.tolerance, seed=evidence.seed)
-        if not found.undetermined and not found.at_least and found.group.is_finite:
-            of_target = side is evidence.target
-            maps = with_copies(maps, found.group, found.center, factor, of_target=of_target)
+        if found.undetermined or found.at_least:
+            continue
+        if found.group.is_finite:
+            maps = with_copies(maps, found.group, found.center, factor, of_target=side is evidence.target)
+        break
     return [m for m in maps if reflections or np.linalg.det(m[0]) > 0.0]
 
 
