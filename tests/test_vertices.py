@@ -15,6 +15,7 @@ from experiments.objects.shapes import bottle, box, join, mug, sample, table
 from experiments.studies import boundary
 from symrefine.cli.tables import record_lines
 from symrefine.export.bop import decided
+from symrefine.fit.anchors import stays
 from symrefine.fit.vertices import NEAR, ROUNDED, exact_symmetry, on_vertices
 from symrefine.geometry import random_orthogonal, rotation
 from symrefine.groups import PointGroup
@@ -421,6 +422,21 @@ def test_points_of_a_surface_are_exact_where_they_map_onto_one_another():
     assert plane.offset == pytest.approx(plane.normal @ shift, abs=1e-11)
     made = symrefine.symmetrize(points)
     assert symrefine.detect(made.shape).exact.miss < 1e-12
+
+
+def test_points_that_stand_alone_in_their_distance_stay_where_they_are():
+    """What is seen at once to map nothing has no operation; what maps something, or may, is not seen so."""
+    rng = np.random.default_rng(4)
+    half = rng.normal(size=(2000, 3))
+    known = {
+        "strewn": (half, True),
+        "mirrored": (np.concatenate([half, half * [1.0, 1.0, -1.0]]), False),
+        "flat": (half * [1.0, 1.0, 0.0], False),
+        "told twice": (np.concatenate([half, half[:1]]), False),
+    }
+    for name, (points, told) in known.items():
+        about = points - points.mean(axis=0)
+        assert stays(about, ROUNDED) is told, name
 
 
 @pytest.mark.parametrize(

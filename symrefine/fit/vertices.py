@@ -11,7 +11,7 @@ import numpy as np
 
 from symrefine.errors import InputError
 from symrefine.fit.action import generators, mean_back, permutations
-from symrefine.fit.anchors import LARGEST, permuting_groups
+from symrefine.fit.anchors import LARGEST, permuting_groups, stays
 from symrefine.fit.corners import Corners, corners
 from symrefine.fit.finite import finite_group
 from symrefine.fit.placed import Placed, common_center
@@ -75,6 +75,8 @@ def exact_symmetry(shape: Shape, diagonal: float) -> tuple[OnVertices | None, On
     mirrors of a box in its corners, the two that keep the opening. None if nothing of it does.
     """
     origin, best = shape.points.mean(axis=0), list[OnVertices | None]()
+    if shape.faces is None and stays((shape.points - origin) / diagonal, ROUNDED):
+        return None, None
     for own in corners(shape, origin, diagonal, ROUNDED):
         exact = _exact(own, origin, diagonal)
         if (proof := _proven(own, exact, origin, diagonal)) is not None:
