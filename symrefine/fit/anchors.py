@@ -32,17 +32,17 @@ PROBES = (4, 40, 400)
 def stays(points: Array, within: float) -> bool:
     """Whether points [N, 3] about their centroid are seen at once to be carried onto one another by nothing.
 
-    No operation moves a point that is alone in its distance from there, and where the farthest of these are in no
-    plane with it none moves anything. Points that are told twice leave that open, as they draw the centroid.
+    No operation moves a point that is alone in its distance from there, and where these are in no plane with it none
+    moves anything. Points that are told twice leave that open, as they draw the centroid.
     """
     radii = np.linalg.norm(points, axis=1)
     order = np.argsort(radii)
     gaps = np.diff(radii[order], prepend=-np.inf, append=np.inf)
     if gaps.min() == 0.0:
         return False
-    alone = order[np.minimum(gaps[:-1], gaps[1:]) > 2.0 * within]
-    sizes = np.linalg.svd(points[alone[-AROUND:]], compute_uv=False)
-    return len(sizes) == 3 and bool(sizes[2] > LEVER * sizes[0])
+    alone = points[order[np.minimum(gaps[:-1], gaps[1:]) > 2.0 * within]]
+    squares = np.linalg.eigvalsh(alone.T @ alone)
+    return bool(squares[0] > LEVER**2 * squares[-1])
 
 
 def permuting_groups(points: Array, labels: Index | None, within: float) -> Iterator[PointGroup | None]:
