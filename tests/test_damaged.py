@@ -1468,8 +1468,8 @@ def test_the_handle_tells_the_mirror_of_a_mug_that_is_missing_a_part():
     assert (found.point_group, found.at_least) == ("Cs", True)
 
 
-@pytest.mark.parametrize("diagonals", [3.0, 1e4])
-@pytest.mark.parametrize("count", [1, 20])
+@pytest.mark.parametrize("diagonals", [3.0, pytest.param(1e2, marks=pytest.mark.slow), 1e4])
+@pytest.mark.parametrize("count", [1, pytest.param(5, marks=pytest.mark.slow), 20])
 def test_strays_however_far_are_set_apart_though_some_lie_in_the_plane_of_others(count, diagonals):
     """From so far the body is a speck, and with a stray or two its points make a plane, which some other one is in."""
     part = extruded(polygon(5), -0.5, 0.5)

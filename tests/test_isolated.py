@@ -211,7 +211,7 @@ def test_they_need_not_be_exact() -> None:
     assert (found.point_group, found.sparse) == ("D3d", True)
 
 
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 def test_points_at_random_are_not_told(seed: int) -> None:
     assert detect(posed(strewn(300 + 100 * seed, seed), seed)).undetermined
 

@@ -458,9 +458,8 @@ def test_of_voxels_that_some_are_missing_of_nothing_is_sure_that_is_not_there():
     grid = np.stack(np.meshgrid(*3 * [np.arange(28.0) - 13.5], indexing="ij"), axis=-1).reshape(-1, 3)
     found = symrefine.detect(grid[rng.random(len(grid)) > 0.002] @ rotation([0.3, 1.0, 0.2], 0.5).T)
     assert found.exact is None
-    assert {found.point_group: found.confidence, **{a.point_group: a.probability for a in found.alternatives}}[
-        "Oh"
-    ] > 0.4
+    told = {a.point_group: a.probability for a in found.alternatives} | {found.point_group: found.confidence}
+    assert told["Oh"] > 0.4
 
 
 def test_noisy_meshes_and_clouds_are_not_exact():

@@ -4,7 +4,6 @@ If the target has the symmetry group G, then R and g R, g in G, map the source o
 tell them apart. A continuous group leaves a whole subspace free: every orthogonal map within it does as well.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -14,6 +13,7 @@ import numpy as np
 from symrefine.decide.hypotheses import SAME_RAD
 from symrefine.geometry import Array, ReadOnly, householder, unit
 from symrefine.groups import PointGroup
+from symrefine.groups.orthogonal import chord_angles
 from symrefine.groups.plane import PointGroup2D
 from symrefine.rounding import SINGLE
 
@@ -135,13 +135,12 @@ def with_copies(
     copy near a map before it is that map, found by itself.
     """
     operations = group.operations()
-    apart = np.linalg.norm(operations - np.eye(3), axis=(1, 2))
-    # Matrices that are a small angle apart differ by the square root of two times that.
-    nearest = min(0.5 * float(apart[apart > SINGLE].min(initial=np.inf)), math.sqrt(2.0) * 2.0 * SAME_RAD)
+    apart = chord_angles(operations, np.eye(3))
+    nearest = min(0.5 * float(apart[apart > SINGLE].min(initial=np.inf)), 2.0 * SAME_RAD)
     kept = list(maps)
     for (matrix, shift), operation in product(maps, operations):
         copy = operation @ matrix if of_target else matrix @ operation
-        if all(np.linalg.norm(copy - known) >= nearest for known, _ in kept):
+        if chord_angles(np.array([known for known, _ in kept]), copy).min() >= nearest:
             moved = operation @ (shift - center) + center
             kept.append((copy, moved if of_target else shift + scale * (matrix @ (center - operation @ center))))
     return kept

@@ -185,7 +185,7 @@ def planar_lines(record: Record) -> Iterator[Table | str]:
     yield ""
     yield "Offsets in units of the file (of a picture: pixels, y up), misses in % of the diagonal."
     if record["near_misses"]:
-        yield from all_turned_down([float(miss["excess"]) for miss in record["near_misses"]], record["point_group"])
+        yield from all_turned_down([miss["excess"] for miss in record["near_misses"]], record["point_group"])
     yield f"{seconds(record)} s"
 
 

@@ -71,8 +71,9 @@ def exact_symmetry(shape: Shape, diagonal: float) -> tuple[OnVertices | None, On
     """The group that maps points of a shape, corners of a mesh, onto one another to rounding, and what of it is proven.
 
     Nothing else has to be known of the shape but its diagonal, input units. The first is None if it cannot be told so
-    (see `permuting_groups`). The second is that part of it which maps the faces, too: of an open box, that has all the
-    mirrors of a box in its corners, the two that keep the opening. None if nothing of it does.
+    (see `permuting_groups`), and of a cloud that shows at once to have none (see `stays`). The second is that part of
+    it which maps the faces, too: of an open box, that has all the mirrors of a box in its corners, the two that keep
+    the opening. None if nothing of it does.
     """
     origin, best = shape.points.mean(axis=0), list[OnVertices | None]()
     if shape.faces is None and stays((shape.points - origin) / diagonal, ROUNDED):
