@@ -452,6 +452,15 @@ def test_voxels_have_the_group_of_their_grid(keep, group):
     assert (found.point_group, found.exact.point_group) == (group, group)
 
 
+def test_a_cloud_without_symmetry_is_not_exactly_without():
+    """With a point that is told twice nothing shows at once that none is mapped."""
+    points = np.random.default_rng(0).random((300, 3))
+    points = np.concatenate([points, points[:1]])
+    assert exact_symmetry(Shape(points), 1.7)[0].group.name == "C1"
+    found = symrefine.detect(points, isolated=True)
+    assert (found.point_group, found.exact) == ("C1", None)
+
+
 def test_of_voxels_that_some_are_missing_of_nothing_is_sure_that_is_not_there():
     """Of 21,909 voxels 20,000 were looked at: what had no counterpart among them was two percent off, and C1 sure."""
     rng = np.random.default_rng(0)

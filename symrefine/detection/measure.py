@@ -365,7 +365,8 @@ def by_vertices(
     moments = measured.moments
     exact, proof = exact_symmetry(measured.shape, moments.scale * diagonal)
     if exact is None or exact.group.name == "C1":
-        return exact, None, evidence
+        # That every point is mapped onto itself says nothing of a cloud.
+        return exact if measured.shape.faces is not None else None, None, evidence
     found = [None if known is None else known.beside(moments.center) for known in (exact, proof)]
     placed = [None if k is None else Placed(group=k.group, center=moments.normalised(k.center)) for k in found]
     return found[0], found[1], replace(evidence, vertices=placed[0], proven=placed[1])
