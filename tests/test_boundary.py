@@ -357,3 +357,9 @@ def test_noise_that_a_small_cloud_tells_over_and_over_is_told_once(view, seed):
     Taken as so many, a few planes at the rim of a cone that lie beyond all of them were a detail, and it was Cs.
     """
     assert run(Case(family="sparse", name="cone", view=view, seed=seed)).outcome == "right"
+
+
+@pytest.mark.parametrize(("name", "view"), [("spined1", 1), pytest.param("knobbed1", 3, marks=pytest.mark.slow)])
+def test_what_is_finer_than_moments_are_is_found(name, view):
+    """Nothing proposed the half turn of an urchin, and C1 was told, at 1.000 and .992."""
+    assert run(Case(family="spread", name=name, view=view, seed=5)).outcome == "right"

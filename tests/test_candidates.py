@@ -9,10 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
+from experiments.objects.boundary import instance
 from experiments.objects.constructions import gear, rotor
 from experiments.objects.parts import assembled
 from experiments.objects.shapes import bottle, box, join, sample, table
-from symrefine.fit.placed import Placed, joined
+from symrefine.fit.placed import Placed, elements, joined
 from symrefine.geometry import line_angle_rad, random_orthogonal, rotation, unit
 from symrefine.groups import is_subgroup, point_group
 from symrefine.moments.moments import central_moments
@@ -24,6 +25,7 @@ from symrefine.propose.candidates import (
     apart,
     beside,
     beside_details,
+    fine,
     placed,
     prime_axes,
     proposals,
@@ -272,3 +274,16 @@ def test_details_of_what_is_round_tell_the_mirrors_through_its_axis(count):
         np.testing.assert_array_equal(p.center, center)
         for operation in p.group.operations():
             assert cKDTree(middles).query(middles @ operation.T)[0].max() < 0.15
+
+
+@pytest.mark.parametrize("name", ["spined1", "knobbed2", "studded3"])
+def test_what_is_finer_than_moments_resolve_is_proposed(name):
+    """Of spines all over a ball the moments see nothing; what they see they tell better."""
+    made, rng = instance("spread", name, seed=5), np.random.default_rng(4)
+    turn = random_orthogonal(rng)
+    told = [p.group for p in fine(evidence_of(sample(made.shape, 20000, 0.0, rng) @ turn.T))]
+    for element in elements(made.truth.group):
+        axis = turn @ element.direction
+        alike = [g for g in told if g.name == f"C{element.order}"]
+        assert min(line_angle_rad(axis, g.frame[2]) for g in alike) < START_ERROR
+    assert not any(fine(seen(other, 0)[0]) for other in ("table", "brick", "bottle"))

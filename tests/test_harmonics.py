@@ -8,7 +8,14 @@ from scipy.linalg import expm
 from scipy.special import lpmv
 
 from symrefine.geometry import random_orthogonal, rotation, unit
-from symrefine.moments.harmonics import generators, harmonic_moments, solid_harmonic, to_polar_axis, turn
+from symrefine.moments.harmonics import (
+    directional_moments,
+    generators,
+    harmonic_moments,
+    solid_harmonic,
+    to_polar_axis,
+    turn,
+)
 from symrefine.moments.moments import central_moments, transformed
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -79,6 +86,17 @@ def test_harmonics_are_orthogonal_on_the_sphere():
     # The rule is exact to degree 16 = 8 + 8, over z and over phi.
     expected = np.concatenate([np.full(2 * l + 1, 1 / (2 * l + 1)) for l in DEGREES])
     np.testing.assert_allclose(mean, np.diag(expected), atol=EPS)
+
+
+def test_directional_moments_weigh_harmonics_by_radial_powers():
+    """Up to twice the degree of the polynomials, by the oracle; a point at the centre has no direction."""
+    x, weights = np.vstack([points_of(5), np.zeros(3)]), np.random.default_rng(6).uniform(0.5, 2.0, 41)
+    found = directional_moments(x, weights, 16)
+    assert list(found) == list(range(1, 17))
+    radii = np.linalg.norm(x[:-1], axis=1)
+    for l, c in found.items():
+        on_sphere = np.stack([legendre(l, m, x[:-1] / radii[:, None]) for m in range(-l, l + 1)], axis=1)
+        np.testing.assert_allclose(c, (weights[:-1] * radii ** np.arange(3)[:, None]) @ on_sphere, atol=1e-10)
 
 
 # How they turn

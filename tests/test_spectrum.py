@@ -8,15 +8,7 @@ from symrefine.geometry import frame_with_z, householder, random_orthogonal, rot
 from symrefine.groups import point_group
 from symrefine.moments.harmonics import harmonic_moments
 from symrefine.moments.moments import shape_moments, transformed
-from symrefine.propose.spectrum import (
-    DIRECTIONS,
-    axis_misses,
-    half_sphere,
-    local_minima,
-    mirror_candidates,
-    mirror_misses,
-    whitened,
-)
+from symrefine.propose.spectrum import DIRECTIONS, Spectrum, half_sphere, local_minima, mirror_candidates, whitened
 from symrefine.shape import Shape
 
 ORDER = 8
@@ -39,6 +31,10 @@ def moved(shape, matrix, shift=0.0):
 def onto(source, target):
     """A rotation that turns one direction into another."""
     return frame_with_z(target).T @ frame_with_z(source)
+
+
+def candidates(moments):
+    return mirror_candidates(Spectrum.of_moments(whitened(moments)), Spectrum.of_moments(moments))
 
 
 def coefficients(moments):
@@ -65,7 +61,7 @@ def test_mirror_miss_is_the_energy_that_the_reflection_flips(direction):
     c = coefficients(moments)
     image = coefficients(transformed(moments, householder(half_sphere()[direction])))
     expected = np.sum(((c - image) / 2) ** 2) / np.sum(c**2)
-    assert mirror_misses(moments)[direction] == pytest.approx(expected, rel=1e-9)
+    assert Spectrum.of_moments(moments).mirror_misses()[direction] == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("fold", [2, 3, 5, 7])
@@ -75,7 +71,7 @@ def test_axis_miss_is_the_energy_that_the_turns_do_not_keep(fold, direction):
     u, c = half_sphere()[direction], coefficients(moments)
     turned = [coefficients(transformed(moments, rotation(u, 2 * np.pi * k / fold))) for k in range(fold)]
     expected = np.sum((c - np.mean(turned, axis=0)) ** 2) / np.sum(c**2)
-    assert axis_misses(moments, fold)[direction] == pytest.approx(expected, rel=1e-9)
+    assert Spectrum.of_moments(moments).axis_misses(fold)[direction] == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize(("shape", "normals"), MIRRORS.values(), ids=MIRRORS)
@@ -83,7 +79,7 @@ def test_a_true_mirror_misses_by_nothing(shape, normals):
     for i, normal in zip((5, 333, 1200), normals, strict=False):
         moments = shape_moments(moved(shape, onto(normal, half_sphere()[i]), 3.0), ORDER)
         for m in (moments, whitened(moments)):
-            misses = mirror_misses(m)
+            misses = Spectrum.of_moments(m).mirror_misses()
             # Squares of rounding errors of 1e-12 at most; the mug's handle is symmetric but for the diagonals of the
             # bent quads it is made of, 1e-8 of its moments.
             assert misses[i] < (1e-15 if shape is MIRRORS["mug"][0] else 1e-20)
@@ -97,21 +93,22 @@ def test_a_true_axis_misses_by_nothing_and_other_folds_do_not_hold(fold):
     pyramid = join([revolve([(0, 0), (1, 0), (0, 1.3)], fold)]) if fold > 2 else join([box((0, 0, 0), (1, 0.7, 0.4))])
     i = 432
     moments = shape_moments(moved(pyramid, onto([0, 0, 1], half_sphere()[i])), ORDER)
+    spectrum = Spectrum.of_moments(moments)
     for order in range(2, 8):
-        miss = axis_misses(moments, order)[i]
+        miss = spectrum.axis_misses(order)[i]
         assert miss < 1e-20 if fold % order == 0 else miss > 1e-6
 
 
 def test_round_objects_miss_no_fold_about_their_axis():
     moments = shape_moments(moved(join([revolve([(0, 0), (1, 0), (0, 2)], 60)]), onto([0, 0, 1], half_sphere()[9])), 8)
-    assert max(axis_misses(moments, k)[9] for k in (2, 3, 5, 7)) < 1e-20
+    assert max(Spectrum.of_moments(moments).axis_misses(k)[9] for k in (2, 3, 5, 7)) < 1e-20
 
 
 @pytest.mark.parametrize("det", [1, -1])
 @pytest.mark.parametrize(("shape", "normals"), MIRRORS.values(), ids=MIRRORS)
 def test_the_first_candidates_are_the_true_mirrors_in_any_pose(shape, normals, det):
     matrix = random_orthogonal(np.random.default_rng(1), 3, det)
-    found = mirror_candidates(shape_moments(moved(shape, matrix, 2.0), ORDER))
+    found = candidates(shape_moments(moved(shape, matrix, 2.0), ORDER))
     first = np.array(found[: len(normals)])
     angles = np.degrees(np.arccos(np.clip(np.abs(normals @ matrix.T @ first.T), 0, 1)))
     # A paraboloid through directions 3.7 degrees apart puts the minimum right to a tenth of that.
@@ -121,7 +118,7 @@ def test_the_first_candidates_are_the_true_mirrors_in_any_pose(shape, normals, d
 
 
 def test_candidates_are_apart_and_few():
-    found = np.array(mirror_candidates(shape_moments(CUBE, ORDER)))
+    found = np.array(candidates(shape_moments(CUBE, ORDER)))
     assert len(found) <= 16
     closeness = np.abs(found @ found.T) - np.eye(len(found))
     assert closeness.max() < np.cos(np.radians(5))
@@ -165,7 +162,7 @@ def test_the_deepest_minima_are_kept_in_their_order(order):
 def test_the_mirrors_of_long_and_flat_boxes_are_all_among_the_candidates(size):
     """Of a long box the raw moments see little of what lies around its length; they may blur it by a few degrees."""
     matrix = random_orthogonal(np.random.default_rng(5))
-    found = mirror_candidates(shape_moments(moved(join([box((0, 0, 0), size)]), matrix), ORDER))
+    found = candidates(shape_moments(moved(join([box((0, 0, 0), size)]), matrix), ORDER))
     for n in matrix.T:
         assert np.degrees(np.arccos(np.abs(found @ n).max())) < 6.0
 
@@ -193,4 +190,4 @@ def test_whitening_a_plate_stays_finite():
     # The thin direction is stretched by no more than THIN^-1/2.
     assert white.covariance[2, 2] < 1e-9
     np.testing.assert_allclose(white.covariance[:2, :2], np.eye(2) / 3, atol=1e-9)
-    assert np.isfinite(mirror_misses(white)).all()
+    assert np.isfinite(Spectrum.of_moments(white).mirror_misses()).all()

@@ -4,8 +4,9 @@
 
 prints them. Families: rotors without mirrors and gears, surfaces of revolution with something to them, meshes of uneven
 area, scans with defects and their siblings, prisms for sparse clouds, objects without symmetry, clouds with something
-extreme, molecules for a ladder of tolerances, thin-walled open vessels, furniture of thin boards and rods, thin
-blades of which one is shorter, bodies with fins or pins at one place. Names are keys; a seed varies all dimensions.
+extreme, molecules for a ladder of tolerances, thin-walled open vessels, furniture of thin boards and rods, thin blades
+of which one is shorter, bodies with fins or pins at one place, balls with details spread evenly. Names are keys; a seed
+varies all dimensions.
 """
 
 import zlib
@@ -21,6 +22,7 @@ from experiments.objects.ladders import LADDERS
 from experiments.objects.lathe import ROUND
 from experiments.objects.prisms import SPARSE
 from experiments.objects.scans import SCANS
+from experiments.objects.spread import SPREAD
 from experiments.objects.turning import GEARS, ROTORS
 from experiments.objects.uneven import UNEVEN
 from experiments.objects.vanes import VANES
@@ -40,6 +42,7 @@ FAMILIES: dict[str, dict[str, Build]] = {
     "furniture": FURNITURE,
     "vanes": VANES,
     "finned": FINNED,
+    "spread": SPREAD,
 }
 
 

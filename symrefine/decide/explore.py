@@ -35,6 +35,7 @@ from symrefine.propose.candidates import (
     about,
     beside,
     beside_details,
+    fine,
     prime_axes,
     proposals,
     repeated,
@@ -149,6 +150,8 @@ def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float
     better = [h for h in pool.small if ALIKE * h.need < pool.largest.need]
     for known in {h.group.name: h for h in (*better, pool.largest)}.values():
         pool = _with(surface, pool, turned_over(evidence, known.placed))
+    if evidence.tuples.rank == 0 or not pool.largest.elements or pool.largest.need > doubtless(surface):
+        pool = _with(surface, pool, fine(evidence))
     # Where nothing comes near, what comes nearest is told of, and looked at for that.
     if pool.small or min((needs for _, needs in pool.looked), default=math.inf) <= COARSE * limit:
         return pool

@@ -92,6 +92,33 @@ def harmonic_moments(moments: Moments) -> dict[int, Array]:
     return result
 
 
+def directional_moments(points: Array, weights: Array, degree: int) -> dict[int, Array]:
+    """c[p,l,m] = sum w r^p R_lm(x / r) of points [N, 3], as {l: [3, 2l+1]} for l = 1..degree and p = 0, 1, 2.
+
+    They see details as fine as the degree allows, as far out as near by, where the powers r^l of moments would tell
+    of nothing but the farthest points.
+    """
+    radii = np.linalg.norm(points, axis=1)
+    away = radii > 0.0
+    radii, (x, y, z) = radii[away], (points[away] / radii[away, None]).T
+    radial = weights[away] * radii ** np.arange(3)[:, None]
+    result: dict[int, Array] = {l: np.zeros((3, 2 * l + 1)) for l in range(1, degree + 1)}
+    around, sectoral = np.ones(len(radii), dtype=complex), np.ones(len(radii))  # (x + i y)^m, and (2m - 1)!!
+    for m in range(degree + 1):
+        before, zonal = np.zeros_like(z), sectoral
+        both = np.concatenate([radial * around.real, radial * around.imag])
+        for l in range(m, degree + 1):
+            if l > m:  # the recurrence of the associated Legendre functions, over sin^m
+                before, zonal = zonal, ((2 * l - 1) * z * zonal - (l + m - 1) * before) / (l - m)
+            if l:
+                scale = sqrt((2.0 if m else 1.0) * factorial(l - m) / factorial(l + m))
+                cosine, sine = (scale * (both @ zonal)).reshape(2, 3)
+                result[l][:, l + m] = cosine
+                result[l][:, l - m] = sine if m else cosine
+        around, sectoral = around * (x + 1j * y), sectoral * (2 * m + 1)
+    return result
+
+
 @lru_cache(maxsize=32)
 def generators(l: int) -> Array:
     """Skew matrices J_x, J_y, J_z [3, 2l+1, 2l+1] with D_l(exp[w]_x) = exp(w.J).

@@ -4,6 +4,7 @@ The n-tuples give an axis or a plane where they do not vanish, the directional s
 azimuthal spectrum the folds about an axis with their phases. Everything is in normalised units (RMS radius 1).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -16,19 +17,28 @@ from symrefine.geometry import Array, frame_with_z
 from symrefine.groups import MAX_FOLD, PointGroup, close
 from symrefine.groups.identify import POLYHEDRAL
 from symrefine.groups.names import CLOSED_FOLD
-from symrefine.moments.harmonics import FLOOR, Harmonics, flattened, harmonic_moments, row_variance
+from symrefine.moments.harmonics import (
+    FLOOR,
+    Harmonics,
+    directional_moments,
+    flattened,
+    harmonic_moments,
+    row_variance,
+)
 from symrefine.moments.moments import Moments
 from symrefine.ntuples.rank import FixedSubspace
 from symrefine.propose.folds import azimuthal_spectrum, folds_of, frames_across, mirror_through
 from symrefine.propose.maps import WITHIN, maps_onto_itself
-from symrefine.propose.spectrum import apart, axis_misses, local_minima, mirror_candidates, whitened
+from symrefine.propose.spectrum import Spectrum, apart, local_minima, mirror_candidates, whitened, whitening
 from symrefine.propose.votes import AGREE_RAD, meeting, mirror_votes, revolution
 from symrefine.rounding import DOUBLE, START_ERROR
-from symrefine.samples import FOLLOWED
+from symrefine.samples import COUNT, FOLLOWED
 from symrefine.surface.skin import LocalPlanes
 
 # Primes whose axes the moments tell.
 PRIMES = (2, 3, 5, 7)
+# Degree of what is finer than moments resolve: twice their order, as fine as directions 3.7 degrees apart can show.
+FINEST = 16
 # Atoms nearer to an axis than these (RMS radii) may stand on it.
 ON_AXIS = (0.03, 0.15)
 # Longest step (radians) of a frame that is polished on the moments: what the linear model covers.
@@ -41,7 +51,7 @@ class Evidence:
 
     `atoms` says that the points stand for themselves, so that they can be counted. `vertices` is the group that maps
     those of a mesh, or the points of a cloud, onto one another, where they put it; `proven` that of
-    it which maps the faces, too. `spectra` are those that `azimuths` told, by the bytes of their axes.
+    it which maps the faces, too. `told` is what `azimuths` told, by the bytes of their axes.
     """
 
     moments: Moments
@@ -51,19 +61,24 @@ class Evidence:
     atoms: bool = False
     vertices: Placed | None = None
     proven: Placed | None = None
-    spectra: dict[bytes, tuple[Array, Array]] = field(default_factory=dict)
+    told: dict[bytes, tuple[Array, Array]] = field(default_factory=dict)
 
     @cached_property
     def harmonics(self) -> dict[int, Array]:
         """Solid-harmonic moments with jackknife replicates."""
         return harmonic_moments(self.moments)
 
+    @cached_property
+    def spectra(self) -> tuple[Spectrum, Spectrum]:
+        """The directional spectra of the whitened moments and of the moments."""
+        return Spectrum.of_moments(whitened(self.moments)), Spectrum.of_moments(self.moments)
+
     def azimuths(self, axis: Array) -> tuple[Array, Array]:
         """The azimuthal spectrum about an axis, which folds and mirrors are both told by."""
         key = axis.tobytes()
-        if key not in self.spectra:
-            self.spectra[key] = azimuthal_spectrum(self.points, self.weights, axis)
-        return self.spectra[key]
+        if key not in self.told:
+            self.told[key] = azimuthal_spectrum(self.points, self.weights, axis)
+        return self.told[key]
 
 
 def proposals(evidence: Evidence) -> list[Placed]:
@@ -73,7 +88,7 @@ def proposals(evidence: Evidence) -> list[Placed]:
     axes = [start.group.frame[2] for start in around if start.group.name == "Cinfv"]
     through = (mirror_through(evidence.azimuths(axis), axis) for axis in axes)
     told = [normal for normal in through if normal is not None]
-    normals = [*evidence.tuples.directions[::-1], *_principal(evidence), *mirror_candidates(evidence.moments), *told]
+    normals = [*evidence.tuples.directions[::-1], *_principal(evidence), *mirror_candidates(*evidence.spectra), *told]
     return [*around, placed("Ci", np.eye(3)), *(placed("Cs", frame_with_z(n)) for n in apart(normals))]
 
 
@@ -114,11 +129,29 @@ def beside_details(known: Placed, details: Array) -> list[Placed]:
 
 def prime_axes(evidence: Evidence) -> list[Placed]:
     """Axes of prime order that the moments propose elsewhere: an axis of any order is one of a prime order too."""
-    white, likely = whitened(evidence.moments), _likely(evidence)
+    return _axes(evidence.spectra[0], _likely(evidence))
+
+
+def fine(evidence: Evidence) -> list[Placed]:
+    """Axes and mirrors of what is finer than the moments resolve, if that is most of what tells directions apart.
+
+    Of what is spread evenly, such as the spines of an urchin, the moments see nothing.
+    """
+    points, weights = evidence.points @ whitening(evidence.moments.covariance), evidence.weights
+    every = max(1, len(points) // COUNT)
+    energy = {l: (c**2).sum() for l, c in directional_moments(points[::every], weights[::every], FINEST).items()}
+    if 2.0 * sum(energy[l] for l in evidence.harmonics) > sum(energy.values()):
+        return []
+    spectrum = Spectrum.of(directional_moments(points, weights, FINEST))
+    return [*_axes(spectrum), *(placed("Cs", frame_with_z(n)) for n in mirror_candidates(spectrum))]
+
+
+def _axes(spectrum: Spectrum, known: Sequence[Array] = ()) -> list[Placed]:
+    """Axes of prime order that a spectrum proposes beside known directions."""
     found = []
     for k in PRIMES:
-        minima, _ = local_minima(axis_misses(white, k), count=5)
-        found += [placed(f"C{k}", frame_with_z(d)) for d in apart([*likely, *minima])[len(likely) :]]
+        minima, _ = local_minima(spectrum.axis_misses(k), count=5)
+        found += [placed(f"C{k}", frame_with_z(d)) for d in apart([*known, *minima])[len(known) :]]
     return found
 
 

@@ -7,6 +7,7 @@ judges them.
 """
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -47,29 +48,36 @@ def _neighbours() -> Index:
     return np.argpartition(-closeness, 8, axis=1)[:, :8]
 
 
-def _share(moments: Moments, kept: Callable[[int, Index], NDArray[np.bool_]]) -> Array:
-    """Fraction of the energy about every direction [DIRECTIONS] that is of the orders m that `kept(l, m)` selects."""
-    energy, total = np.zeros(DIRECTIONS), 0.0
-    for l, c in harmonic_moments(moments).items():
-        rows = _rows(l, tuple(np.flatnonzero(kept(l, np.arange(-l, l + 1))).tolist()))
-        energy += ((rows.reshape(-1, 2 * l + 1) @ c[0].T) ** 2).reshape(DIRECTIONS, -1).sum(axis=1)
-        total += float((c[0] ** 2).sum())
-    return energy / max(total, 1e-300)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Spectrum:
+    """The energy of each order m about every direction, {l: [DIRECTIONS, 2l+1]}."""
 
+    energies: dict[int, Array]
 
-@lru_cache(maxsize=128)
-def _rows(l: int, chosen: tuple[int, ...]) -> Array:
-    return read_only(_table(l)[:, list(chosen)])
+    @classmethod
+    def of(cls, by_degree: dict[int, Array]) -> "Spectrum":
+        """That of harmonic coefficients {l: [n_l, 2l+1]}."""
+        return cls(energies={l: ((_table(l) @ c.T) ** 2).sum(axis=2) for l, c in by_degree.items()})
 
+    @classmethod
+    def of_moments(cls, moments: Moments) -> "Spectrum":
+        """That of the harmonic moments, to their order."""
+        return cls.of({l: c[0] for l, c in harmonic_moments(moments).items()})
 
-def mirror_misses(moments: Moments) -> Array:
-    """Fraction of the energy that the mirror normal to each direction flips, [DIRECTIONS]."""
-    return _share(moments, lambda l, m: (l + m) % 2 == 1)
+    def mirror_misses(self) -> Array:
+        """Fraction of the energy that the mirror normal to each direction flips, [DIRECTIONS]."""
+        return self._share(lambda l, m: (l + m) % 2 == 1)
 
+    def axis_misses(self, order: int) -> Array:
+        """Fraction of the energy that a rotation by 2 pi / order about each direction does not keep, [DIRECTIONS]."""
+        return self._share(lambda _, m: m % order != 0)
 
-def axis_misses(moments: Moments, order: int) -> Array:
-    """Fraction of the energy that a rotation by 2 pi / order about each direction does not keep, [DIRECTIONS]."""
-    return _share(moments, lambda _, m: m % order != 0)
+    def _share(self, flipped: Callable[[int, Index], NDArray[np.bool_]]) -> Array:
+        lost, total = np.zeros(DIRECTIONS), 0.0
+        for l, energy in self.energies.items():
+            lost += energy[:, flipped(l, np.arange(-l, l + 1))].sum(axis=1)
+            total += float(energy[0].sum())  # turning keeps it
+        return lost / max(total, 1e-300)
 
 
 def local_minima(misses: Array, *, count: int) -> tuple[Array, Array]:
@@ -100,18 +108,23 @@ def _vertices(misses: Array, lowest: Index) -> Array:
     return unit(here + np.einsum("cp,cpi->ci", move, frames[:, :2]))
 
 
-def whitened(moments: Moments) -> Moments:
-    """Moments of `C^(-1/2) x`: every symmetry of an object commutes with its covariance C, so none is lost, and
+def whitening(covariance: Array) -> Array:
+    """C^(-1/2) up to a factor, [3, 3]: every symmetry of an object commutes with its covariance C, so none is lost, and
     elongated shapes no longer drown what lies around their long axis (method.md, section 5)."""
-    values, vectors = np.linalg.eigh(moments.covariance)
+    values, vectors = np.linalg.eigh(covariance)
     values = np.maximum(values, THIN * values[-1])
-    return transformed(moments, (vectors / np.sqrt(3.0 * values)) @ vectors.T)
+    return np.asarray((vectors / np.sqrt(3.0 * values)) @ vectors.T)
 
 
-def mirror_candidates(moments: Moments) -> list[Array]:
-    """Normals of candidate mirror planes through the centre, raw and whitened spectrum together, least miss first."""
+def whitened(moments: Moments) -> Moments:
+    """Moments of the whitened object; see `whitening`."""
+    return transformed(moments, whitening(moments.covariance))
+
+
+def mirror_candidates(*spectra: Spectrum) -> list[Array]:
+    """Normals of candidate mirror planes through the centre by several spectra together, least miss first."""
     count = 16
-    found = [local_minima(mirror_misses(m), count=count) for m in (whitened(moments), moments)]
+    found = [local_minima(spectrum.mirror_misses(), count=count) for spectrum in spectra]
     directions, misses = (np.concatenate(part) for part in zip(*found, strict=True))
     return apart(directions[np.argsort(misses, kind="stable")], np.radians(5.0))[:count]
 
