@@ -218,6 +218,17 @@ def test_files_of_open3d(tmp_path: Path) -> None:
     assert "SIZE 4; save it as binary" in refusal(tmp_path, "c.pcd", double_compressed())
 
 
+@pytest.mark.parametrize("kind", ["ascii", "binary"])
+def test_a_pixel_of_an_organised_cloud_that_saw_nothing_is_no_point(tmp_path: Path, kind: str) -> None:
+    nothing = np.full((1, 3), np.nan)
+    data = pcd(kind, np.vstack([nothing, TETRA[:2], nothing, TETRA[2:]]))
+    organised = data.replace(b"WIDTH 6\nHEIGHT 1", b"WIDTH 3\nHEIGHT 2")
+    np.testing.assert_array_equal(load_bytes(tmp_path, "a.pcd", organised).points, TETRA)
+    assert "is [nan, nan, nan] (2 such of 6)" in refusal(tmp_path, "b.pcd", data)
+    half = pcd(kind, np.vstack([TETRA, nothing, [[np.nan, 0.0, 1.0]]])).replace(b"WIDTH 6\nHEIGHT 1", b"WIDTH 3\nHEIGHT 2")
+    assert "is [nan, 0.0, 1.0] (1 such of 5)" in refusal(tmp_path, "c.pcd", half)
+
+
 def double_compressed() -> bytes:
     header = pcd("binary", TETRA)[: -TETRA.nbytes].replace(b"DATA binary", b"DATA binary_compressed")
     return header + struct.pack("<II", 3, TETRA.nbytes) + b"abc"

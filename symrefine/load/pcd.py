@@ -23,12 +23,16 @@ _NOT_FIELDS = frozenset({*_COORDINATES, *_NORMAL, "_", "rgb", "rgba"})
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Header:
-    """Fields with their NumPy types and numbers of values, points, encoding; where the data begin."""
+    """Fields with their NumPy types and numbers of values, points, encoding; where the data begin.
+
+    An `organised` cloud has a point for every pixel of its sensor.
+    """
 
     names: list[str]
     types: list[str]
     counts: list[int]
     points: int
+    organised: bool
     encoding: str
     size: int
     lines: int
@@ -46,6 +50,8 @@ class _Header:
 def read_pcd(data: bytes, path: Path) -> Content:
     """Content of a PCD file; the viewpoint is where the sensor stood and moves no point (see `_viewpoint`).
 
+    A pixel of an organised cloud that saw nothing has a point of three NaN, which is none, as in a depth image.
+
     Fields are those of one value a point beside places, normals and colours (which PCD packs into one number); of
     compressed files, none.
     """
@@ -61,6 +67,8 @@ def read_pcd(data: bytes, path: Path) -> Content:
         table, lines = _read_binary(data, header, [*wanted, *others]), None
     else:
         table, lines, others = _read_compressed(data, path, header, wanted), None, []
+    if header.organised and not (seen := ~np.isnan(table[:, :3]).all(axis=1)).all():
+        table, lines = table[seen], lines and [line for line, kept in zip(lines, seen, strict=True) if kept]
     return Content(
         points=table[:, :3],
         normals=table[:, 3:6] if normals else None,
@@ -104,7 +112,7 @@ def _interpret(entries: dict[str, list[str]], size: int, lines: int) -> _Header:
         raise InputError(f"line {lines}: DATA {shorten(encoding)}; expected one of {', '.join(_ENCODINGS)}")
     return _Header(
         names=names, types=types, counts=_whole(counts, "COUNT"), points=_points(entries),
-        encoding=encoding, size=size, lines=lines, viewpoint=_viewpoint(entries.get("VIEWPOINT")),
+        organised=entries["HEIGHT"] != ["1"], encoding=encoding, size=size, lines=lines, viewpoint=_viewpoint(entries.get("VIEWPOINT")),
     )  # fmt: skip
 
 
