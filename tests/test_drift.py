@@ -6,9 +6,12 @@ import pytest
 from experiments.objects.shapes import sample
 from experiments.objects.vessels import VESSELS
 from experiments.studies import groups
+from symrefine.decide.hypotheses import judged
 from symrefine.detection.measure import gather, measure
 from symrefine.detection.story import detect
+from symrefine.fit.placed import Placed
 from symrefine.geometry import Array, Isometry, Plane, rotation
+from symrefine.groups import point_group
 from symrefine.shape import Shape
 from symrefine.surface.drift import Drift
 from symrefine.surface.misses import needs
@@ -111,3 +114,16 @@ def test_a_tooth_out_of_place_is_told_though_noise_makes_teeth_look_open(seed: i
     assert found.surface.openings is not None
     assert found.point_group == "Cs" or (seed == 64 and found.undetermined)  # Cs or C2v, by the noise of that cloud
     assert found.examined.choices(found.tolerance)[-1].probability < 0.5
+
+
+@pytest.mark.parametrize("seed", [1002, 1008, 1044])
+def test_many_operations_tell_no_more_of_the_same_windows(seed: int) -> None:
+    """Of the 30 of a cube each compares the same few windows: taken for 30 times as many, chance spoke against Oh."""
+    points = np.random.default_rng(seed).uniform(-1.0, 1.0, (4000, 3))
+    measured = measure(Shape(points=points))
+    surface = gather(measured, np.random.default_rng(0))[1]
+    cube = Placed(group=point_group("Oh"), center=np.zeros(3))
+    assert surface.drift is not None
+    once = surface.drift.misses(cube.motions()[1:2], 600) / surface.diagonal
+    assert surface.drifted(np.repeat(once, 30, axis=0))[1] == pytest.approx(surface.drifted(once)[1], rel=0.2)
+    assert judged(surface, cube).need == 0.0

@@ -72,7 +72,9 @@ class Deviation:
 NO_MISS = Deviation(mean=0.0, p95=0.0, p99=0.0, max=0.0)
 
 
-def needs(misses: Array, noise: Array, tests: int = 1, redundancy: float = 1.0) -> Array:
+def needs(
+    misses: Array, noise: Array, tests: int = 1, redundancy: float = 1.0, noise_redundancy: float | None = None
+) -> Array:
     """The smallest tolerances [...], fractions of the diagonal, at which misses [..., N] still count as symmetric.
 
     What noise alone explains is taken away, with what samples leave uncertain: from the mean in squares, as noise and
@@ -86,6 +88,7 @@ def needs(misses: Array, noise: Array, tests: int = 1, redundancy: float = 1.0) 
         noise: [M] misses that noise alone shows, in ascending order; none if empty.
         tests: of how many operations the worst counts: the more, the farther off one of them is by chance.
         redundancy: how many misses are as good as one, as points take part in so many planes.
+        noise_redundancy: the same of the noise, if it is another.
     """
     farthest = -np.sort(-misses, axis=-1)  # what is unseen stands last
     total, count = misses.shape[-1], np.maximum(np.isfinite(misses).sum(axis=-1, keepdims=True), 1)
@@ -95,7 +98,8 @@ def needs(misses: Array, noise: Array, tests: int = 1, redundancy: float = 1.0) 
         beside = (_exceeded(SHARES[-1], total, tests) * unseen).astype(int)
         mean = mean - (farthest * (np.arange(total) < beside)).sum(axis=-1) / count[..., 0]
     if noise.size:
-        sampled = np.sqrt((SURE**2 + 2.0 * np.log(tests)) * redundancy * (1.0 / count + 1.0 / noise.size))
+        again = (redundancy if noise_redundancy is None else noise_redundancy) / noise.size
+        sampled = np.sqrt((SURE**2 + 2.0 * np.log(tests)) * (redundancy / count + again))
         chance = 1.0 - np.searchsorted(noise, farthest, side="right") / noise.size
         beyond = beyond - chance - sampled * np.sqrt(chance * (1.0 - chance))
         mean = np.sqrt(np.maximum(mean**2 - (noise.mean() + sampled[..., 0] * noise.std()) ** 2, 0.0))
