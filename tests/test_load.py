@@ -220,13 +220,13 @@ def test_files_of_open3d(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["ascii", "binary"])
 def test_a_pixel_of_an_organised_cloud_that_saw_nothing_is_no_point(tmp_path: Path, kind: str) -> None:
+    flat, square = b"WIDTH 6\nHEIGHT 1", b"WIDTH 3\nHEIGHT 2"
     nothing = np.full((1, 3), np.nan)
     data = pcd(kind, np.vstack([nothing, TETRA[:2], nothing, TETRA[2:]]))
-    organised = data.replace(b"WIDTH 6\nHEIGHT 1", b"WIDTH 3\nHEIGHT 2")
-    np.testing.assert_array_equal(load_bytes(tmp_path, "a.pcd", organised).points, TETRA)
+    np.testing.assert_array_equal(load_bytes(tmp_path, "a.pcd", data.replace(flat, square)).points, TETRA)
     assert "is [nan, nan, nan] (2 such of 6)" in refusal(tmp_path, "b.pcd", data)
-    half = pcd(kind, np.vstack([TETRA, nothing, [[np.nan, 0.0, 1.0]]])).replace(b"WIDTH 6\nHEIGHT 1", b"WIDTH 3\nHEIGHT 2")
-    assert "is [nan, 0.0, 1.0] (1 such of 5)" in refusal(tmp_path, "c.pcd", half)
+    half = pcd(kind, np.vstack([TETRA, nothing, [[np.nan, 0.0, 1.0]]]))
+    assert "is [nan, 0.0, 1.0] (1 such of 5)" in refusal(tmp_path, "c.pcd", half.replace(flat, square))
 
 
 def double_compressed() -> bytes:

@@ -67,8 +67,9 @@ def read_pcd(data: bytes, path: Path) -> Content:
         table, lines = _read_binary(data, header, [*wanted, *others]), None
     else:
         table, lines, others = _read_compressed(data, path, header, wanted), None, []
-    if header.organised and not (seen := ~np.isnan(table[:, :3]).all(axis=1)).all():
-        table, lines = table[seen], lines and [line for line, kept in zip(lines, seen, strict=True) if kept]
+    if header.organised:
+        seen = np.flatnonzero(~np.isnan(table[:, :3]).all(axis=1))
+        table, lines = table[seen], None if lines is None else [lines[k] for k in seen]
     return Content(
         points=table[:, :3],
         normals=table[:, 3:6] if normals else None,
@@ -112,7 +113,8 @@ def _interpret(entries: dict[str, list[str]], size: int, lines: int) -> _Header:
         raise InputError(f"line {lines}: DATA {shorten(encoding)}; expected one of {', '.join(_ENCODINGS)}")
     return _Header(
         names=names, types=types, counts=_whole(counts, "COUNT"), points=_points(entries),
-        organised=entries["HEIGHT"] != ["1"], encoding=encoding, size=size, lines=lines, viewpoint=_viewpoint(entries.get("VIEWPOINT")),
+        organised=entries["HEIGHT"] != ["1"], encoding=encoding, size=size, lines=lines,
+        viewpoint=_viewpoint(entries.get("VIEWPOINT")),
     )  # fmt: skip
 
 
