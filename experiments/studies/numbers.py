@@ -93,7 +93,7 @@ KIND_OF = {
         "ndim.sampled": "LOW HIGH STARTS",
         "plane.outline": "OUTLINED STEPS",
         "poses.mean": "_STARTS",
-        "propose.candidates": "PRIMES FINEST ON_AXIS LONGEST",
+        "propose.candidates": "PRIMES ON_AXIS LONGEST",
         "propose.folds": "BINS_PER_ORDER CHANCE",
         "propose.maps": "AROUND WITHIN PLANES MATCHES INVARIANT SEEDS TOLD ROUNDS",
         "propose.signatures": "SHELLS BINS",

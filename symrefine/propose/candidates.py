@@ -37,8 +37,6 @@ from symrefine.surface.skin import LocalPlanes
 
 # Primes whose axes the moments tell.
 PRIMES = (2, 3, 5, 7)
-# Degree of what is finer than moments resolve: twice their order, as fine as directions 3.7 degrees apart can show.
-FINEST = 16
 # Atoms nearer to an axis than these (RMS radii) may stand on it.
 ON_AXIS = (0.03, 0.15)
 # Longest step (radians) of a frame that is polished on the moments: what the linear model covers.
@@ -135,14 +133,15 @@ def prime_axes(evidence: Evidence) -> list[Placed]:
 def fine(evidence: Evidence) -> list[Placed]:
     """Axes and mirrors of what is finer than the moments resolve, if that is most of what tells directions apart.
 
-    Of what is spread evenly, such as the spines of an urchin, the moments see nothing.
+    Of what is spread evenly, such as the spines of an urchin, the moments see nothing. Harmonics to twice their degree
+    do, and are about as fine as the directions of a spectrum can show.
     """
     points, weights = evidence.points @ whitening(evidence.moments.covariance), evidence.weights
-    every = max(1, len(points) // COUNT)
-    energy = {l: (c**2).sum() for l, c in directional_moments(points[::every], weights[::every], FINEST).items()}
+    every, degree = max(1, len(points) // COUNT), 2 * max(evidence.harmonics)
+    energy = {l: (c**2).sum() for l, c in directional_moments(points[::every], weights[::every], degree).items()}
     if 2.0 * sum(energy[l] for l in evidence.harmonics) > sum(energy.values()):
         return []
-    spectrum = Spectrum.of(directional_moments(points, weights, FINEST))
+    spectrum = Spectrum.of(directional_moments(points, weights, degree))
     return [*_axes(spectrum), *(placed("Cs", frame_with_z(n)) for n in mirror_candidates(spectrum))]
 
 
