@@ -12,6 +12,7 @@ import pytest
 import symrefine
 from experiments.objects.assemblies import ASSEMBLIES, cage, grain, large_molecule, ring
 from experiments.objects.parts import marked_group
+from experiments.objects.spread import directions
 from experiments.studies.molecules import Case
 from experiments.studies.molecules import run as asked
 from symrefine.cli.sources import manifest
@@ -260,6 +261,16 @@ def test_the_command_says_what_it_was_told(run: Run, tmp_path: Path) -> None:
     page = tmp_path / "nodes.html"
     assert run("detect", file, "--isolated", "--report", page)[0] == 0
     assert "isolated=True" in page.read_text()
+
+
+@pytest.mark.parametrize("count", [91, pytest.param(151, marks=pytest.mark.slow)])
+def test_atoms_spread_evenly_over_a_ball_have_their_half_turn(count: int) -> None:
+    """Moments see a ball: with a little noise nothing proposed the turn, and C1 was told at 1.0."""
+    rng = np.random.default_rng(count)
+    places = directions(1, count, 0.0) @ random_orthogonal(rng).T
+    found = detect(places + 0.002 * rng.standard_normal(places.shape))
+    assert found.point_group == "C2"
+    assert found.confidence > 0.95
 
 
 def test_of_a_mesh_it_is_refused(run: Run, tmp_path: Path) -> None:

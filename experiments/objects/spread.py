@@ -15,11 +15,12 @@ from experiments.objects.instances import Build, Instance, as_built
 from experiments.objects.lathe import Rng
 from experiments.objects.parts import Part, ball, cylinder
 from symrefine.geometry import Array, frame_with_z
+from symrefine.groups.standard import GOLDEN
 
 RADIUS = 3.0
 # Details in all, on so many spirals: as many on each.
 DETAILS = {1: (47, 70), 2: (25, 36), 3: (18, 26), 5: (11, 16)}
-GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
+ANGLE = 2.0 * math.pi * (2.0 - GOLDEN)
 
 
 def directions(spirals: int, each: int, lopsided: float) -> Array:
@@ -27,7 +28,7 @@ def directions(spirals: int, each: int, lopsided: float) -> Array:
     index = np.arange(each) + 0.5
     z = 1.0 - 2.0 * index / each
     z = z + lopsided * (1.0 - z * z)
-    azimuth = np.add.outer(2.0 * math.pi * np.arange(spirals), GOLDEN * index).ravel() / spirals
+    azimuth = np.add.outer(2.0 * math.pi * np.arange(spirals), ANGLE * index).ravel() / spirals
     z = np.tile(z, spirals)
     return np.stack([np.sqrt(1.0 - z * z) * np.cos(azimuth), np.sqrt(1.0 - z * z) * np.sin(azimuth), z], axis=1)
 
