@@ -57,7 +57,8 @@ class Spectrum:
     @classmethod
     def of(cls, by_degree: dict[int, Array]) -> "Spectrum":
         """That of harmonic coefficients {l: [n_l, 2l+1]}."""
-        return cls(energies={l: ((_table(l) @ c.T) ** 2).sum(axis=2) for l, c in by_degree.items()})
+        turned = {l: _table(l).reshape(-1, 2 * l + 1) @ c.T for l, c in by_degree.items()}  # one product each
+        return cls(energies={l: np.einsum("kn,kn->k", c, c).reshape(DIRECTIONS, -1) for l, c in turned.items()})
 
     @classmethod
     def of_moments(cls, moments: Moments) -> "Spectrum":
