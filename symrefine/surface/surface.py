@@ -279,11 +279,11 @@ class Surface:
         """
         if self.drift is None:
             return np.zeros(len(drifts)), 0.0
-        noise, redundancy = self.drift.noise / self.diagonal, self.drift.redundancy
-        each, every, again = (redundancy(count) for count in (drifts.shape[1], drifts.size, noise.size))
+        noise = self.drift.noise / self.diagonal
+        each, every = (self.drift.redundancy(count) for count in (drifts.shape[1], drifts.size))
         # All operations compare the same windows: they tell of no more of them than one does.
-        together = needs(drifts.ravel(), noise, redundancy=every, noise_redundancy=again)
-        return needs(drifts, noise, tests, each, again), float(together)
+        together = needs(drifts.ravel(), noise, redundancy=every, noise_redundancy=each)
+        return needs(drifts, noise, tests, each), float(together)
 
     def _unseen(self, misses: Array, motions: Sequence[Isometry], sources: int) -> list[tuple[Array, Array]]:
         """Of each operation what it, and what its inverse, takes to where nobody looked, [., 3] each."""
