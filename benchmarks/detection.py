@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable, Iterator
-from functools import partial
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -96,6 +95,5 @@ def metrics() -> Iterator[Metric]:
             key = f"detect {100 * noise:g} % noise, {name} of {len(found)} objects"
             yield Metric(key=key, value=float(value), unit="kd-tree passes", target=target)
     moments = central_moments(cloud, np.ones(len(cloud)), 8)
-    both = partial(map, Spectrum.of_moments)
-    took = 1e3 * best_of(lambda: mirror_candidates(*both((whitened(moments), moments))))
+    took = 1e3 * best_of(lambda: mirror_candidates(*map(Spectrum.of_moments, (whitened(moments), moments))))
     yield Metric(key="mirror candidates after the moments", value=took, unit="ms", target=10.0)

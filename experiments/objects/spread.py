@@ -18,7 +18,7 @@ from symrefine.geometry import Array, frame_with_z
 from symrefine.groups.standard import GOLDEN
 
 RADIUS = 3.0
-# Details in all, on so many spirals: as many on each.
+# How many details each of so many spirals has: at least, and fewer than.
 DETAILS = {1: (47, 70), 2: (25, 36), 3: (18, 26), 5: (11, 16)}
 ANGLE = 2.0 * math.pi * (2.0 - GOLDEN)
 

@@ -150,6 +150,7 @@ def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float
     better = [h for h in pool.small if ALIKE * h.need < pool.largest.need]
     for known in {h.group.name: h for h in (*better, pool.largest)}.values():
         pool = _with(surface, pool, turned_over(evidence, known.placed))
+    # Where the n-tuples say nothing, or what was found says little, the moments may see too coarsely.
     if evidence.tuples.rank == 0 or not pool.largest.elements or pool.largest.need > doubtless(surface):
         pool = _with(surface, pool, fine(evidence))
     # Where nothing comes near, what comes nearest is told of, and looked at for that.

@@ -113,8 +113,7 @@ def directional_moments(points: Array, weights: Array, degree: int) -> dict[int,
             if l:
                 scale = sqrt((2.0 if m else 1.0) * factorial(l - m) / factorial(l + m))
                 cosine, sine = (scale * (both @ zonal)).reshape(2, 3)
-                result[l][:, l + m] = cosine
-                result[l][:, l - m] = sine if m else cosine
+                result[l][:, l - m], result[l][:, l + m] = sine, cosine  # the one that m = 0 has
         around, sectoral = around * (x + 1j * y), sectoral * (2 * m + 1)
     return result
 

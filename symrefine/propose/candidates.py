@@ -69,7 +69,8 @@ class Evidence:
     @cached_property
     def spectra(self) -> tuple[Spectrum, Spectrum]:
         """The directional spectra of the whitened moments and of the moments."""
-        return Spectrum.of_moments(whitened(self.moments)), Spectrum.of_moments(self.moments)
+        own = Spectrum.of({l: c[0] for l, c in self.harmonics.items()})
+        return Spectrum.of_moments(whitened(self.moments)), own
 
     def azimuths(self, axis: Array) -> tuple[Array, Array]:
         """The azimuthal spectrum about an axis, which folds and mirrors are both told by."""
