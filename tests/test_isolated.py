@@ -263,7 +263,7 @@ def test_the_command_says_what_it_was_told(run: Run, tmp_path: Path) -> None:
     assert "isolated=True" in page.read_text()
 
 
-@pytest.mark.parametrize("count", [91, pytest.param(151, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [121, *(pytest.param(count, marks=pytest.mark.slow) for count in (91, 151))])
 def test_atoms_spread_evenly_over_a_ball_have_their_half_turn(count: int) -> None:
     """Moments see a ball: with a little noise nothing proposed the turn, and C1 was told at 1.0."""
     rng = np.random.default_rng(count)
