@@ -8,7 +8,7 @@ SINGLE = 1e-6
 # Sums, products and small systems of equations in double precision: some thousand roundings.
 DOUBLE = 1e-12
 # How far the moments may put a start wrong (radians, RMS radii; 0.04 was the most of 698 true ones): directions nearer
-# than this to an earlier one are the same start, and what puts them off by more has to be made up for.
+# than this to an earlier one are the same start, elements are one; what puts them off by more has to be made up for.
 START_ERROR = 0.05
 # The tolerance unless another is asked for, and the largest, as fractions of the diagonal: beyond a fifth everything is
 # symmetric.

@@ -18,7 +18,7 @@ from experiments.studies import groups
 from experiments.studies.boundary import Case, look
 from symrefine.decide.chain import _best, _excluded, chain
 from symrefine.decide.explore import _holding, _with, explore
-from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, fitted, single
+from symrefine.decide.hypotheses import NOTHING, Hypothesis, fitted, single
 from symrefine.decide.joins import _told_apart, better_parts
 from symrefine.decide.looks import by_chance
 from symrefine.decide.pool import Pool
@@ -373,7 +373,7 @@ def test_exploring_ends_with_a_group_whose_neighbours_fail():
         assert h.need > TOLERANCE or pool.largest.holds(h.placed)
     for placed, needs in (*pool.looked, *pool.hopeless):
         assert needs > TOLERANCE
-        assert not is_subgroup(placed.group, point_group("C6v"), 0.5 * SAME_RAD)
+        assert not is_subgroup(placed.group, point_group("C6v"), 0.5 * START_ERROR)
 
 
 def test_of_what_has_no_symmetry_the_nearest_misses_are_looked_at_and_told():

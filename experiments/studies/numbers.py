@@ -38,7 +38,6 @@ KIND_OF = {
         "align.sides": "RADII",
         "decide.ends": "KEPT PLACES",
         "decide.doubts": "STRAY",
-        "decide.hypotheses": "SAME_RAD",
         "decide.maps": "WELL NOTHING LEAD SHARE UNLIKE DENIED SURE",
         "decide.place": "SUPPORTED",
         "decide.posterior": "EVEN STEEPNESS EVEN_MIRROR ALIKE ALONE UNKNOWN BLURRED BROKEN "

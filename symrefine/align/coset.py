@@ -10,12 +10,11 @@ from itertools import product
 
 import numpy as np
 
-from symrefine.decide.hypotheses import SAME_RAD
 from symrefine.geometry import Array, ReadOnly, householder, unit
 from symrefine.groups import PointGroup
 from symrefine.groups.orthogonal import chord_angles
 from symrefine.groups.plane import PointGroup2D
-from symrefine.rounding import SINGLE
+from symrefine.rounding import SINGLE, START_ERROR
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -136,7 +135,7 @@ def with_copies(
     """
     operations = group.operations()
     apart = chord_angles(operations, np.eye(3))
-    nearest = min(0.5 * float(apart[apart > SINGLE].min(initial=np.inf)), 2.0 * SAME_RAD)
+    nearest = min(0.5 * float(apart[apart > SINGLE].min(initial=np.inf)), 2.0 * START_ERROR)
     kept = list(maps)
     for (matrix, shift), operation in product(maps, operations):
         copy = operation @ matrix if of_target else matrix @ operation

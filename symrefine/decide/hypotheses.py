@@ -29,8 +29,6 @@ from symrefine.surface.wedge import Wedge
 # Local planes that are moved in a fit and when judged by all together, and when judged by each at least: 0.6 % of fewer
 # are no sample.
 MOVED, MOVED_EACH = 12000, 1200
-# Elements nearer than this (radians) are the same.
-SAME_RAD = np.radians(4.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -112,7 +110,7 @@ class Hypothesis:
         return has_all(self.placed, other)
 
 
-def has_all(placed: Placed, other: Placed, within_rad: float = SAME_RAD) -> bool:
+def has_all(placed: Placed, other: Placed, within_rad: float = START_ERROR) -> bool:
     """Whether a group has all operations of another one, as far as directions tell that may be so far apart."""
     # By a quarter of a turn of the other's own, lest turns of many folds pass for those of fewer.
     fold = other.group.symbol.fold

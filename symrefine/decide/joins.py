@@ -4,20 +4,13 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from symrefine.decide.hypotheses import (
-    NOTHING,
-    SAME_RAD,
-    Hypothesis,
-    fitted,
-    has_all,
-    roughly_judged,
-    single,
-)
+from symrefine.decide.hypotheses import NOTHING, Hypothesis, fitted, has_all, roughly_judged, single
 from symrefine.decide.looks import COARSE, by_chance, looked_at
 from symrefine.decide.pool import is_at
 from symrefine.decide.posterior import ALIKE, EVEN
 from symrefine.fit.placed import Placed, joined
 from symrefine.groups import PointGroup
+from symrefine.rounding import START_ERROR
 from symrefine.surface.surface import Surface
 
 
@@ -88,7 +81,7 @@ def _told_apart(surface: Surface, placed: Placed | None, parts: Sequence[Placed]
     fold = placed.group.symbol.fold
     if any(fold <= p.group.symbol.fold for p in parts):
         return placed
-    return endless(placed) if math.inf > fold > math.pi / SAME_RAD or by_chance(surface, placed) else placed
+    return endless(placed) if math.inf > fold > math.pi / START_ERROR or by_chance(surface, placed) else placed
 
 
 def endless(placed: Placed) -> Placed:

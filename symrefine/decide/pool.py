@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.decide.hypotheses import NOTHING, SAME_RAD, Hypothesis, has_all
+from symrefine.decide.hypotheses import NOTHING, Hypothesis, has_all
 from symrefine.decide.posterior import ALIKE
 from symrefine.fit.placed import Placed
 from symrefine.groups import PointGroup, is_subgroup
@@ -87,7 +87,7 @@ class Pool:
         if not self.largest.group.is_finite and self.largest.holds(start):
             return False
         name = start.group.name
-        alike = [(p, SAME_RAD) for p, need in self.seen if p.group.name == name and need < ALIKE * glance]
+        alike = [(p, START_ERROR) for p, need in self.seen if p.group.name == name and need < ALIKE * glance]
         # From another start, no worse than this one, a look came to where this one stands.
         alike += [
             (end, START_ERROR)
@@ -110,7 +110,7 @@ def is_at(a: Placed, b: Placed) -> bool:
     return a.group.name == b.group.name and is_subgroup(b.group, a.group, DIRECTION_ERROR_RAD)
 
 
-def is_same(a: Placed, b: Placed, within_rad: float = SAME_RAD) -> bool:
+def is_same(a: Placed, b: Placed, within_rad: float = START_ERROR) -> bool:
     """Whether two groups are one, as far as directions tell that may be so far apart."""
     return a.group.name == b.group.name and has_all(a, b, within_rad)
 
@@ -119,7 +119,7 @@ def _images(known: Placed, group: PointGroup, wanted: Placed) -> Iterator[Placed
     """Where operations carry a placed group that bring its axis near that of another one."""
     axis, goal = known.group.frame[2], wanted.group.frame[2]
     for operation in group.bringing(axis, goal):
-        if abs(goal @ operation @ axis) > np.cos(SAME_RAD):
+        if abs(goal @ operation @ axis) > np.cos(START_ERROR):
             # A frame is right-handed; the inversion, which the operation may lack, changes no group's place.
             frame = known.group.frame @ operation.T * np.sign(np.linalg.det(operation))
             yield Placed(group=PointGroup(name=known.group.name, frame=frame), center=known.center)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.decide.hypotheses import SAME_RAD, Hypothesis
+from symrefine.decide.hypotheses import Hypothesis
 from symrefine.decide.looks import exact_need
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import Alternative, Decision, Link, decide, least_told, meant, odd
@@ -15,6 +15,7 @@ from symrefine.fit.placed import SAMPLED
 from symrefine.fit.vertices import OnVertices, on_vertices
 from symrefine.geometry import Mask
 from symrefine.groups import PointGroup, is_subgroup
+from symrefine.rounding import START_ERROR
 from symrefine.shape import Index
 from symrefine.surface.misses import SHARES
 from symrefine.surface.surface import Surface
@@ -79,7 +80,7 @@ class Examined:
         if same is not None or group.name == "C1" or (known is None and self.measured.shape.faces is None):
             return same
         if known is not None and not group.is_finite:
-            return known.rounded(group) if is_subgroup(known.group, group, SAME_RAD) else None
+            return known.rounded(group) if is_subgroup(known.group, group, START_ERROR) else None
         # What corners prove may be less than what all vertices have, where a hole makes corners of a few.
         moments = self.measured.moments
         center, diagonal = moments.restored(found.placed.center), moments.scale * self.surface.diagonal
@@ -90,7 +91,7 @@ class Examined:
         known, group = self.exact, found.group
         if known is None or known.group.name == "C1" or not group.is_finite:
             return None
-        return known if is_subgroup(known.group, group, SAME_RAD) else None
+        return known if is_subgroup(known.group, group, START_ERROR) else None
 
     def decided(self, tolerance: float, *, shown: bool = False) -> Decision:
         """The likeliest group of the chain at a tolerance; with `shown` as if what no camera saw kept to the rest."""

@@ -12,7 +12,7 @@ from functools import reduce
 import numpy as np
 
 from symrefine.clock import Clock
-from symrefine.decide.hypotheses import MOVED_EACH, NOTHING, SAME_RAD, Element, Hypothesis, judged
+from symrefine.decide.hypotheses import MOVED_EACH, NOTHING, Element, Hypothesis, judged
 from symrefine.decide.looks import exact_need, few_motions
 from symrefine.decide.posterior import ALIKE
 from symrefine.decide.subgroups import subgroup_chain
@@ -25,6 +25,7 @@ from symrefine.fit.placed import Placed
 from symrefine.geometry import Array, Isometry, rotation
 from symrefine.groups import PointGroup, is_subgroup
 from symrefine.moments.quadrature import sample_surface
+from symrefine.rounding import START_ERROR
 from symrefine.shape import Shape
 from symrefine.surface.misses import Deviation
 from symrefine.surface.painted import Painted, needed
@@ -102,7 +103,7 @@ def _chain(found: Examined, painted: Painted, whole: Placed) -> list[Placed]:
 def _known(found: Examined, whole: Placed, matrix: Array) -> tuple[Isometry, float]:
     """An operation of a group as the first link that has it places it, with what the shape needs there."""
     for link in found.links[1:]:
-        if link.group.distance_rad(matrix[None])[0] < SAME_RAD:
+        if link.group.distance_rad(matrix[None])[0] < START_ERROR:
             if not link.group.is_finite:
                 return Isometry.about(whole.center, matrix), link.need
             operations = link.group.operations()
@@ -147,7 +148,7 @@ def _marked(
     inside = [
         Placed(group=h.group, center=here.normalised(there.restored(h.placed.center)))
         for h in seen.links[1:]
-        if is_subgroup(h.group, whole.group, SAME_RAD)
+        if is_subgroup(h.group, whole.group, START_ERROR)
     ]
     few = [_turned(painted, p, whole) for p in inside if p.group.order <= MOST]
     return few[-1:], [p for p in inside if p.group.order > MOST]
@@ -156,7 +157,7 @@ def _marked(
 def _turned(painted: Painted, placed: Placed, whole: Placed) -> Placed:
     """A finite group turned about the axes of an endless one to where colours miss it least: the shape says nothing."""
     best, least = placed, _colour_miss(painted, placed)
-    for step in (SAME_RAD / 4.0, SAME_RAD / 16.0):
+    for step in (START_ERROR / 4.0, START_ERROR / 16.0):
         for axis in whole.group.continuous_axes():
             start = best
             for k in range(-4, 5):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symrefine.decide.hypotheses import MOVED, SAME_RAD
+from symrefine.decide.hypotheses import MOVED
 from symrefine.fit.gauss_newton import Linearisation, minimise
 from symrefine.fit.matching import match, pair_equations
 from symrefine.fit.placed import FITTED, FREE_TURNS, evenly, wide_angle_rad
@@ -48,7 +48,7 @@ class Placed(ReadOnly):
             return False
         period = math.pi / self.fold
         apart = abs((self.angle_rad - other.angle_rad + 0.5 * period) % period - 0.5 * period)
-        return not other.mirrored or (self.mirrored and apart < min(SAME_RAD, 0.25 * period))
+        return not other.mirrored or (self.mirrored and apart < min(START_ERROR, 0.25 * period))
 
     @property
     def is_line(self) -> bool:
