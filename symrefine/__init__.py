@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from symrefine.groups import PointGroup as PointGroup
     from symrefine.groups import point_group as point_group
     from symrefine.load import load as load
-    from symrefine.load import load_depth as load_depth
     from symrefine.load import load_frames as load_frames
     from symrefine.load import stream as stream
+    from symrefine.load.depth import load_depth as load_depth
     from symrefine.ntuples.derive import derive as derive
     from symrefine.poses.canonicalizer import Canonicalizer as Canonicalizer
     from symrefine.poses.distance import symmetric_distance as symmetric_distance
@@ -42,7 +42,8 @@ if TYPE_CHECKING:
 
 # Where each public name comes from.
 _HOMES = {
-    "symrefine.load": ("load", "load_frames", "load_depth", "stream"),
+    "symrefine.load": ("load", "load_frames", "stream"),
+    "symrefine.load.depth": ("load_depth",),
     "symrefine.front.verbs": ("detect", "align", "report"),
     "symrefine.front.made": ("symmetrize", "complete", "export"),
     "symrefine.front.space": ("Detection",),

@@ -7,7 +7,6 @@ from symrefine.detection.measure import Outliers, floor_under
 from symrefine.detection.sketch import MANY, is_large, sampled, sketched
 from symrefine.errors import InputError, about
 from symrefine.geometry import LARGEST_TOLERANCE, Array, check_tolerance, tight_diagonal
-from symrefine.plane.outline import smallest_diagonal
 from symrefine.shape import Shape
 from symrefine.stream import Stream
 from symrefine.surface.sampling import sampling
@@ -74,6 +73,8 @@ def object_diagonal(shape: Shape, *, outliers: Outliers = "auto") -> float:
             f"{shape.source}: has {shape.dim} coordinates; give the tolerance as a fraction of the diameter"
         )
     if shape.dim == 2:
+        from symrefine.plane.outline import smallest_diagonal
+
         return smallest_diagonal(heavy(shape).points)
     return tight_diagonal(body(shape, outliers=outliers))
 

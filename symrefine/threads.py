@@ -50,12 +50,11 @@ def one_thread() -> Iterator[None]:
 
 @cache
 def _libraries(kind: str) -> "ThreadpoolController":
-    """Of one kind of what makes threads in numpy, scipy and pykdtree, which are loaded first lest one is missed.
+    """Of one kind of what makes threads in numpy and pykdtree, which is loaded first lest it is missed.
 
     What limits some of the libraries of a controller sets all of them back afterwards: so each kind has its own.
     """
     import pykdtree.kdtree  # noqa: F401
-    import scipy.linalg  # noqa: F401
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController().select(user_api=kind)

@@ -11,7 +11,7 @@ from experiments.objects.shapes import stool
 from symrefine.cli import invoke
 from symrefine.errors import InputError
 from symrefine.geometry import unit
-from symrefine.load import load_depth
+from symrefine.load.depth import load_depth
 from symrefine.load.open3d import open3d
 
 INTRINSICS = (300.0, 310.0, 119.5, 89.5)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from experiments.objects.shapes import bottle, box, join, mug, sample, stool, table
 from symrefine.geometry import Isometry, Plane, householder, random_orthogonal, rotation, tight_diagonal
@@ -28,7 +30,7 @@ from symrefine.surface.misses import (
     noise_distances,
     spread_distance,
 )
-from symrefine.surface.neighbourhoods import planes_of
+from symrefine.surface.neighbourhoods import connected_parts, in_cells, planes_of
 from symrefine.surface.skin import isolated_points
 from symrefine.surface.surface import Surface
 from symrefine.surface.surroundings import Surroundings
@@ -545,6 +547,23 @@ def test_a_neighbour_that_there_is_not_is_refused():
     assert near.max() == len(points)
     with pytest.raises(IndexError, match="member 10 of 10"):
         planes_of(points, near)
+
+
+@given(seed=st.integers(0, 2**32 - 1), nodes=st.integers(1, 300), share=st.floats(0.0, 3.0), is_chain=st.booleans())
+def test_parts_are_those_that_scipy_finds(seed, nodes, share, is_chain):
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(nodes)
+    one, other = (order[:-1], order[1:]) if is_chain else rng.integers(0, nodes, (2, int(share * nodes)))
+    links = coo_array((np.ones(len(one)), (one, other)), shape=(nodes, nodes))
+    np.testing.assert_array_equal(connected_parts(one, other, nodes), connected_components(links, directed=False)[1])
+
+
+def test_cells_hold_the_sums_of_the_points_that_are_nearest_to_them():
+    rng = np.random.default_rng(0)
+    points, values = rng.normal(size=(500, 3)), rng.normal(size=(500, 2))
+    cells, sums = in_cells(values, points, 40, rng)
+    nearest = np.linalg.norm(points[:, None] - cells.points, axis=2).argmin(axis=1)
+    np.testing.assert_allclose(sums, [values[nearest == k].sum(axis=0) for k in range(40)], atol=1e-12)
 
 
 def test_a_clump_of_fewer_points_than_a_neighbourhood_is_asked_as_it_is():

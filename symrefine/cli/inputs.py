@@ -184,7 +184,7 @@ def scans(path: str, options: dict[str, Any], *, in_chunks: bool = False, **pict
 
     With `in_chunks` a cloud that is too large to hold is a stream, if nothing but its coordinates is asked for.
     """
-    from symrefine.load import Frames, load, load_depth, load_frames, stream_if_large
+    from symrefine.load import Frames, load, load_frames, stream_if_large
 
     said = {name: given for name in _READING if (given := options.get(name)) is not None}
     if said.get("labels") == TEXTURE:
@@ -197,6 +197,8 @@ def scans(path: str, options: dict[str, Any], *, in_chunks: bool = False, **pict
         idle = [name for name, given in (said | picture).items() if given not in (None, False)]
         if idle:
             raise InputError(f"{path}: is read as a depth image, so {_option(idle[0])} does not apply; leave it out")
+        from symrefine.load.depth import load_depth
+
         return Frames("images", 1, lambda _: load_depth(path, camera, **depth))
     if depth:
         raise InputError(f"{path}: {_option(next(iter(depth)))} goes with --intrinsics, which make it a depth image")

@@ -16,6 +16,7 @@ rounds to float32, stops at what is no number and leaves out what it does not kn
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
@@ -23,29 +24,13 @@ from typing import Any, Literal
 from symrefine.clock import passed
 from symrefine.errors import InputError, about
 from symrefine.files import file_bytes, path_of
-from symrefine.load.cif import read_cif
-from symrefine.load.collada import read_dae
 from symrefine.load.content import Content, Threshold, Wanted, check_distinct, check_finite
-from symrefine.load.depth import load_depth
 from symrefine.load.frames import Frames, one
-from symrefine.load.gltf import read_glb, read_gltf
-from symrefine.load.image import FORMATS, read_image
+from symrefine.load.image import FORMATS
 from symrefine.load.labels import point_classes, point_weights
 from symrefine.load.mesh import mesh_arrays
-from symrefine.load.molfile import read_molfile
-from symrefine.load.obj import read_obj
-from symrefine.load.off import read_off
 from symrefine.load.packed import GZIP, LARGEST, stem_of, suffix_of, unpacked
-from symrefine.load.pcd import read_pcd
-from symrefine.load.pdb import read_pdb
-from symrefine.load.ply import read_ply
-from symrefine.load.scans import read_e57, read_las
-from symrefine.load.step import read_step
-from symrefine.load.stl import read_stl
 from symrefine.load.stream import stream, stream_if_large
-from symrefine.load.tables import read_npy, read_npz, read_table, read_xyz
-from symrefine.load.threemf import read_3mf
-from symrefine.load.volume_files import read_mrc, read_nifti, read_nrrd
 from symrefine.options import flag_of
 from symrefine.shape import Shape
 
@@ -55,7 +40,6 @@ __all__ = [
     "SUFFIXES",
     "Frames",
     "load",
-    "load_depth",
     "load_frames",
     "stem_of",
     "stream",
@@ -78,6 +62,11 @@ class _Format:
     unit: str | None = None
 
 
+def _by(module: str) -> Any:
+    """The module of this room that reads a format, imported when the first file of it comes: few need more than one."""
+    return import_module(f"{__name__}.{module}")
+
+
 # What to say where a file takes none of a group.
 _OPTIONS = {
     "fields": "labels and weights apply to meshes, clouds and molecules only",
@@ -86,42 +75,44 @@ _OPTIONS = {
     "texture": "textures are read of meshes only",
 }
 
-_PAINTED = ("fields", "texture")
+_PAINTED, _ATOMS, _GRID = ("fields", "texture"), ("fields", "frame"), ("frame", "grey", "measure")
 _MESHES_AND_CLOUDS = {
-    ".3mf": _Format(lambda data, *_: read_3mf(data)),
-    ".csv": _Format(lambda data, _, wanted: read_table(data, wanted.fields)),
-    ".dae": _Format(lambda data, *_: read_dae(data)),
-    ".e57": _Format(lambda data, path, _: read_e57(data, path), unit="m"),
-    ".glb": _Format(lambda data, path, wanted: read_glb(data, path, texture=wanted.texture), _PAINTED, "m"),
-    ".gltf": _Format(lambda data, path, wanted: read_gltf(data, path, texture=wanted.texture), _PAINTED, "m"),
-    ".las": _Format(lambda data, *_: read_las(data)),
-    ".laz": _Format(lambda data, *_: read_las(data)),
-    ".npy": _Format(lambda data, *_: read_npy(data)),
-    ".npz": _Format(lambda data, _, wanted: read_npz(data, wanted.fields)),
-    ".obj": _Format(lambda data, path, wanted: read_obj(data, path if wanted.texture else None), _PAINTED),
-    ".off": _Format(lambda data, *_: read_off(data)),
-    ".pcd": _Format(lambda data, path, _: read_pcd(data, path)),
-    ".ply": _Format(lambda data, path, wanted: read_ply(data, path if wanted.texture else None), _PAINTED),
-    ".step": _Format(lambda data, path, _: read_step(data, path), unit="m"),
-    ".stl": _Format(lambda data, *_: read_stl(data)),
-    ".stp": _Format(lambda data, path, _: read_step(data, path), unit="m"),
-    ".txt": _Format(lambda data, _, wanted: read_table(data, wanted.fields)),
-    ".xyz": _Format(lambda data, *_: read_xyz(data), ("fields", "frame")),
+    ".3mf": _Format(lambda data, *_: _by("threemf").read_3mf(data)),
+    ".csv": _Format(lambda data, _, wanted: _by("tables").read_table(data, wanted.fields)),
+    ".dae": _Format(lambda data, *_: _by("collada").read_dae(data)),
+    ".e57": _Format(lambda data, path, _: _by("scans").read_e57(data, path), unit="m"),
+    ".glb": _Format(lambda data, path, wanted: _by("gltf").read_glb(data, path, texture=wanted.texture), _PAINTED, "m"),
+    ".gltf": _Format(
+        lambda data, path, wanted: _by("gltf").read_gltf(data, path, texture=wanted.texture), _PAINTED, "m"
+    ),
+    ".las": _Format(lambda data, *_: _by("scans").read_las(data)),
+    ".laz": _Format(lambda data, *_: _by("scans").read_las(data)),
+    ".npy": _Format(lambda data, *_: _by("tables").read_npy(data)),
+    ".npz": _Format(lambda data, _, wanted: _by("tables").read_npz(data, wanted.fields)),
+    ".obj": _Format(lambda data, path, wanted: _by("obj").read_obj(data, path if wanted.texture else None), _PAINTED),
+    ".off": _Format(lambda data, *_: _by("off").read_off(data)),
+    ".pcd": _Format(lambda data, path, _: _by("pcd").read_pcd(data, path)),
+    ".ply": _Format(lambda data, path, wanted: _by("ply").read_ply(data, path if wanted.texture else None), _PAINTED),
+    ".step": _Format(lambda data, path, _: _by("step").read_step(data, path), unit="m"),
+    ".stl": _Format(lambda data, *_: _by("stl").read_stl(data)),
+    ".stp": _Format(lambda data, path, _: _by("step").read_step(data, path), unit="m"),
+    ".txt": _Format(lambda data, _, wanted: _by("tables").read_table(data, wanted.fields)),
+    ".xyz": _Format(lambda data, *_: _by("tables").read_xyz(data), _ATOMS),
 }
 _MOLECULES = {
-    ".cif": _Format(lambda data, _, wanted: read_cif(data, wanted.fields), ("fields", "frame"), "A"),
-    ".mol": _Format(lambda data, *_: read_molfile(data), ("fields", "frame"), "A"),
-    ".pdb": _Format(lambda data, _, wanted: read_pdb(data, wanted.fields), ("fields", "frame"), "A"),
-    ".sdf": _Format(lambda data, *_: read_molfile(data), ("fields", "frame"), "A"),
+    ".cif": _Format(lambda data, _, wanted: _by("cif").read_cif(data, wanted.fields), _ATOMS, "A"),
+    ".mol": _Format(lambda data, *_: _by("molfile").read_molfile(data), _ATOMS, "A"),
+    ".pdb": _Format(lambda data, _, wanted: _by("pdb").read_pdb(data, wanted.fields), _ATOMS, "A"),
+    ".sdf": _Format(lambda data, *_: _by("molfile").read_molfile(data), _ATOMS, "A"),
 }
 _VOLUMES = {
-    ".map": _Format(lambda data, _, wanted: read_mrc(data, wanted), ("frame", "grey", "measure"), "A"),
-    ".mrc": _Format(lambda data, _, wanted: read_mrc(data, wanted), ("frame", "grey", "measure"), "A"),
-    ".nii": _Format(lambda data, _, wanted: read_nifti(data, wanted), ("frame", "grey", "measure")),
-    ".nrrd": _Format(lambda data, _, wanted: read_nrrd(data, wanted), ("frame", "grey", "measure")),
+    ".map": _Format(lambda data, _, wanted: _by("volume_files").read_mrc(data, wanted), _GRID, "A"),
+    ".mrc": _Format(lambda data, _, wanted: _by("volume_files").read_mrc(data, wanted), _GRID, "A"),
+    ".nii": _Format(lambda data, _, wanted: _by("volume_files").read_nifti(data, wanted), _GRID),
+    ".nrrd": _Format(lambda data, _, wanted: _by("volume_files").read_nrrd(data, wanted), _GRID),
 }
 _PICTURES = {
-    suffix: _Format(lambda data, path, wanted: read_image(data, suffix_of(path), wanted), ("grey",))
+    suffix: _Format(lambda data, path, wanted: _by("image").read_image(data, suffix_of(path), wanted), ("grey",))
     for suffix in FORMATS
 }
 _IN_SPACE = _MESHES_AND_CLOUDS | _MOLECULES | _VOLUMES

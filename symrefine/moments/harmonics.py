@@ -10,7 +10,6 @@ from collections import defaultdict
 from dataclasses import dataclass
 from functools import lru_cache
 from math import comb, factorial, sqrt
-from typing import Any
 
 import numpy as np
 
@@ -147,13 +146,6 @@ def turn(l: int, axis: int, angle_rad: Array) -> Array:
     return np.real((vectors * phases[..., None, :]) @ adjoint)
 
 
-def to_polar_axis(l: int, directions: Array) -> Array:
-    """D_l of the rotations R_y(-theta) R_z(-phi) [N, 2l+1, 2l+1] that turn unit directions [N, 3] into the z axis."""
-    theta = np.arctan2(np.hypot(directions[..., 0], directions[..., 1]), directions[..., 2])
-    phi = np.arctan2(directions[..., 1], directions[..., 0])
-    return turn(l, 1, -theta) @ turn(l, 2, -phi)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Harmonics:
     """Flat harmonic coefficients with these rows; D_l(-R) = (-1)^l D_l(R).
@@ -173,8 +165,9 @@ class Harmonics:
         return np.asarray(out * np.where(layout.l % 2, signs[:, None], 1.0)[:, None])
 
     def tangents(self, values: Array) -> Array:
-        turns = _layout(self.rows).generators @ values.T
-        return np.asarray(turns.T.reshape(len(values), 3, -1))
+        layout = _layout(self.rows)
+        one, other = (by * values.take(at, axis=1) for by, at in zip(layout.turned_by, layout.turns, strict=True))
+        return np.asarray(one + other)
 
 
 def flattened(by_degree: dict[int, Array]) -> tuple[Array, Rows]:
@@ -197,8 +190,8 @@ def row_variance(replicates: Array, rows: Rows) -> Array:
 class _Layout:
     """Flat coefficients: |m| and l of each, where its partner -m stands, and the sign with which a turn mixes it in.
 
-    `tip` [C, C] is D of the quarter turn about x, transposed, between which R_y(b) is R_z(b); `generators` [3C, C] are
-    the three of them on top of one another, of two entries a row at most.
+    `tip` [C, C] is D of the quarter turn about x, transposed, between which R_y(b) is R_z(b). Each row of a
+    generator has two entries at most: `turned_by` [2, 3, C] of coefficients `turns` [2, 3, C].
     """
 
     m: Index
@@ -206,23 +199,26 @@ class _Layout:
     partner: Index
     sign: Array
     tip: Array
-    generators: Any
+    turns: Index
+    turned_by: Array
 
 
 @lru_cache(maxsize=32)
 def _layout(rows: Rows) -> _Layout:
-    from scipy.linalg import block_diag
-    from scipy.sparse import csr_array
-
-    stacked = np.concatenate([block_diag(*(generators(l)[k] for l in rows)) for k in range(3)])
     m = np.concatenate([np.arange(-l, l + 1) for l in rows])
+    every, tip, end = np.zeros((3, len(m), len(m))), np.zeros((len(m), len(m))), 0
+    for l in rows:
+        own = slice(end, end := end + 2 * l + 1)
+        every[:, own, own], tip[own, own] = generators(l), turn(l, 0, np.array(np.pi / 2)).T
+    turns = np.argsort(np.abs(every), axis=2)[..., -2:]
     return _Layout(
         m=np.abs(m),
         l=np.repeat(rows, [2 * l + 1 for l in rows]),
         partner=np.arange(len(m)) - 2 * m,
         sign=-np.sign(m).astype(np.float64),
-        tip=read_only(block_diag(*(turn(l, 0, np.array(np.pi / 2)).T for l in rows))),
-        generators=csr_array(stacked),
+        tip=read_only(tip),
+        turns=np.ascontiguousarray(np.moveaxis(turns, 2, 0)),
+        turned_by=read_only(np.moveaxis(np.take_along_axis(every, turns, axis=2), 2, 0)),
     )
 
 
@@ -230,6 +226,16 @@ def _spin(c: Array, phase: tuple[Array, Array], layout: _Layout) -> Array:
     """D of turns about z by K angles, given as cos and sin of m times each [K, degree + 1], on c [P or K, P, C]."""
     cosine, sine = (values[:, None, layout.m] for values in phase)
     return np.asarray(cosine * c + (layout.sign * sine) * c[..., layout.partner])
+
+
+def to_polar_axis(l: int, directions: Array) -> Array:
+    """D_l of the rotations R_y(-theta) R_z(-phi) [N, 2l+1, 2l+1] that turn unit directions [N, 3] into the z axis."""
+    layout, m = _layout((l,)), np.arange(l + 1)
+    theta = np.arctan2(np.hypot(directions[:, 0], directions[:, 1]), directions[:, 2])
+    phi = np.arctan2(directions[:, 1], directions[:, 0])
+    about_y, about_z = ((np.cos(a), np.sin(a)) for a in (np.multiply.outer(angle, m) for angle in (theta, phi)))
+    # Rows, not columns, are turned here, so the other way round.
+    return _spin(_spin(layout.tip, about_y, layout) @ layout.tip.T, about_z, layout)
 
 
 def euler_zyz(rotations: Array) -> tuple[Array, Array, Array]:

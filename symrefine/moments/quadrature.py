@@ -66,17 +66,14 @@ def _triangles(shape: Shape) -> tuple[Index, Array, Array]:
 def triangle_rule(degree: int) -> tuple[Array, Array]:
     """Barycentric nodes [Q, 3] and weights [Q] (sum 1) exact for polynomials of `degree` on a triangle.
 
-    Gauss-Jacobi in the collapsed direction times Gauss-Legendre (Stroud's conical product rule): any degree,
-    positive weights, nodes inside.
+    Gauss-Legendre in both directions of a square that is collapsed into the triangle (Duffy): any degree, positive
+    weights, nodes inside.
     """
-    from scipy.special import roots_jacobi
-
-    count = degree // 2 + 1
-    s, ws = roots_jacobi(count, 1.0, 0.0)
-    t, wt = np.polynomial.legendre.leggauss(count)
+    # What the square is collapsed by, 1 - s with its thin end at s = +1, is one degree more.
+    s, ws = np.polynomial.legendre.leggauss((degree + 1) // 2 + 1)
+    t, wt = np.polynomial.legendre.leggauss(degree // 2 + 1)
     u, v = np.meshgrid(0.5 * (1.0 + s), 0.5 * (1.0 + t), indexing="ij")
-    weights = np.outer(ws, wt)
-    # roots_jacobi(1, 0) carries the weight (1 - s): the thin end of the collapsed square is at s = +1.
+    weights = np.outer((1.0 - s) * ws, wt)
     nodes = np.stack([u, (1.0 - u) * (1.0 - v), (1.0 - u) * v], axis=-1)
     return nodes.reshape(-1, 3), (weights / weights.sum()).ravel()
 

@@ -2,13 +2,16 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from symrefine.detection.result import Detection
 from symrefine.geometry import Array, positive
 from symrefine.groups import PointGroup
-from symrefine.ndim.detection import SubspaceDetection
-from symrefine.plane.detection import PlanarDetection
 from symrefine.surface.misses import LIMITS
+
+if TYPE_CHECKING:
+    from symrefine.ndim import SubspaceDetection
+    from symrefine.plane import PlanarDetection
 
 # By what something is turned down that the tolerance allows.
 MORE = "more than objects mostly do that are meant to have it"
@@ -71,14 +74,14 @@ def headline(detection: Detection) -> str:
     return f"{least}{symbol(detection.point_group)}: {meaning(detection.group)}"
 
 
-def planar_headline(detection: PlanarDetection) -> str:
+def planar_headline(detection: "PlanarDetection") -> str:
     """The same of an object in the plane."""
     if detection.undetermined:
         return f"Undetermined: {detection.undetermined}"
     return f"{detection.point_group}: {detected_lines(detection)}"
 
 
-def detected_lines(detection: PlanarDetection) -> str:
+def detected_lines(detection: "PlanarDetection") -> str:
     """What the lines and turns that were found in the plane come to."""
     turns = detection.rotation
     return planar_meaning(detection.point_group, len(detection.lines), None if turns is None else turns.order)
@@ -97,7 +100,7 @@ def turns_name(order: float) -> str:
     return "all turns" if math.isinf(order) else f"turns of order {round(order)}"
 
 
-def subspace_headline(detection: SubspaceDetection) -> str:
+def subspace_headline(detection: "SubspaceDetection") -> str:
     """How many hyperplanes of symmetry there are, and the order of the group they generate."""
     if detection.undetermined:
         return f"Undetermined: {detection.undetermined}"

@@ -18,6 +18,7 @@ from symrefine.moments.harmonics import harmonic_moments, to_polar_axis
 from symrefine.moments.moments import Moments, transformed
 from symrefine.rounding import START_ERROR
 from symrefine.shape import Index
+from symrefine.surface.tree import Tree
 
 # Directions on the half sphere: 3.7 degrees apart, against 11 degrees that order 8 can resolve.
 DIRECTIONS = 1500
@@ -43,9 +44,8 @@ def _table(l: int) -> Array:
 @lru_cache(maxsize=1)
 def _neighbours() -> Index:
     """The eight nearest directions of each, n ~ -n; [DIRECTIONS, 8]."""
-    closeness = np.abs(half_sphere() @ half_sphere().T)
-    np.fill_diagonal(closeness, -1.0)
-    return np.argpartition(-closeness, 8, axis=1)[:, :8]
+    both = np.concatenate([half_sphere(), -half_sphere()])
+    return Tree(both).query(half_sphere(), 8, skip=1)[1] % DIRECTIONS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -74,19 +74,19 @@ def sums_of(points: Array) -> Array:
     return sums
 
 
-def _added(sums: Array, members: Index, ends: Index) -> Array:
-    """Rows of sums [N, .] added up over groups: the i-th has the members from `ends[i]` up to `ends[i + 1]`.
+def _added(sums: Array, members: Index) -> Array:
+    """Rows of sums [N, .] added up over groups of members [M, k].
 
     Raises:
-        IndexError: a member that there is not, such as the neighbour that a tree says is missing; scipy would read
-            whatever lies behind the sums.
+        IndexError: a member that there is not, such as the neighbour that a tree says is missing.
     """
-    from scipy.sparse import csr_array
-
-    if len(members) and members.max() >= len(sums):
+    if members.size and members.max() >= len(sums):
         raise IndexError(f"member {members.max()} of {len(sums)}")
-    groups = csr_array((np.ones(len(members)), members, ends), shape=(len(ends) - 1, len(sums)))
-    return np.asarray(groups @ sums)
+    total = rows(sums, members[:, 0])
+    each = np.empty_like(total)
+    for member in members.T[1:]:
+        total += np.take(sums, member, axis=0, out=each, mode="clip")  # "raise" would buffer them
+    return total
 
 
 def in_cells(values: Array, points: Array, count: int, rng: np.random.Generator) -> tuple[Tree, Array]:
@@ -96,8 +96,7 @@ def in_cells(values: Array, points: Array, count: int, rng: np.random.Generator)
     """
     cells = Tree(points[rng.permutation(len(points))[:count]])
     own = cells.nearest(points)[1]
-    order = np.argsort(own, kind="stable")
-    return cells, _added(values, order, np.searchsorted(own[order], np.arange(count + 1)))
+    return cells, np.stack([np.bincount(own, weights=column, minlength=count) for column in values.T], axis=1)
 
 
 def spreads_of(sums: Array) -> tuple[Array, Array]:
@@ -152,18 +151,22 @@ class Neighbourhoods:
     def around(self, points: Array, near: Index | None = None) -> Array:
         """Sums [M, .] of the neighbourhoods of points [M, d]; `near` [M, .] are the cells near them, if known."""
         near = self.tree.query(points, self.count)[1] if near is None else near[:, : self.count]
-        return _added(self.sums, near.ravel(), np.arange(0, near.size + 1, self.count))
+        return _added(self.sums, near)
 
 
 def connected_parts(one: Index, other: Index, count: int) -> Index:
-    """Number of the part that each of `count` nodes belongs to, from pairs of linked ones, [E] and [E]."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    """Number of the part that each of `count` nodes belongs to, from pairs of linked ones, [E] and [E].
 
-    # Numbers that it would have to copy into narrower ones otherwise.
-    ends = (one.astype(np.int32), other.astype(np.int32)) if count <= np.iinfo(np.int32).max else (one, other)
-    links = coo_array((np.ones(len(one)), ends), shape=(count, count))
-    return np.asarray(connected_components(links, directed=False)[1].astype(np.intp))
+    Every node learns of the first node that links lead to, and from that node what it has learnt meanwhile.
+    """
+    first = np.arange(count)
+    while (apart := first[one] != first[other]).any():
+        one, other = one[apart], other[apart]
+        a, b = first[one], first[other]
+        np.minimum.at(first, np.maximum(a, b), np.minimum(a, b))
+        while not np.array_equal(beyond := first[first], first):
+            first = beyond
+    return np.asarray((np.cumsum(first == np.arange(count)) - 1)[first])
 
 
 def renumbered(chosen: Index, count: int) -> tuple[Index, Index]:
@@ -204,7 +207,7 @@ def choose_neighbours(points: Array, tree: Tree, rng: np.random.Generator, *, th
 def planes_of(points: Array, near: Index) -> tuple[Array, Array, Array]:
     """Means, normals and variances (across first), all [M, 3], of neighbourhoods [M, k] of points [N, 3]."""
     members, own = renumbered(near, len(points)) if near.size < len(points) else (slice(None), near)
-    return fit_planes(_added(sums_of(rows(points, members)), own.ravel(), np.arange(0, near.size + 1, near.shape[1])))
+    return fit_planes(_added(sums_of(rows(points, members)), own))
 
 
 def thickness_of(variances: Array) -> Array:
