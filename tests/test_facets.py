@@ -84,3 +84,9 @@ def rim(faces):
     """Edges of an odd number of triangles."""
     edges = [tuple(sorted((int(f[k - 1]), int(f[k])))) for f in faces for k in range(3)]
     return {edge for edge in edges if edges.count(edge) % 2}
+
+
+def test_a_triangle_with_one_corner_twice_stands_for_itself():
+    """Two of its sides are one edge, so that it is beside nothing but itself; a file may have no other triangle."""
+    alone = Triangles.of(np.eye(3)[:2], np.array([[0, 1, 1]]), np.zeros(1, dtype=int))
+    assert len(Facets.flat(alone, 1e-9).labels) == 1

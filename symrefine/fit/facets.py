@@ -48,11 +48,10 @@ class Facets:
         Each is by itself where no two are.
         """
         faces, labels = triangles.faces, triangles.labels
-        near, far = triangles.pairs(within)
-        if not len(near):
-            return cls.single(faces, labels)
-        of = connected_parts(near, far, len(faces))
+        of = connected_parts(*triangles.pairs(within), len(faces))
         rows = np.flatnonzero((np.bincount(of) > 1)[of])
+        if not len(rows):
+            return cls.single(faces, labels)
         of = renumbered(of[rows], len(faces))[1]
         normals, off = triangles.planes(rows, of)
         # What bends little by little is no facet: each of its triangles is one.
