@@ -254,7 +254,7 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], *, anew: bool
             pool = replace(pool, looked=(*pool.looked, (moved, needs)))
             parts += _holding(surface, moved, useful)
         elif not pool.has(moved, needs) and not pool.met(moved):
-            pool = _joined_at_once(surface, pool, moved) if needs <= pool.limit and pool.largest.elements else pool
+            pool = _joined_at_once(surface, pool, moved) if needs <= pool.nothing and pool.largest.elements else pool
             if not pool.has(moved, needs):
                 found = fitted(surface, moved, error_rad=look.error_rad, close=useful)
                 if surface.openings is None or surface.viewed or found.supported >= SUPPORTED:
