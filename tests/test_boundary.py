@@ -363,3 +363,9 @@ def test_noise_that_a_small_cloud_tells_over_and_over_is_told_once(view, seed):
 def test_what_is_finer_than_moments_are_is_found(name, view):
     """Nothing proposed the half turn of an urchin, and C1 was told, at 1.000 and .992."""
     assert run(Case(family="spread", name=name, view=view, seed=5)).outcome == "right"
+
+
+@pytest.mark.parametrize("name", ["circle 2000", "ellipse 500", "arch 500", "sigmoid 2000", "helix 500", "cable 500"])
+def test_a_curve_is_told_from_its_points_alone(name):
+    """All planes along a flat one are the same, which said nothing of where in it a mirror stands: C2v, for certain."""
+    assert run(Case(family="curves", name=name, seed=1)).outcome == "right"

@@ -477,11 +477,11 @@ def mirror_at(angle_deg):
     ("parts", "whole"),
     [
         ([mirror_at(0.0), mirror_at(36.0)], "C5v"),
-        ([mirror_at(0.0), mirror_at(4.5)], "C40v"),
-        # Mirrors that no direction tells apart generate nothing but what is round.
-        ([mirror_at(0.0), mirror_at(3.6)], "Cinfv"),
-        ([mirror_at(0.0), mirror_at(36.0), mirror_at(39.6)], "Cinfv"),
-        ([mirror_at(0.0), mirror_at(3.6), upright("Cs")], "Dinfh"),
+        ([mirror_at(0.0), mirror_at(3.0)], "C60v"),
+        # Mirrors that no direction tells apart are one, and with others generate nothing but what is round.
+        ([mirror_at(0.0), mirror_at(2.5)], "Cs"),
+        ([mirror_at(0.0), mirror_at(36.0), mirror_at(38.5)], "Cinfv"),
+        ([mirror_at(0.0), mirror_at(2.5), upright("Cs")], "Dinfh"),
         # A fold that was found as one is one.
         ([upright("C60"), mirror_at(10.0)], "C60v"),
         ([upright("C50v"), upright("Cs")], "D50h"),

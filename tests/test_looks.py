@@ -168,3 +168,18 @@ def test_a_wedge_that_would_tell_no_more_than_the_surface_counts_as_looked_at():
     assert surface.looked_about(axis, 2)
     assert not surface.wedges
     assert not surface.looked_about(axis, 200)
+
+
+def test_where_a_group_needs_least_is_looked_for_as_far_as_it_gets_less():
+    """A fit that ends far up a valley says that it is off by little: the valley is followed to its ground."""
+    points = sample(join([box((0, 0, 0), (1, 2, 3))]), 4000, 0.0, np.random.default_rng(0))
+    measured = measure(Shape(points=points))
+    surface = gather(measured, np.random.default_rng(0))[1]
+    center = -measured.moments.center / measured.moments.scale
+    true = Placed(group=PointGroup(name="Cs", frame=frame_with_z(np.eye(3)[0])), center=center)
+    sigma, way = 0.01, np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    state = true.framed().moved(-32.0 * sigma * way)
+    start = next(refine(surface.cloud, state, start_error_rad=START_ERROR))
+    ended = replace(start, covariance=np.diag((sigma * way) ** 2))
+    found = looks.least_around(surface, true, [ended])  # a Gaussian ends at four
+    assert abs(found.group.frame[2] @ true.group.frame[2]) > np.cos(2.0 * sigma)

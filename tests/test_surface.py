@@ -10,7 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from experiments.objects.shapes import bottle, box, join, mug, sample, stool, table
-from symrefine.geometry import Isometry, Plane, householder, random_orthogonal, rotation, tight_diagonal
+from symrefine.geometry import Isometry, Plane, householder, random_orthogonal, rotation, tight_diagonal, unit
 from symrefine.groups import PointGroup
 from symrefine.moments.moments import shape_moments
 from symrefine.moments.quadrature import sample_surface
@@ -30,7 +30,7 @@ from symrefine.surface.misses import (
     noise_distances,
     spread_distance,
 )
-from symrefine.surface.neighbourhoods import connected_parts, in_cells, planes_of
+from symrefine.surface.neighbourhoods import are_wires, connected_parts, in_cells, planes_of
 from symrefine.surface.skin import isolated_points
 from symrefine.surface.surface import Surface
 from symrefine.surface.surroundings import Surroundings
@@ -572,3 +572,15 @@ def test_a_clump_of_fewer_points_than_a_neighbourhood_is_asked_as_it_is():
     sheet = rng.uniform(-9, 9, (700, 3)) * [1, 1, 1e-3]
     points = np.concatenate([sheet, 0.3 * rng.normal(size=(10, 3)) + [0, 0, 14.0]])
     assert [len(c) for c in clumps(points, Surroundings.of(points))] in ([], [10])
+
+
+def test_normals_of_a_flat_curve_are_not_all_those_of_its_plane():
+    """They go all ways across it, so that what slides within the plane is told as well as what leaves it."""
+    angles = np.sort(np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, 1500))
+    circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(1500)], axis=1)
+    planes = local_planes(circle, 1500, np.random.default_rng(1))
+    outwards = unit(planes.points)
+    along = np.cross(outwards, [0.0, 0.0, 1.0])
+    shares = [((planes.normals * way).sum(axis=1) ** 2).mean() for way in (outwards, [0.0, 0.0, 1.0], along)]
+    np.testing.assert_allclose(shares, [0.5, 0.5, 0.0], atol=0.02)
+    np.testing.assert_array_equal(are_wires(np.array([[0.0, 1.0, 20.0], [0.0, 1.0, 30.0]])), [False, True])

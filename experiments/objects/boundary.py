@@ -14,6 +14,7 @@ import zlib
 import numpy as np
 
 from experiments.objects.blobs import BLOBS
+from experiments.objects.curves import CURVES
 from experiments.objects.extremes import FAR
 from experiments.objects.finned import FINNED
 from experiments.objects.furniture import FURNITURE
@@ -43,6 +44,7 @@ FAMILIES: dict[str, dict[str, Build]] = {
     "vanes": VANES,
     "finned": FINNED,
     "spread": SPREAD,
+    "curves": CURVES,
 }
 
 

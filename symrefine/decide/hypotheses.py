@@ -20,7 +20,7 @@ from symrefine.geometry import Array, Axis, Isometry, frame_with_z, rotation
 from symrefine.groups import PointGroup, is_subgroup
 from symrefine.propose.folds import azimuthal_spectrum, folds_of
 from symrefine.rounding import START_ERROR
-from symrefine.samples import COUNT, GLANCE
+from symrefine.samples import COUNT, GLANCE, LOOK
 from symrefine.surface.misses import Deviation
 from symrefine.surface.skin import Skin
 from symrefine.surface.surface import Coverage, Surface
@@ -152,7 +152,7 @@ def fitted(
         found = _placed(surface, end, history, before)
         if found.need <= clear:
             return found
-        other = _placed(surface, least_around(surface, start, history), history, before)
+        other = _placed(surface, least_around(surface, start, history, LOOK), history, before)
         return min(found, other, key=lambda h: h.need)
     asked = asked if surface.is_open else seems(surface, start)
     every = [(seems(surface, end), end, history), (asked, start, history[:1])]

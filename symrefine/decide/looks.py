@@ -31,13 +31,15 @@ GLANCED = 4
 ASIDE = 7
 
 
-def glances(surface: Surface, starts: Sequence[Placed], most: float = math.inf) -> list[float]:
+def glances(
+    surface: Surface, starts: Sequence[Placed], most: float = math.inf, *, sources: int = GLANCE
+) -> list[float]:
     """What each of several groups needs, as a few operations tell on a few points; from `most` on a lower bound."""
     each = [few_motions(s) for s in starts]
     owner = np.repeat(np.arange(len(starts)), [len(motions) for motions in each])
     every, found = [m for motions in each for m in motions], np.zeros(len(starts))
     if every:
-        needs = surface.needs(every, sources=GLANCE, bound=LIMITS[-1] * most, discs=1, tests=GLANCED)
+        needs = surface.needs(every, sources=sources, bound=LIMITS[-1] * most, discs=1, tests=GLANCED)
         np.maximum.at(found, owner, needs)
     return found.tolist()
 
@@ -116,19 +118,28 @@ def look_stride(surface: Surface, operations: int) -> int:
     return surface.stride(max(GLANCE, LOOK // operations), matched=True)
 
 
-def least_around(surface: Surface, start: Placed, history: Sequence[Iterate]) -> Placed:
+def least_around(surface: Surface, start: Placed, history: Sequence[Iterate], sources: int = GLANCE) -> Placed:
     """Where a fit passed, or may as well have come to, a group seems to need least, by a few points.
 
     What is round but for a handle is turned about its axis by noise of all of it: the fit passes where the handle is
     met, and goes on to where the rest agrees a little better. So places are asked along the direction that it tells
-    least, as far as it may be off there.
+    least, as far as it may be off there; and farther, twice as far each time, as long as nothing is better: of a spring
+    only its ends tell how far along its own screw the axis lies.
     """
     end = history[-1]
     variance, ways = np.linalg.eigh(end.covariance)
-    aside = math.sqrt(max(float(variance[-1]), 0.0)) * ways[:, -1]
-    states = [*(i.state for i in history), *(end.state.moved(k * aside) for k in np.arange(-RIM, RIM + 1.0) if k)]
-    places = [start.moved(state) for state in states]
-    return places[int(np.argmin(glances(surface, places)))]
+    off = math.sqrt(max(float(variance[-1]), 0.0))
+    passed, aside = [start.moved(i.state) for i in history], dict[float, tuple[float, Placed]]()
+    least, best = min(zip(glances(surface, passed, sources=sources), passed, strict=True), key=lambda k: k[0])
+    asked = [k for k in np.arange(-RIM, RIM + 1.0).tolist() if k]
+    while asked:
+        places = [start.moved(end.state.moved(k * off * ways[:, -1])) for k in asked]
+        aside |= dict(zip(asked, zip(glances(surface, places, sources=sources), places, strict=True), strict=True))
+        lowest = min(needs for needs, _ in aside.values())
+        there = sorted(k for k, (needs, _) in aside.items() if needs == lowest)
+        ends = {k for k in there if k in (min(aside), max(aside)) and abs(k) * off < math.pi}
+        asked = [2.0 * k for k in ends if lowest < least]
+    return aside[there[len(there) // 2]][1] if lowest < least else best
 
 
 def slid(surface: Surface, placed: Placed, needs: float, useful: float = math.inf) -> tuple[Placed, float]:
@@ -268,8 +279,8 @@ def hopeless(error_rad: float) -> float:
 
 
 def start_error(surface: Surface) -> float:
-    """How far a start may be off: moments know no more where surface is missing than votes do."""
-    return AGREE_RAD if surface.is_open else START_ERROR
+    """How far a start may be off: moments know no more where surface is missing than votes do, nor than few points."""
+    return AGREE_RAD if surface.is_open else max(START_ERROR, SURE / math.sqrt(len(surface.cloud.points)))
 
 
 def _told(surface: Surface, placed: Placed, sources: int, reach: float = 0.0) -> tuple[float, float, float]:

@@ -7,7 +7,7 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from symrefine.geometry import Array, rows
+from symrefine.geometry import Array, Mask, rows
 from symrefine.rounding import SINGLE
 from symrefine.samples import GLANCE, LOOK
 from symrefine.shape import Index
@@ -20,6 +20,8 @@ WIDEST = 0.2
 # Thickness over width, or over length, below which neighbourhoods count as planes; where noise may make them thick,
 # over that of a blob.
 FLAT = 0.3
+# Width over length below which neighbourhoods are of wires.
+WIRE = 0.2
 # Median flatness of neighbourhoods up to WIDEST_BLOB wide (RMS radii), over that of a blob, from which on points fill a
 # volume; the median thickness of large parts of a clump, over that of a ball.
 VOLUME = 0.8
@@ -121,6 +123,21 @@ def fit_planes(sums: Array, normals: Array | None = None) -> tuple[Array, Array,
         return mean, fitted, values
     across = np.clip(np.einsum("ni,nij,nj->n", normals, covariance, normals), 0.0, None)
     return mean, normals, np.column_stack([across, values[:, 1:]])
+
+
+def are_wires(variances: Array) -> Mask:
+    """Which neighbourhoods are much narrower than long, from their variances [M, d] (across first)."""
+    return np.asarray(variances[:, -2] <= WIRE**2 * variances[:, -1])
+
+
+def across_wires(sums: Array) -> Array:
+    """Unit normals [M, d] of wires from the sums of neighbourhoods: one of all ways across each, evenly.
+
+    All along a flat curve its narrowest way across is the same, and tells nothing of where in its plane the curve is.
+    """
+    axes = np.linalg.eigh(spreads_of(sums)[1])[1]
+    turns = math.pi * (math.sqrt(5.0) - 1.0) / 2.0 * np.arange(len(sums))[:, None]
+    return np.asarray(np.cos(turns) * axes[:, :, 0] + np.sin(turns) * axes[:, :, -2])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -22,6 +22,7 @@ from symrefine.surface.misses import SHARES
 from symrefine.surface.neighbourhoods import (
     WIDEST,
     Neighbourhoods,
+    are_wires,
     connected_parts,
     fit_planes,
     planes_of,
@@ -43,9 +44,8 @@ NEIGHBOURS, FAR_ASIDE, ASIDE = 32, 0.7, 0.5
 BENDS = 2.0
 # A surface counts as open from this share of local planes far aside on, for each RMS radius that neighbourhoods are
 # wide: what lies that near a border is as much more as they are wider. Of 21 closed objects of 20,000 points all stay
-# below 0.016; where 5 % of the surface are missing, 22 of 24 are above 0.022. Neighbourhoods so much narrower than long
-# are wires, which end anyway.
-OPEN, WIRE = 0.02, 0.2
+# below 0.016; where 5 % of the surface are missing, 22 of 24 are above 0.022.
+OPEN = 0.02
 # So much of it leaves no doubt: five times as much. Where noise makes one of its walls, the rim of a mug reaches 0.08.
 EVIDENT = 0.1
 # Correlation of how far off the common sheet neighbours lie with how far in: 0.6 where two sheets meet, 0 at a border.
@@ -302,8 +302,8 @@ def _aside(cloud: LocalPlanes, points: Array, tree: Tree, near: Index | None) ->
     # The normals of as wide a neighbourhood.
     count = min(max(AROUND, round(NEIGHBOURS * len(cloud.points) / len(points))), len(cloud.points))
     normals = rows(cloud.normals, cloud.around(cloud.points, cloud.labels, count)[1])
-    sheet = variances[:, 1] > WIRE**2 * variances[:, 2]
-    aside = np.where(sheet, _off(mean - cloud.points, spread, normals), 0.0)
+    # A wire ends anyway.
+    aside = np.where(are_wires(variances), 0.0, _off(mean - cloud.points, spread, normals))
     return aside, float(np.median(np.sqrt(variances.sum(axis=1))))
 
 

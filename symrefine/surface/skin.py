@@ -15,6 +15,8 @@ from symrefine.shape import Index
 from symrefine.surface.neighbourhoods import (
     NEIGHBOURS,
     Neighbourhoods,
+    across_wires,
+    are_wires,
     choose_neighbours,
     connected_parts,
     fit_planes,
@@ -277,7 +279,10 @@ class Skin:
         if self.neighbours == 1 and normals is not None:
             none = np.zeros(len(nearest))
             return Planes(points=rows(self.points, nearest), normals=normals, thickness=none, flatness=none)
-        mean, normals, values = fit_planes(self.neighbourhoods.around(queries, near), normals)
+        sums = self.neighbourhoods.around(queries, near)
+        mean, normals, values = fit_planes(sums, normals)
+        if self.normals is None and are_wires(values).mean() > 0.5:
+            normals = across_wires(sums)
         return Planes(points=mean, normals=normals, thickness=np.sqrt(values[:, 0]), flatness=flatness_of(values))
 
     def patches(self, pick: Index, labels: Index | None = None, near: Index | None = None) -> Patches:
