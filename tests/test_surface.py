@@ -583,4 +583,6 @@ def test_normals_of_a_flat_curve_are_not_all_those_of_its_plane():
     along = np.cross(outwards, [0.0, 0.0, 1.0])
     shares = [((planes.normals * way).sum(axis=1) ** 2).mean() for way in (outwards, [0.0, 0.0, 1.0], along)]
     np.testing.assert_allclose(shares, [0.5, 0.5, 0.0], atol=0.02)
+    flat = local_planes(circle[:, :2], 1500, np.random.default_rng(1))
+    assert (np.abs((flat.normals * unit(flat.points)).sum(axis=1)) > 0.99).all()  # the only way in the plane
     np.testing.assert_array_equal(are_wires(np.array([[0.0, 1.0, 20.0], [0.0, 1.0, 30.0]])), [False, True])

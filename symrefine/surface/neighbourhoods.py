@@ -126,18 +126,18 @@ def fit_planes(sums: Array, normals: Array | None = None) -> tuple[Array, Array,
 
 
 def are_wires(variances: Array) -> Mask:
-    """Which neighbourhoods are much narrower than long, from their variances [M, d] (across first)."""
-    return np.asarray(variances[:, -2] <= WIRE**2 * variances[:, -1])
+    """Which neighbourhoods are much narrower than long, from their variances [M, 3] (across first)."""
+    return np.asarray(variances[:, 1] <= WIRE**2 * variances[:, 2])
 
 
 def across_wires(sums: Array) -> Array:
-    """Unit normals [M, d] of wires from the sums of neighbourhoods: one of all ways across each, evenly.
+    """Unit normals [M, 3] of wires from the sums of neighbourhoods: one of all ways across each, evenly.
 
     All along a flat curve its narrowest way across is the same, and tells nothing of where in its plane the curve is.
     """
     axes = np.linalg.eigh(spreads_of(sums)[1])[1]
     turns = math.pi * (math.sqrt(5.0) - 1.0) / 2.0 * np.arange(len(sums))[:, None]
-    return np.asarray(np.cos(turns) * axes[:, :, 0] + np.sin(turns) * axes[:, :, -2])
+    return np.asarray(np.cos(turns) * axes[:, :, 0] + np.sin(turns) * axes[:, :, 1])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

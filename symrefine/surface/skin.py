@@ -281,7 +281,8 @@ class Skin:
             return Planes(points=rows(self.points, nearest), normals=normals, thickness=none, flatness=none)
         sums = self.neighbourhoods.around(queries, near)
         mean, normals, values = fit_planes(sums, normals)
-        if self.normals is None and are_wires(values).mean() > 0.5:
+        # In the plane there is but one way across.
+        if self.normals is None and queries.shape[1] == 3 and are_wires(values).mean() > 0.5:
             normals = across_wires(sums)
         return Planes(points=mean, normals=normals, thickness=np.sqrt(values[:, 0]), flatness=flatness_of(values))
 
