@@ -129,17 +129,20 @@ def least_around(surface: Surface, start: Placed, history: Sequence[Iterate], so
     end = history[-1]
     variance, ways = np.linalg.eigh(end.covariance)
     off = math.sqrt(max(float(variance[-1]), 0.0))
-    passed, aside = [start.moved(i.state) for i in history], dict[float, tuple[float, Placed]]()
+
+    def aside(k: float) -> Placed:
+        return start.moved(end.state.moved(k * off * ways[:, -1]))
+
+    passed, needs = [start.moved(i.state) for i in history], dict[float, float]()
     least, best = min(zip(glances(surface, passed, sources=sources), passed, strict=True), key=lambda k: k[0])
     asked = [k for k in np.arange(-RIM, RIM + 1.0).tolist() if k]
     while asked:
-        places = [start.moved(end.state.moved(k * off * ways[:, -1])) for k in asked]
-        aside |= dict(zip(asked, zip(glances(surface, places, sources=sources), places, strict=True), strict=True))
-        lowest = min(needs for needs, _ in aside.values())
-        there = sorted(k for k, (needs, _) in aside.items() if needs == lowest)
-        ends = {k for k in there if k in (min(aside), max(aside)) and abs(k) * off < math.pi}
+        needs |= zip(asked, glances(surface, [aside(k) for k in asked], sources=sources), strict=True)
+        lowest = min(needs.values())
+        there = sorted(k for k in needs if needs[k] == lowest)
+        ends = {k for k in there if k in (min(needs), max(needs)) and abs(k) * off < math.pi}
         asked = [2.0 * k for k in ends if lowest < least]
-    return aside[there[len(there) // 2]][1] if lowest < least else best
+    return aside(there[len(there) // 2]) if lowest < least else best
 
 
 def slid(surface: Surface, placed: Placed, needs: float, useful: float = math.inf) -> tuple[Placed, float]:
