@@ -117,7 +117,8 @@ def attempt(one: Case, folder: Path) -> None:
     Raises:
         SymrefineError: it is refused, which is right.
     """
-    from symrefine.load import load, load_depth
+    from symrefine.load import load
+    from symrefine.load.depth import load_depth
 
     path = folder / one.name
     if one.name:
