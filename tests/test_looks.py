@@ -20,6 +20,7 @@ from symrefine.propose.candidates import START_ERROR
 from symrefine.samples import LOOK
 from symrefine.shape import Shape
 from symrefine.surface.clumps import Clump
+from symrefine.surface.misses import SURE
 from symrefine.surface.openings import Openings
 from symrefine.surface.surface import Surface
 
@@ -183,3 +184,12 @@ def test_where_a_group_needs_least_is_looked_for_as_far_as_it_gets_less():
     ended = replace(start, covariance=np.diag((sigma * way) ** 2))
     found = looks.least_around(surface, true, [ended])  # a Gaussian ends at four
     assert abs(found.group.frame[2] @ true.group.frame[2]) > np.cos(2.0 * sigma)
+
+
+def test_a_start_may_be_off_by_what_few_samples_tell_and_atoms_are_no_samples():
+    points = sample(join([box((0, 0, 0), (1, 2, 3))]), 400, 0.0, np.random.default_rng(0))
+    errors = [
+        start_error(gather(measure(Shape(points=p, isolated=alone)), np.random.default_rng(0))[1])
+        for p, alone in ((points, None), (points[:40], True))
+    ]
+    assert errors == [SURE / 20.0, START_ERROR]

@@ -282,8 +282,11 @@ def hopeless(error_rad: float) -> float:
 
 
 def start_error(surface: Surface) -> float:
-    """How far a start may be off: moments know no more where surface is missing than votes do, nor than few points."""
-    return AGREE_RAD if surface.is_open else max(START_ERROR, SURE / math.sqrt(len(surface.cloud.points)))
+    """How far a start may be off: moments know no more where surface is missing than votes do, nor than few samples."""
+    if surface.is_open:
+        return AGREE_RAD
+    sampled = 0.0 if surface.cloud.body == "atoms" else SURE / math.sqrt(len(surface.cloud.points))
+    return max(START_ERROR, sampled)
 
 
 def _told(surface: Surface, placed: Placed, sources: int, reach: float = 0.0) -> tuple[float, float, float]:
