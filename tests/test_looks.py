@@ -10,6 +10,7 @@ import pytest
 from experiments.objects import damage
 from experiments.objects.shapes import box, join, mug, sample, table
 from symrefine.decide import explore, looks
+from symrefine.decide.hypotheses import Hypothesis
 from symrefine.decide.looks import ASIDE, glances, looked_at, start_error
 from symrefine.detection.measure import gather, measure
 from symrefine.fit.placed import Placed
@@ -193,3 +194,21 @@ def test_a_start_may_be_off_by_what_few_samples_tell_and_atoms_are_no_samples():
         for p, alone in ((points, None), (points[:40], True))
     ]
     assert errors == [SURE / 20.0, START_ERROR]
+
+
+def test_what_needs_something_alone_is_not_joined_before_it_is_fitted(monkeypatch):
+    """A group needs no less than its elements, and a join at once is kept only where it needs nothing."""
+    surface, center = surface_of("mug")
+    one, other = mirrors(center, 2)
+    element = explore.judged(surface, one).elements[0]
+    pool = explore.Pool(nothing=0.001, limit=0.03, largest=Hypothesis(placed=one, elements=(element,), need=0.0))
+    look = looks.Look(placed=other, history=(), needs=0.01, error_rad=START_ERROR)
+    monkeypatch.setattr(explore, "_glanced", lambda *_: [(other, 0.0)])
+    monkeypatch.setattr(explore, "looked_at", lambda *_, **__: look)
+    monkeypatch.setattr(explore, "fitted", lambda *_, **__: Hypothesis(placed=other, elements=(), need=0.1))
+    joined = []
+    monkeypatch.setattr(explore, "_joined_at_once", lambda _, pool, start: joined.append(start) or pool)
+    explore._tried(surface, pool, [other])
+    assert not joined
+    explore._tried(surface, replace(pool, nothing=0.01), [other])
+    assert joined == [other]
