@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symrefine.geometry import Array, frame_with_z, read_only, unit
+from symrefine.groups.standard import GOLDEN
 from symrefine.moments.harmonics import harmonic_moments, to_polar_axis
 from symrefine.moments.moments import Moments, transformed
 from symrefine.rounding import START_ERROR
@@ -31,7 +32,7 @@ def half_sphere() -> Array:
     """Even directions [DIRECTIONS, 3] on the half sphere z > 0 (Fibonacci lattice)."""
     index = np.arange(DIRECTIONS) + 0.5
     z = 1.0 - index / DIRECTIONS
-    azimuth = np.pi * (1.0 + np.sqrt(5.0)) * index
+    azimuth = 2.0 * np.pi * GOLDEN * index
     radius = np.sqrt(1.0 - z * z)
     return read_only(np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z], axis=1))
 

@@ -8,6 +8,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from symrefine.geometry import Array, Mask, rows
+from symrefine.groups.standard import GOLDEN
 from symrefine.rounding import SINGLE
 from symrefine.samples import GLANCE, LOOK
 from symrefine.shape import Index
@@ -136,7 +137,7 @@ def across_wires(sums: Array) -> Array:
     All along a flat curve its narrowest way across is the same, and tells nothing of where in its plane the curve is.
     """
     axes = np.linalg.eigh(spreads_of(sums)[1])[1]
-    turns = math.pi * (math.sqrt(5.0) - 1.0) / 2.0 * np.arange(len(sums))[:, None]
+    turns = math.pi * GOLDEN * np.arange(len(sums))[:, None]
     return np.asarray(np.cos(turns) * axes[:, :, 0] + np.sin(turns) * axes[:, :, 1])
 
 
