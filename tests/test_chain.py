@@ -349,6 +349,51 @@ def test_a_start_that_looks_no_better_is_not_looked_at_where_a_look_has_been():
     assert not pool.shows(Placed(group=mirror(0.02).group, center=np.array([0.2, 0.0, 0.0])), 0.02)
 
 
+def test_what_an_exact_group_carries_to_a_start_is_known_as_far_as_samples_tell():
+    """Of what keeps all that was seen an image needs as much; a mirror half a turn of it away is of another kind."""
+
+    def mirror(turns):
+        across = rotation([0, 0, 1], 2.0 * np.pi / 60.0 * turns) @ [1.0, 0.0, 0.0]
+        return Placed(group=point_group("Cs", frame_with_z(across)), center=ORIGIN)
+
+    placed = Placed(group=point_group("C60"), center=ORIGIN)
+    element = of("C3").elements[0]
+    hidden = replace(element, coverage=replace(element.coverage, unseen=0.01))
+    exact = Pool(largest=Hypothesis(placed=placed, elements=(element,), need=0.0), looks=((0.02, mirror(0.0)),))
+    parted = replace(exact, largest=replace(exact.largest, elements=(hidden,)))
+    assert exact.shows(mirror(4.2), 0.015, whole=False)
+    assert not exact.shows(mirror(4.2), 0.01, whole=False)
+    assert not exact.shows(mirror(4.3), 0.02, whole=False)
+    assert not parted.shows(mirror(4.0), 0.02, whole=False)
+    assert not replace(exact, largest=replace(exact.largest, need=0.001)).shows(mirror(4.2), 0.015)
+
+
+def test_beside_what_is_exact_only_what_goes_with_it_is_wanted():
+    frame = random_orthogonal(np.random.default_rng(6), 3, 1)
+
+    def pool(name, need=0.0):
+        placed = Placed(group=point_group(name, frame), center=ORIGIN)
+        return Pool(largest=Hypothesis(placed=placed, elements=(), need=need))
+
+    def start(name, tilt):
+        axis = rotation(frame[0], tilt) @ frame[2]
+        return Placed(group=point_group(name, frame_with_z(axis)), center=ORIGIN)
+
+    across, oblique, nearly = np.pi / 2, 1.0, np.pi / 2 - 0.5 * START_ERROR
+    goes = [("Cs", across), ("Cs", nearly), ("C2", across), ("Cs", 0.0), ("C38", 0.0), ("S6", 0.0), ("Cinfv", 0.0)]
+    for name, tilt in (*goes, ("Kh", oblique)):
+        assert pool("C19").wants(start(name, tilt))
+    along = [(name, 0.0) for name in ("C14", "S14", "Oh")]
+    for name, tilt in (*along, ("Cs", oblique), ("C2", oblique), ("C3", across), ("Cinfv", across)):
+        assert not pool("C19").wants(start(name, tilt))
+        assert pool("C19", need=0.01).wants(start(name, tilt))
+        assert pool("C5").wants(start(name, tilt))
+    assert not pool("C19").wants(start("Cs", nearly - START_ERROR))
+    assert pool("C19").wants(start("Cs", nearly - START_ERROR), 2.0 * START_ERROR)
+    assert not pool("Oh").wants(start("C5", oblique))
+    assert pool("Oh").wants(start("Kh", oblique))
+
+
 def test_what_needs_but_belief_shows_its_elements():
     """Of what was seen nothing denies it: a look at one of them would end where it stands."""
     frame = random_orthogonal(np.random.default_rng(3), det=1)

@@ -143,7 +143,7 @@ def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float
     pool = _with(surface, pool, starts)
     vain = 0  # of what is nearly a ball every axis seems possible
     for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
-        if vain < FOLLOWED and glance < hopeless(start_error(surface)) and pool.wants(axis):
+        if vain < FOLLOWED and glance < hopeless(start_error(surface)) and pool.wants(axis, start_error(surface)):
             before, pool = pool.largest, _with(surface, pool, about(evidence, axis.group.frame[2]))
             vain = vain + 1 if pool.largest is before else 0
     # Turns that hold better than the largest group may have half turns across them which that has not.
@@ -179,7 +179,7 @@ def _of_part(surface: Surface, whole: Pool) -> Pool:
     if surface.viewed:
         parts = list[Placed]()
         for h in known:
-            again = fitted(surface, h.placed)
+            again = fitted(surface, h.placed, close=ALIKE * pool.limit)
             pool = _grown(surface, pool, again)
             # Of what was not seen enough to tell the whole group, enough may have been seen of its elements.
             parts += _holding(surface, again.placed, ALIKE * pool.limit) if is_loose(surface, again) else []
@@ -191,7 +191,8 @@ def _of_part(surface: Surface, whole: Pool) -> Pool:
     pool = _with(surface, pool, voted)
     pool = _with(surface, pool, _by_details(surface, pool), anew=True)
     for h in known:
-        pool = pool if pool.has(h.placed, h.need) else _grown(surface, pool, fitted(surface, h.placed))
+        if not pool.has(h.placed, h.need):
+            pool = _grown(surface, pool, fitted(surface, h.placed, close=ALIKE * pool.limit))
     return pool
 
 
@@ -218,7 +219,7 @@ def _with(surface: Surface, pool: Pool, starts: Iterable[Placed], *, anew: bool 
 
 def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tuple[Placed, float]]:
     """The starts that are new with what they seem to need at a glance, large groups that look good first."""
-    new = [s for s in starts if pool.wants(s)]
+    new = [s for s in starts if pool.wants(s, start_error(surface))]
     # What they carry to where nobody looked tells little of their order, and takes long to be told.
     blind = surface.is_open and not surface.viewed
     at, most = (surface.closed, surface.ceiling) if blind else (surface, hopeless(start_error(surface)))
@@ -232,16 +233,16 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], *, anew: bool
 
     And, unless they are tried `anew`, for those beside one that was seen to be no better.
     """
-    parts, inside = list[Placed](), 0
+    parts, inside, error = list[Placed](), 0, start_error(surface)
     for start, glance in _glanced(surface, pool, starts):
-        if not pool.wants(start) or (not anew and pool.shows(start, glance, whole=not surface.is_open)):
+        if not pool.wants(start, error) or (not anew and pool.shows(start, glance, whole=not surface.is_open)):
             continue
         # Parts of what is round beyond doubt only matter to smaller tolerances, and the first of them tell.
         clear = not pool.largest.group.is_finite and pool.largest.need <= doubtless(surface)
         inside += clear and pool.largest.holds(start)
         if inside > FOLLOWED:
             continue
-        if glance >= hopeless(start_error(surface)):
+        if glance >= hopeless(error):
             pool = replace(pool, hopeless=(*pool.hopeless, (start, glance)))
             continue
         useful = ALIKE * pool.limit

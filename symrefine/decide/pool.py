@@ -8,13 +8,15 @@ import numpy as np
 
 from symrefine.decide.hypotheses import NOTHING, Hypothesis, has_all
 from symrefine.decide.posterior import ALIKE
-from symrefine.fit.placed import Placed
+from symrefine.fit.placed import SAMPLED, Placed
 from symrefine.groups import PointGroup, is_subgroup
 from symrefine.groups.elements import DIRECTION_ERROR_RAD
 from symrefine.rounding import START_ERROR
 
 # Groups of points that no other one but that of a ball contains.
 MAXIMAL = ("Oh", "Ih")
+# Axes of more folds than this, which an icosahedron has, cross no other axes but those of half turns.
+CROSSED = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -65,14 +67,15 @@ class Pool:
         most = self.nothing
         return any(h.need <= math.hypot(most, h.believed) and h.holds(placed) for h in (self.largest, *self.small))
 
-    def wants(self, start: Placed) -> bool:
+    def wants(self, start: Placed, error_rad: float = START_ERROR) -> bool:
         """Whether a group is in none that is as good as exact, and something may hold both it and the largest.
 
-        The largest, if it needs nothing, is in every larger one, and of those that hold all of a cube or an icosahedron
-        there is but that of a ball.
+        The largest, if it needs nothing, is in every larger one. Of those that hold all of a cube or an icosahedron
+        there is but that of a ball; one that holds an axis of more folds has all its operations along or across it.
         """
-        alone = self.largest.group.name in MAXIMAL and self.largest.need <= self.nothing
-        return not (self.has(start) or (alone and start.group.name != "Kh"))
+        if self.has(start):
+            return False
+        return self.largest.need > self.nothing or _goes_with(start.group, self.largest.group, error_rad)
 
     def met(self, placed: Placed) -> bool:
         """Whether a group was fitted at this very place."""
@@ -82,23 +85,30 @@ class Pool:
         """Whether the largest group carries a group that was seen onto this one, which looks no better at a glance.
 
         Of what is in a continuous group something may hold better than the rest, and a start is too rough to tell.
-        Where the `whole` was not seen, operations carry what was onto what was not: one shows itself alone there.
+        Where the `whole` was not seen, operations carry what was onto what was not: one shows itself alone there. Where
+        the largest keeps all that was seen, what it carries a group to needs as much, and looks so but for the sample.
         """
         if not self.largest.group.is_finite and self.largest.holds(start):
             return False
-        name = start.group.name
-        alike = [(p, START_ERROR) for p, need in self.seen if p.group.name == name and need < ALIKE * glance]
+        exact, fold = self._keeps_all, self.largest.group.symbol.fold
+        seen = [(p, need < ALIKE * glance) for p, need in self.seen]
         # From another start, no worse than this one, a look came to where this one stands.
-        alike += [
-            (end, START_ERROR)
-            for seemed, end in self.looks
-            if end.group.name == name and seemed <= glance and np.linalg.norm(end.center - start.center) < START_ERROR
-        ]
+        near = [(end, seemed) for seemed, end in self.looks if np.linalg.norm(end.center - start.center) < START_ERROR]
+        seen += [(end, seemed <= (ALIKE if exact else 1.0) * glance) for end, seemed in near]
+        # A quarter of a turn lies half way between mirrors of two kinds.
+        within = min(START_ERROR, 0.5 * math.pi / fold) if exact and 0 < fold < math.inf else START_ERROR
         return any(
             is_same(image, start, within)
-            for p, within in alike
-            for image in (_images(p, self.largest.group, start) if whole else [p])
+            for p, alike in seen
+            if alike and p.group.name == start.group.name
+            for image in (_images(p, self.largest.group, start) if whole or exact else [p])
         )
+
+    @property
+    def _keeps_all(self) -> bool:
+        """Whether the largest group carries all that was seen onto what was."""
+        unseen = (e.coverage.unseen > 0.0 for e in self.largest.elements)
+        return bool(self.largest.elements) and self.largest.need <= self.nothing and not any(unseen)
 
     def with_failed(self, failed: Hypothesis | None) -> "Pool":
         """The pool that knows of a group, if there is one, that it does not hold."""
@@ -113,6 +123,22 @@ def is_at(a: Placed, b: Placed) -> bool:
 def is_same(a: Placed, b: Placed, within_rad: float = START_ERROR) -> bool:
     """Whether two groups are one, as far as directions tell that may be so far apart."""
     return a.group.name == b.group.name and has_all(a, b, within_rad)
+
+
+def _goes_with(group: PointGroup, exact: PointGroup, error_rad: float) -> bool:
+    """Whether something may hold all of two groups, the first of which may stand so far off."""
+    if group.name == "Kh" or not exact.symbol.fold > CROSSED:
+        return group.name == "Kh" or exact.name not in MAXIMAL
+    axis = exact.frame[2]
+    # What is off by an angle takes an axis to where it is off by twice as much.
+    least = math.cos(2.0 * error_rad)
+    if np.abs(group.sampled(SAMPLED).operations() @ axis @ axis).min() < least:
+        return False
+    one, other = group.symbol.fold, exact.symbol.fold
+    if math.isinf(one) or math.isinf(other) or abs(group.frame[2] @ axis) < least:
+        return True
+    # Of turns too many to be told apart what is round has all, which is asked for by itself.
+    return math.lcm(max(int(one), 1), int(other)) <= max(one, other, math.pi / START_ERROR)
 
 
 def _images(known: Placed, group: PointGroup, wanted: Placed) -> Iterator[Placed]:
