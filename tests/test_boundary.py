@@ -369,3 +369,8 @@ def test_what_is_finer_than_moments_are_is_found(name, view):
 def test_a_curve_is_told_from_its_points_alone(name):
     """All planes along a flat one are the same, which said nothing of where in it a mirror stands: C2v, for certain."""
     assert run(Case(family="curves", name=name, seed=1)).outcome == "right"
+
+
+@pytest.mark.parametrize("name", ["crown 800", "trefoil 800", "helix 2000", "spring bent 2000"])
+def test_a_bent_rod_is_told_from_its_points_alone(name):
+    assert run(Case(family="rods", name=name, seed=1)).outcome == "right"

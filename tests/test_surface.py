@@ -1,6 +1,7 @@
 """The surface as a judge: distances to discs, what an operation needs to be forgiven, what noise alone shows."""
 
 from dataclasses import fields
+from functools import partial
 
 import numpy as np
 import pytest
@@ -469,6 +470,24 @@ def test_noise_is_what_another_sample_would_miss_by(noise):
     # Both are estimates: neighbouring planes of one sample share their points, those of two samples do not.
     assert 0.6 < promised.mean() / found.mean() < 1.6
     assert 0.6 < np.quantile(promised, 0.95) / np.quantile(found, 0.95) < 1.6
+
+
+def test_of_rods_as_thin_as_neighbourhoods_noise_is_what_another_sample_would_miss_by():
+    """Their planes lie one way or another by chance, which twice as many points make no better."""
+    rng = np.random.default_rng(12)
+
+    def ring():
+        along, around = 2.0 * np.pi * rng.random((2, 800))
+        out = 1.0 + 0.02 * np.cos(around)
+        return np.column_stack([out * np.cos(along), out * np.sin(along), 0.02 * np.sin(around)])
+
+    points, another = ring(), ring()
+    whole, other = (local_planes(p, len(p), rng) for p in (points, another))
+    assert np.median(whole.flatness) > 0.6
+    promised = noise_distances(800, half_of(points, 400, rng), rng)
+    found = disc_distances(whole, other.points)
+    for told in (np.mean, partial(np.quantile, q=0.95)):
+        assert 0.9 < told(promised) / told(found) < 1.2
 
 
 def test_noise_is_measured_class_by_class():

@@ -5,8 +5,8 @@
 prints them. Families: rotors without mirrors and gears, surfaces of revolution with something to them, meshes of uneven
 area, scans with defects and their siblings, prisms for sparse clouds, objects without symmetry, clouds with something
 extreme, molecules for a ladder of tolerances, thin-walled open vessels, furniture of thin boards and rods, thin blades
-of which one is shorter, bodies with fins or pins at one place, balls with details spread evenly. Names are keys; a seed
-varies all dimensions.
+of which one is shorter, bodies with fins or pins at one place, balls with details spread evenly, points on curves and
+on bent rods. Names are keys; a seed varies all dimensions.
 """
 
 import zlib
@@ -22,6 +22,7 @@ from experiments.objects.instances import Build, Instance
 from experiments.objects.ladders import LADDERS
 from experiments.objects.lathe import ROUND
 from experiments.objects.prisms import SPARSE
+from experiments.objects.rods import RODS
 from experiments.objects.scans import SCANS
 from experiments.objects.spread import SPREAD
 from experiments.objects.turning import GEARS, ROTORS
@@ -45,6 +46,7 @@ FAMILIES: dict[str, dict[str, Build]] = {
     "finned": FINNED,
     "spread": SPREAD,
     "curves": CURVES,
+    "rods": RODS,
 }
 
 

@@ -92,6 +92,7 @@ VIEWS: dict[str, tuple[View, ...]] = {
     "furniture": THIN,
     "vanes": (*THIN, CLEAN),
     "curves": (GIVEN,),
+    "rods": (GIVEN,),
     "spread": (MESH, View(form="cloud", points=5000), CLEAN, NOISY),
     "finned": (MESH, View(form="cloud", points=5000), CLEAN, NOISY, View(form="cloud", points=20000, noise_rel=0.005)),
 }

@@ -229,17 +229,19 @@ def noise_distances(
         one, other = (planes(half) for half in halves(count, rng))
         for here, there in ((one, other), (other, one)):
             some = slice(None, None, max(1, len(there.points) // COUNT))
-            across.append(disc_distances(here, there.points[some], there.classes(some)))
+            away = disc_distances(here, there.points[some], there.classes(some))
+            across.append(away * of_the_whole(there.flatness[some], one.body))
     every = np.sort(np.concatenate(across))
-    return of_the_whole(every[:: -max(1, len(every) // count)], one.body)
+    return every[:: -max(1, len(every) // count)]
 
 
-def of_the_whole(noise: Array, body: Body) -> Array:
-    """Of noise between halves of a cloud what there is of it in the whole.
+def of_the_whole(flatness: Array, body: Body) -> Array:
+    """By how much less noise puts planes [M] of such flatness off in the whole of a cloud than in its halves.
 
-    Means of twice as many points are off by 1 / sqrt(2) as much, in a volume points stand 1 / cbrt(2) as far apart.
+    Means of twice as many points are off by 1 / sqrt(2) as much. But what is as thick as wide has no plane that more
+    points tell better: which way it lies is chance. In a volume points stand 1 / cbrt(2) as far apart.
     """
-    return noise / 2.0 ** (1.0 / 3.0 if body == "volume" else 0.5)
+    return np.full(len(flatness), 0.5 ** (1.0 / 3.0)) if body == "volume" else np.sqrt(0.5 * (1.0 + flatness**2))
 
 
 def halves(count: int, rng: np.random.Generator) -> tuple[Index, Index]:

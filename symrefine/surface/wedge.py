@@ -60,14 +60,17 @@ class Wedge:
             labels=None if skin.labels is None else skin.labels[pick],
         )
         one, other = (_planes(whole.half(half), pitch, rng) for half in halves(len(pick), rng))
-        noise = [disc_distances(a, _own(b), _own_classes(b)) for a, b in ((one, other), (other, one))]
+        noise = [
+            disc_distances(a, _own(b), _own_classes(b)) * of_the_whole(b.flatness[: len(_own(b))], "surface")
+            for a, b in ((one, other), (other, one))
+        ]
         return cls(
             frame=frame,
             center=axis.point,
             fold=fold,
             width=skin.width,
             cloud=_planes(whole, pitch, rng),
-            noise=np.sort(of_the_whole(np.concatenate(noise), "surface")),
+            noise=np.sort(np.concatenate(noise)),
         )
 
     @classmethod
