@@ -851,6 +851,18 @@ def test_a_sample_sparser_than_walls_are_thick_tells_no_end_of_one_from_a_hole(n
     assert told.outcome == "right"
 
 
+@pytest.mark.parametrize(("name", "view"), [("thin4 notched", 4), ("thick4 notched", 4)])
+def test_a_notch_in_a_wall_that_ends_all_along_is_no_sure_hole(name, view):
+    """The rim of a flight is a border all along, which the group keeps: one more is a hole or an end of its own.
+
+    And of what has no symmetry no hole leaves just that. Both were "at least D4", at .999 and .969.
+    """
+    made = instance("augers", name, seed=1)
+    shape, _ = boundary.look(boundary.Case(family="augers", name=name, view=view, seed=1), made)
+    found = detect(shape)
+    assert found.point_group == "C1" or found.confidence < 0.9
+
+
 def test_a_surface_that_is_whole_is_judged_as_that_to_the_end():
     """What is fitted last, too: a hole is then none, but where the object ends."""
     mesh, truth = specimen("shape", "table")

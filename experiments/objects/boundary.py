@@ -6,13 +6,14 @@ prints them. Families: rotors without mirrors and gears, surfaces of revolution 
 area, scans with defects and their siblings, prisms for sparse clouds, objects without symmetry, clouds with something
 extreme, molecules for a ladder of tolerances, thin-walled open vessels, furniture of thin boards and rods, thin blades
 of which one is shorter, bodies with fins or pins at one place, balls with details spread evenly, points on curves and
-on bent rods. Names are keys; a seed varies all dimensions.
+on bent rods, screw conveyors. Names are keys; a seed varies all dimensions.
 """
 
 import zlib
 
 import numpy as np
 
+from experiments.objects.augers import AUGERS
 from experiments.objects.blobs import BLOBS
 from experiments.objects.curves import CURVES
 from experiments.objects.extremes import FAR
@@ -47,6 +48,7 @@ FAMILIES: dict[str, dict[str, Build]] = {
     "spread": SPREAD,
     "curves": CURVES,
     "rods": RODS,
+    "augers": AUGERS,
 }
 
 

@@ -93,6 +93,7 @@ VIEWS: dict[str, tuple[View, ...]] = {
     "vanes": (*THIN, CLEAN),
     "curves": (GIVEN,),
     "rods": (GIVEN,),
+    "augers": (MESH, View(form="cloud", points=6000), View(form="cloud", points=10000), CLEAN, NOISY),
     "spread": (MESH, View(form="cloud", points=5000), CLEAN, NOISY),
     "finned": (MESH, View(form="cloud", points=5000), CLEAN, NOISY, View(form="cloud", points=20000, noise_rel=0.005)),
 }

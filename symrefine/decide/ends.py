@@ -82,6 +82,16 @@ def hides_surely(surface: Surface, found: Hypothesis, limit: float) -> bool:
     return judged(replace(surface, openings=replace(openings, doubted=True)), found.placed).need <= limit
 
 
+def ends_elsewhere(surface: Surface, found: Hypothesis) -> bool:
+    """Whether most borders are ends of thin parts that a group keeps, so that one more may be a hole or such an end."""
+    openings = surface.openings
+    if openings is None or surface.viewed or openings.ends is None:
+        return False
+    line = np.flatnonzero(openings.line)
+    kept = openings.kept(surface.cloud, line, found.placed.motions())[0] > KEPT
+    return bool((kept & openings.ends[line]).mean() > KEPT)
+
+
 def hidden_by(surface: Surface, found: Hypothesis) -> list[tuple[Isometry, Mask]]:
     """A few operations of a group, and which local planes [M] each carries to where nobody looked."""
     motions = few_motions(found.placed)
@@ -175,6 +185,6 @@ def often_left(seen: Hypothesis, found: Hypothesis) -> bool:
     """
     if seen.group.name == "Cs":
         return not found.group.is_finite or len(found.group.mirrors()) >= PLACES
-    if not (seen.group.is_finite and seen.group.is_polar and found.group.is_finite):
+    if not (1 < seen.group.symbol.fold < math.inf and seen.group.is_polar and found.group.is_finite):
         return False
     return sum(order % seen.group.symbol.fold == 0 for _, order in found.group.rotation_axes()) >= PLACES

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import partial
 
 from symrefine.decide.ends import (
+    ends_elsewhere,
     ends_there,
     ends_too,
     hidden_by,
@@ -28,7 +29,7 @@ from symrefine.decide.joins import better_parts, endless, generated, is_loose, j
 from symrefine.decide.looks import COARSE, exact_need, glances, hopeless, looked_at, start_error, unmet_by
 from symrefine.decide.place import SUPPORTED
 from symrefine.decide.pool import Pool, is_at
-from symrefine.decide.posterior import ALIKE, LEAST, Link, certain, meant
+from symrefine.decide.posterior import ALIKE, EVEN, LEAST, Link, certain, lenience, meant
 from symrefine.fit.placed import Placed, elements
 from symrefine.propose.candidates import (
     Evidence,
@@ -98,15 +99,23 @@ def _larger(part: Pool, than: Hypothesis) -> list[Hypothesis]:
 
 
 def _believed(surface: Surface, part: Pool, found: Hypothesis) -> Pool:
-    """The pool where one of its groups is the largest that may be believed in, and what it has not asks for more."""
-    if found is part.largest:
-        return part
+    """The pool where one of its groups is the largest that may be believed in, and what it has not asks for more.
+
+    Where the object mostly ends at its borders, one more is a hole or such an end: as likely as not.
+    """
+    own = EVEN * surface.tolerance if ends_elsewhere(surface, found) else 0.0
 
     def asked(known: Hypothesis) -> Hypothesis:
-        return known if found.holds(known.placed) or not known.believed else _as_rival(surface, known)
+        if not known.believed:
+            return known
+        if not found.holds(known.placed):
+            return _as_rival(surface, known)
+        return _asking(known, own * lenience(known.group.name))
 
+    if found is part.largest and not own:
+        return part
     failed = tuple(map(asked, (part.largest, *part.failed)))
-    return replace(part, largest=found, small=tuple(map(asked, part.small)), failed=failed)
+    return replace(part, largest=asked(found), small=tuple(map(asked, part.small)), failed=failed)
 
 
 def _is_missing(surface: Surface, whole: Hypothesis, part: Hypothesis, limit: float, *, ends: bool) -> bool:
@@ -131,8 +140,12 @@ def _as_rival(surface: Surface, found: Hypothesis) -> Hypothesis:
 
     To believe that what ends so evenly is missing a part takes as much as to believe in as much as was seen.
     """
-    asked = belief_in_as_much(surface, found.placed)
-    return replace(found, need=math.hypot(found.need, asked), believed=math.hypot(found.believed, asked))
+    return _asking(found, belief_in_as_much(surface, found.placed))
+
+
+def _asking(found: Hypothesis, belief: float) -> Hypothesis:
+    """A group that asks for so much more belief."""
+    return replace(found, need=math.hypot(found.need, belief), believed=math.hypot(found.believed, belief))
 
 
 def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float) -> Pool:
