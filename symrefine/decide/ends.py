@@ -83,13 +83,13 @@ def hides_surely(surface: Surface, found: Hypothesis, limit: float) -> bool:
 
 
 def ends_elsewhere(surface: Surface, found: Hypothesis) -> bool:
-    """Whether most borders are ends of thin parts that a group keeps, so that one more may be a hole or such an end."""
+    """Whether a group keeps most borders, as ends that they are, so that one more may be a hole or such an end."""
     openings = surface.openings
-    if openings is None or surface.viewed or openings.ends is None:
+    if openings is None or surface.viewed or not openings.line.any():
         return False
     line = np.flatnonzero(openings.line)
     kept = openings.kept(surface.cloud, line, found.placed.motions())[0] > KEPT
-    return bool((kept & openings.ends[line]).mean() > KEPT)
+    return bool(kept.mean() > KEPT)
 
 
 def hidden_by(surface: Surface, found: Hypothesis) -> list[tuple[Isometry, Mask]]:
