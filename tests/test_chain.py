@@ -244,6 +244,16 @@ def test_of_mirrors_that_need_as_much_each_may_be_meant():
         assert best.share == pytest.approx(1.0 / (1.0 + rivals))
 
 
+def test_of_two_that_need_as_little_each_may_be_off():
+    """Of what is round but for a label noise leaves any mirror near its own, which was a rival: C1, at .5."""
+    for tilt, rivals in ((1.5, 0), (2.5, 1)):
+        frame = rotation([1, 0, 0], tilt * START_ERROR)
+        aside = replace(of("Cs"), placed=Placed(group=point_group("Cs", frame), center=ORIGIN), need=0.0)
+        across = replace(of("C3h"), need=0.0)
+        best = _best([aside, across], 0.001, 0.001)
+        assert (best.group.name, len(best.rivals)) == ("C3h", rivals)
+
+
 def test_a_mirror_shows_its_image_where_all_was_seen_and_itself_anywhere():
     turned = [Placed(group=point_group("Cs", rotation([1, 0, 0], a)), center=ORIGIN) for a in (0.0, 0.7, -0.7)]
     largest, seen, image = turned

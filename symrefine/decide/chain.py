@@ -15,7 +15,8 @@ from symrefine.decide.looks import COARSE, by_chance
 from symrefine.decide.place import is_told, least_elsewhere, told_apart
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import ALIKE, ALONE, lenience
-from symrefine.fit.placed import joined
+from symrefine.fit.placed import Placed, joined
+from symrefine.rounding import START_ERROR
 from symrefine.samples import FOLLOWED
 from symrefine.surface.surface import Surface
 
@@ -119,8 +120,12 @@ def _best(tried: Sequence[Hypothesis], hidden: float, noise: float) -> Hypothesi
     """Of groups that do not hold together the one that needs least; of those that need as good as nothing the largest.
 
     By chance fewer operations hold than many. Of those as large it is the one that misses least in the mean; how many
-    others there are that need as little, or as little as noise, tells how sure it is.
+    others there are that need as little, or as little as noise, tells how sure it is. Each of two that are one may be
+    off: of what is round but for a label noise leaves any mirror near its own.
     """
+
+    def is_in(one: Placed, other: Placed) -> bool:
+        return has_all(other, one, 2.0 * START_ERROR)
 
     def rank(found: Hypothesis) -> tuple[float, float, float]:
         need, mean = _worst(found, hidden)
@@ -131,7 +136,7 @@ def _best(tried: Sequence[Hypothesis], hidden: float, noise: float) -> Hypothesi
         return None
     apart, most = [best.placed], max(ALIKE * best.need, noise)
     for other in sorted((h for h in tried if h.elements and h.need <= most), key=rank):
-        apart += [] if any(has_all(p, other.placed) or has_all(other.placed, p) for p in apart) else [other.placed]
+        apart += [] if any(is_in(p, other.placed) or is_in(other.placed, p) for p in apart) else [other.placed]
     return replace(best, rivals=tuple(apart[1:]))
 
 
