@@ -381,9 +381,10 @@ def test_what_an_exact_group_carries_to_a_start_is_known_as_far_as_samples_tell(
 def test_beside_what_is_exact_only_what_goes_with_it_is_wanted():
     frame = random_orthogonal(np.random.default_rng(6), 3, 1)
 
-    def pool(name, need=0.0):
-        placed = Placed(group=point_group(name, frame), center=ORIGIN)
-        return Pool(largest=Hypothesis(placed=placed, elements=(), need=need))
+    def pool(name, need=0.0, unseen=0.0):
+        placed, element = Placed(group=point_group(name, frame), center=ORIGIN), of("C3").elements[0]
+        element = replace(element, coverage=replace(element.coverage, unseen=unseen))
+        return Pool(largest=Hypothesis(placed=placed, elements=(element,), need=need))
 
     def start(name, tilt):
         axis = rotation(frame[0], tilt) @ frame[2]
@@ -397,6 +398,7 @@ def test_beside_what_is_exact_only_what_goes_with_it_is_wanted():
     for name, tilt in (*along, ("Cs", oblique), ("C2", oblique), ("C3", across), ("Cinfv", across)):
         assert not pool("C19").wants(start(name, tilt))
         assert pool("C19", need=0.01).wants(start(name, tilt))
+        assert pool("C19", unseen=0.01).wants(start(name, tilt))
         assert pool("C5").wants(start(name, tilt))
     assert not pool("C19").wants(start("Cs", nearly - START_ERROR))
     assert pool("C19").wants(start("Cs", nearly - START_ERROR), 2.0 * START_ERROR)

@@ -70,12 +70,15 @@ class Pool:
     def wants(self, start: Placed, error_rad: float = START_ERROR) -> bool:
         """Whether a group is in none that is as good as exact, and something may hold both it and the largest.
 
-        The largest, if it needs nothing, is in every larger one. Of those that hold all of a cube or an icosahedron
-        there is but that of a ball; one that holds an axis of more folds has all its operations along or across it.
+        The largest, if it needs nothing, is in every larger one, and of those that hold all of a cube or an icosahedron
+        there is but that of a ball. Where it keeps all that was seen and turns by more folds than axes that cross
+        others, every larger one has all its operations along or across its axis.
         """
-        if self.has(start):
+        alone = self.largest.group.name in MAXIMAL and self.largest.need <= self.nothing
+        if self.has(start) or (alone and start.group.name != "Kh"):
             return False
-        return self.largest.need > self.nothing or _goes_with(start.group, self.largest.group, error_rad)
+        turns = self.largest.group.symbol.fold > CROSSED and self._keeps_all
+        return not turns or _goes_with(start.group, self.largest.group, error_rad)
 
     def met(self, placed: Placed) -> bool:
         """Whether a group was fitted at this very place."""
@@ -126,9 +129,9 @@ def is_same(a: Placed, b: Placed, within_rad: float = START_ERROR) -> bool:
 
 
 def _goes_with(group: PointGroup, exact: PointGroup, error_rad: float) -> bool:
-    """Whether something may hold all of two groups, the first of which may stand so far off."""
-    if group.name == "Kh" or not exact.symbol.fold > CROSSED:
-        return group.name == "Kh" or exact.name not in MAXIMAL
+    """Whether something may hold a group, which may stand so far off, and one that turns by many folds."""
+    if group.name == "Kh":
+        return True
     axis = exact.frame[2]
     # What is off by an angle takes an axis to where it is off by twice as much.
     least = math.cos(2.0 * error_rad)
