@@ -252,6 +252,9 @@ def test_of_two_that_need_as_little_each_may_be_off():
         across = replace(of("C3h"), need=0.0)
         best = _best([aside, across], 0.001, 0.001)
         assert (best.group.name, len(best.rivals)) == ("C3h", rivals)
+    # But a turn by a third is none by elevenths, however far axes may be off.
+    many = Placed(group=point_group("C11"), center=ORIGIN)
+    assert len(_best([replace(of("C3"), need=0.0), replace(of("C6"), placed=many, need=0.0)], 0.001, 0.001).rivals) == 1
 
 
 def test_a_mirror_shows_its_image_where_all_was_seen_and_itself_anywhere():
@@ -393,17 +396,17 @@ def test_beside_what_is_exact_only_what_goes_with_it_is_wanted():
     across, oblique, nearly = np.pi / 2, 1.0, np.pi / 2 - 0.5 * START_ERROR
     goes = [("Cs", across), ("Cs", nearly), ("C2", across), ("Cs", 0.0), ("C38", 0.0), ("S6", 0.0), ("Cinfv", 0.0)]
     for name, tilt in (*goes, ("Kh", oblique)):
-        assert pool("C19").wants(start(name, tilt))
+        assert pool("C19").wants(start(name, tilt), START_ERROR)
     along = [(name, 0.0) for name in ("C14", "S14", "Oh")]
     for name, tilt in (*along, ("Cs", oblique), ("C2", oblique), ("C3", across), ("Cinfv", across)):
-        assert not pool("C19").wants(start(name, tilt))
-        assert pool("C19", need=0.01).wants(start(name, tilt))
-        assert pool("C19", unseen=0.01).wants(start(name, tilt))
-        assert pool("C5").wants(start(name, tilt))
-    assert not pool("C19").wants(start("Cs", nearly - START_ERROR))
+        assert not pool("C19").wants(start(name, tilt), START_ERROR)
+        assert pool("C19", need=0.01).wants(start(name, tilt), START_ERROR)
+        assert pool("C19", unseen=0.01).wants(start(name, tilt), START_ERROR)
+        assert pool("C5").wants(start(name, tilt), START_ERROR)
+    assert not pool("C19").wants(start("Cs", nearly - START_ERROR), START_ERROR)
     assert pool("C19").wants(start("Cs", nearly - START_ERROR), 2.0 * START_ERROR)
-    assert not pool("Oh").wants(start("C5", oblique))
-    assert pool("Oh").wants(start("Kh", oblique))
+    assert not pool("Oh").wants(start("C5", oblique), START_ERROR)
+    assert pool("Oh").wants(start("Kh", oblique), START_ERROR)
 
 
 def test_what_needs_but_belief_shows_its_elements():

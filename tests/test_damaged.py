@@ -27,8 +27,8 @@ from symrefine.cli import invoke
 from symrefine.cli.tables import record_lines
 from symrefine.complete import complete
 from symrefine.decide import chain, joins
-from symrefine.decide.ends import often_kept
-from symrefine.decide.hypotheses import judged
+from symrefine.decide.ends import often_kept, often_left
+from symrefine.decide.hypotheses import Hypothesis, judged
 from symrefine.decide.looks import COARSE, looked_at
 from symrefine.decide.pool import Pool
 from symrefine.detection import examination
@@ -860,7 +860,18 @@ def test_a_notch_in_a_wall_that_ends_all_along_is_no_sure_hole(name, view):
     made = instance("augers", name, seed=1)
     shape, _ = boundary.look(boundary.Case(family="augers", name=name, view=view, seed=1), made)
     found = detect(shape)
-    assert found.point_group == "C1" or found.confidence < 0.9
+    likely = {found.point_group: found.confidence} | {a.point_group: a.probability for a in found.alternatives}
+    assert found.at_least
+    assert likely.pop("C1") > 0.45
+    assert sum(likely.values()) < 0.55
+
+
+@pytest.mark.parametrize(("seen", "left"), [("C1", False), ("C2", True), ("C3", False), ("Cs", True)])
+def test_of_what_shows_no_symmetry_no_hole_is_said_to_have_left_just_that(seen, left):
+    """As a hole through one of five half turns leaves that, and one in one of five mirrors leaves it."""
+    part, whole = (Placed(group=point_group(name), center=np.zeros(3)) for name in (seen, "D4h"))
+    found = [Hypothesis(placed=placed, elements=(), need=0.0) for placed in (part, whole)]
+    assert often_left(*found) == left
 
 
 def test_a_surface_that_is_whole_is_judged_as_that_to_the_end():

@@ -29,6 +29,7 @@ from symrefine.surface.misses import (
     needs,
     needs_of_atoms,
     noise_distances,
+    of_the_whole,
     spread_distance,
 )
 from symrefine.surface.neighbourhoods import are_wires, connected_parts, in_cells, planes_of
@@ -488,6 +489,13 @@ def test_of_rods_as_thin_as_neighbourhoods_noise_is_what_another_sample_would_mi
     found = disc_distances(whole, other.points)
     for told in (np.mean, partial(np.quantile, q=0.95)):
         assert 0.9 < told(promised) / told(found) < 1.2
+
+
+def test_what_noise_is_of_the_whole_is_half_of_planes_in_squares_and_all_of_blobs():
+    """Thicker than wide neighbourhoods are only across normals that were given: no noise is more than all of it."""
+    flatness = np.array([0.0, 0.5, 1.0, 5.0])
+    np.testing.assert_allclose(of_the_whole(flatness, "surface") ** 2, [0.5, 0.625, 1.0, 1.0])
+    np.testing.assert_allclose(of_the_whole(flatness, "volume") ** 3, 0.5)
 
 
 def test_noise_is_measured_class_by_class():

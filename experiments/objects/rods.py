@@ -4,13 +4,12 @@ Where points are sparse neighbourhoods are as wide as a rod is thick, so that pl
 chance, and only the ends of a spring tell where along its own screw its half turn stands.
 """
 
-import math
 from functools import partial
 
 import numpy as np
 
 from experiments.objects.built_symmetry import Truth
-from experiments.objects.curves import ABOUT_X, ABOUT_Z, CORNERS, DRAWN, Curve
+from experiments.objects.curves import ABOUT_X, ABOUT_Z, CORNERS, DRAWN, TURN, Curve
 from experiments.objects.instances import Build, Instance
 from experiments.objects.lathe import Rng
 from symrefine.geometry import Array, unit
@@ -27,7 +26,7 @@ ASIDE = 0.08
 
 def spring(t: Array, rng: Rng) -> Array:
     """C2 about x: a helix of some turns."""
-    a = rng.uniform(2.5, 6.0) * 2.0 * math.pi * (t - 0.5)
+    a = rng.uniform(2.5, 6.0) * TURN * (t - 0.5)
     return np.column_stack([np.cos(a), np.sin(a), rng.uniform(2.0, 4.0) * (t - 0.5)])
 
 
@@ -42,14 +41,14 @@ def bent(t: Array, rng: Rng) -> Array:
 def along(shape: Curve, name: str, frame: Array, count: int, rng: Rng) -> Instance:
     """So many points on a rod at random places along a curve, any side out."""
     path = shape(np.linspace(0.0, 1.0, CORNERS + 1), rng)
-    radius = rng.uniform(*THICK) * Shape(points=path).diagonal
-    step = np.linalg.norm(np.diff(path, axis=0), axis=1)
-    which = rng.choice(CORNERS, count, p=step / step.sum())
-    forward = np.diff(path, axis=0)[which]
+    diagonal, steps = Shape(points=path).diagonal, np.diff(path, axis=0)
+    radius, lengths = rng.uniform(*THICK) * diagonal, np.linalg.norm(steps, axis=1)
+    which = rng.choice(CORNERS, count, p=lengths / lengths.sum())
+    forward = steps[which]
     out = unit(np.cross(forward, rng.normal(size=(count, 3))))
     points = path[which] + rng.random((count, 1)) * forward + radius * out
     truth = Truth(group=PointGroup(name=name, frame=frame), center=np.zeros(3))
-    return Instance(shape=Shape(points=points), truth=truth, diagonal=Shape(points=path).diagonal)
+    return Instance(shape=Shape(points=points), truth=truth, diagonal=diagonal)
 
 
 BENT: dict[str, tuple[Curve, str, Array]] = {

@@ -41,8 +41,9 @@ class Promise:
 def shapes() -> Iterator[tuple[str, Sampled]]:
     """Names, and what draws so many points."""
     for name, (build, *_) in SHAPES.items():
+        shape = build()
         for noise in NOISES:
-            yield f"{name} {100 * noise:g} %", partial(_of_shape, build(), noise)
+            yield f"{name} {100 * noise:g} %", partial(_of_shape, shape, noise)
     for name, (curve, *_) in BENT.items():
         yield f"rod {name}", partial(_of_rod, curve)
 

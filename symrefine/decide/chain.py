@@ -4,6 +4,7 @@ Elements are joined in the order of what they need, the exact ones first. So the
 exact stays in it, and the group at any tolerance is read from the same table.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -125,7 +126,9 @@ def _best(tried: Sequence[Hypothesis], hidden: float, noise: float) -> Hypothesi
     """
 
     def is_in(one: Placed, other: Placed) -> bool:
-        return has_all(other, one, 2.0 * START_ERROR)
+        # Of many folds a turn less than that is another.
+        apart_rad = 0.25 * math.pi / max(other.group.symbol.fold, 1.0)
+        return has_all(other, one, max(START_ERROR, min(2.0 * START_ERROR, apart_rad)))
 
     def rank(found: Hypothesis) -> tuple[float, float, float]:
         need, mean = _worst(found, hidden)

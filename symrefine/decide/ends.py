@@ -75,9 +75,8 @@ def hides_surely(surface: Surface, found: Hypothesis, limit: float) -> bool:
     openings = surface.openings
     if openings is None or surface.viewed or openings.ends is None:
         return True
-    line = np.flatnonzero(openings.line)
-    kept = openings.kept(surface.cloud, line, found.placed.motions())[0] > KEPT
-    if kept.mean() > KEPT and openings.ends[line][kept].mean() <= KEPT:
+    kept = _kept(surface, found)
+    if kept.mean() > KEPT and openings.ends[openings.line][kept].mean() <= KEPT:
         return False
     return judged(replace(surface, openings=replace(openings, doubted=True)), found.placed).need <= limit
 
@@ -87,9 +86,14 @@ def ends_elsewhere(surface: Surface, found: Hypothesis) -> bool:
     openings = surface.openings
     if openings is None or surface.viewed or not openings.line.any():
         return False
-    line = np.flatnonzero(openings.line)
-    kept = openings.kept(surface.cloud, line, found.placed.motions())[0] > KEPT
-    return bool(kept.mean() > KEPT)
+    return bool(_kept(surface, found).mean() > KEPT)
+
+
+def _kept(surface: Surface, found: Hypothesis) -> Mask:
+    """Which of the local planes that make up the open borders most operations of a group carry onto one."""
+    assert surface.openings is not None
+    line = np.flatnonzero(surface.openings.line)
+    return np.asarray(surface.openings.kept(surface.cloud, line, found.placed.motions())[0] > KEPT)
 
 
 def hidden_by(surface: Surface, found: Hypothesis) -> list[tuple[Isometry, Mask]]:

@@ -103,19 +103,20 @@ def _believed(surface: Surface, part: Pool, found: Hypothesis) -> Pool:
 
     Where the object mostly ends at its borders, one more is a hole or such an end: as likely as not.
     """
-    own = EVEN * surface.tolerance if ends_elsewhere(surface, found) else 0.0
+    as_end = EVEN * surface.tolerance if ends_elsewhere(surface, found) else 0.0
+    if found is part.largest and not as_end:
+        return part
 
     def asked(known: Hypothesis) -> Hypothesis:
         if not known.believed:
             return known
         if not found.holds(known.placed):
             return _as_rival(surface, known)
-        return _asking(known, own * lenience(known.group.name))
+        return _asking(known, as_end * lenience(known.group.name))
 
-    if found is part.largest and not own:
-        return part
-    failed = tuple(map(asked, (part.largest, *part.failed)))
-    return replace(part, largest=asked(found), small=tuple(map(asked, part.small)), failed=failed)
+    others = part.failed if found is part.largest else (part.largest, *part.failed)
+    small, failed = (tuple(map(asked, hypotheses)) for hypotheses in (part.small, others))
+    return replace(part, largest=asked(found), small=small, failed=failed)
 
 
 def _is_missing(surface: Surface, whole: Hypothesis, part: Hypothesis, limit: float, *, ends: bool) -> bool:
@@ -144,8 +145,10 @@ def _as_rival(surface: Surface, found: Hypothesis) -> Hypothesis:
 
 
 def _asking(found: Hypothesis, belief: float) -> Hypothesis:
-    """A group that asks for so much more belief."""
-    return replace(found, need=math.hypot(found.need, belief), believed=math.hypot(found.believed, belief))
+    """A group that asks for so much more belief, and so does each of its elements."""
+    elements = tuple(replace(e, need=math.hypot(e.need, belief)) for e in found.elements)
+    need, believed = math.hypot(found.need, belief), math.hypot(found.believed, belief)
+    return replace(found, elements=elements, need=need, believed=believed)
 
 
 def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float) -> Pool:
@@ -154,9 +157,9 @@ def _of_whole(surface: Surface, evidence: Evidence, limit: float, nothing: float
         pool = pool if exact is None else _with_vertices(surface, pool, exact, proven=exact is evidence.proven)
     starts = [*beside(pool.largest.placed), *starts] if evidence.vertices is not None else starts
     pool = _with(surface, pool, starts)
-    vain = 0  # of what is nearly a ball every axis seems possible
+    vain, error = 0, start_error(surface)  # of what is nearly a ball every axis seems possible
     for axis, glance in _glanced(surface, pool, prime_axes(evidence)):
-        if vain < FOLLOWED and glance < hopeless(start_error(surface)) and pool.wants(axis, start_error(surface)):
+        if vain < FOLLOWED and glance < hopeless(error) and pool.wants(axis, error):
             before, pool = pool.largest, _with(surface, pool, about(evidence, axis.group.frame[2]))
             vain = vain + 1 if pool.largest is before else 0
     # Turns that hold better than the largest group may have half turns across them which that has not.
@@ -232,10 +235,11 @@ def _with(surface: Surface, pool: Pool, starts: Iterable[Placed], *, anew: bool 
 
 def _glanced(surface: Surface, pool: Pool, starts: Iterable[Placed]) -> list[tuple[Placed, float]]:
     """The starts that are new with what they seem to need at a glance, large groups that look good first."""
-    new = [s for s in starts if pool.wants(s, start_error(surface))]
+    error = start_error(surface)
+    new = [s for s in starts if pool.wants(s, error)]
     # What they carry to where nobody looked tells little of their order, and takes long to be told.
     blind = surface.is_open and not surface.viewed
-    at, most = (surface.closed, surface.ceiling) if blind else (surface, hopeless(start_error(surface)))
+    at, most = (surface.closed, surface.ceiling) if blind else (surface, hopeless(error))
     seen = zip(new, glances(at, new, most), strict=True)
     best = sorted(seen, key=lambda k: max(k[1], pool.nothing) / math.log2(1.0 + size_of(k[0])))
     return best[:LOOKED] if surface.is_open else best

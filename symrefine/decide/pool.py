@@ -67,12 +67,12 @@ class Pool:
         most = self.nothing
         return any(h.need <= math.hypot(most, h.believed) and h.holds(placed) for h in (self.largest, *self.small))
 
-    def wants(self, start: Placed, error_rad: float = START_ERROR) -> bool:
+    def wants(self, start: Placed, error_rad: float) -> bool:
         """Whether a group is in none that is as good as exact, and something may hold both it and the largest.
 
         The largest, if it needs nothing, is in every larger one, and of those that hold all of a cube or an icosahedron
         there is but that of a ball. Where it keeps all that was seen and turns by more folds than axes that cross
-        others, every larger one has all its operations along or across its axis.
+        others, every larger one has all its operations along or across its axis, from which a start may be so far off.
         """
         alone = self.largest.group.name in MAXIMAL and self.largest.need <= self.nothing
         if self.has(start) or (alone and start.group.name != "Kh"):
@@ -93,17 +93,17 @@ class Pool:
         """
         if not self.largest.group.is_finite and self.largest.holds(start):
             return False
-        exact, fold = self._keeps_all, self.largest.group.symbol.fold
-        seen = [(p, need < ALIKE * glance) for p, need in self.seen]
+        exact, fold, name = self._keeps_all, self.largest.group.symbol.fold, start.group.name
+        alike = [p for p, need in self.seen if p.group.name == name and need < ALIKE * glance]
         # From another start, no worse than this one, a look came to where this one stands.
-        near = [(end, seemed) for seemed, end in self.looks if np.linalg.norm(end.center - start.center) < START_ERROR]
-        seen += [(end, seemed <= (ALIKE if exact else 1.0) * glance) for end, seemed in near]
+        worst = (ALIKE if exact else 1.0) * glance
+        ends = (end for seemed, end in self.looks if end.group.name == name and seemed <= worst)
+        alike += [end for end in ends if np.linalg.norm(end.center - start.center) < START_ERROR]
         # A quarter of a turn lies half way between mirrors of two kinds.
         within = min(START_ERROR, 0.5 * math.pi / fold) if exact and 0 < fold < math.inf else START_ERROR
         return any(
             is_same(image, start, within)
-            for p, alike in seen
-            if alike and p.group.name == start.group.name
+            for p in alike
             for image in (_images(p, self.largest.group, start) if whole or exact else [p])
         )
 

@@ -236,12 +236,15 @@ def noise_distances(
 
 
 def of_the_whole(flatness: Array, body: Body) -> Array:
-    """By how much less noise puts planes [M] of such flatness off in the whole of a cloud than in its halves.
+    """Factors [M] by which noise puts planes of such flatness off in the whole of a cloud, over that in its halves.
 
     Means of twice as many points are off by 1 / sqrt(2) as much. But what is as thick as wide has no plane that more
-    points tell better: which way it lies is chance. In a volume points stand 1 / cbrt(2) as far apart.
+    points tell better: which way it lies is chance. (Thicker than wide it is only across normals that were given.) In a
+    volume points stand 1 / cbrt(2) as far apart.
     """
-    return np.full(len(flatness), 0.5 ** (1.0 / 3.0)) if body == "volume" else np.sqrt(0.5 * (1.0 + flatness**2))
+    if body == "volume":
+        return np.full(len(flatness), 0.5 ** (1.0 / 3.0))
+    return np.sqrt(0.5 * (1.0 + np.minimum(flatness, 1.0) ** 2))
 
 
 def halves(count: int, rng: np.random.Generator) -> tuple[Index, Index]:
