@@ -571,7 +571,9 @@ def test_too_few_points_of_a_surface_leave_a_doubt_or_the_truth():
     for count in (300, 700):
         found = [detect(sample(table(), count, 0.0, np.random.default_rng(seed))) for seed in range(4)]
         assert all(f.point_group == "C4v" or f.undetermined or f.confidence < 0.95 for f in found)
-    assert detect(sample(mug(), 900, 0.0, np.random.default_rng(0))).point_group == "Cs"
+    few, more = (detect(sample(mug(), count, 0.0, np.random.default_rng(0))) for count in (900, 3000))
+    assert few.point_group == "Cs" or few.undetermined
+    assert more.point_group == "Cs"
 
 
 def test_noise_supports_no_decision():

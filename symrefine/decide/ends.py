@@ -82,11 +82,16 @@ def hides_surely(surface: Surface, found: Hypothesis, limit: float) -> bool:
 
 
 def ends_elsewhere(surface: Surface, found: Hypothesis) -> bool:
-    """Whether a group keeps most borders, as ends that they are, so that one more may be a hole or such an end."""
+    """Whether a group keeps most borders, as ends that they are, so that one more may be a hole or such an end.
+
+    What ends early is where others of its kind go on to their own ends. In the middle of a wall, where what is hidden
+    holds hardly any border of the surface itself, nothing ends.
+    """
     openings = surface.openings
-    if openings is None or surface.viewed or not openings.line.any():
+    if openings is None or surface.viewed or not openings.line.any() or _kept(surface, found).mean() <= KEPT:
         return False
-    return bool(_kept(surface, found).mean() > KEPT)
+    tips = [float(openings.border[some].mean()) for _, some in hidden_by(surface, found) if some.any()]
+    return bool(tips) and MOST * float(np.median(tips)) >= 1.0
 
 
 def _kept(surface: Surface, found: Hypothesis) -> Mask:
