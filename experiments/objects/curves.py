@@ -63,10 +63,10 @@ def arch(t: Array, rng: Rng) -> Array:
     return _flat(np.cos(a), np.sin(a))
 
 
-def helix(t: Array, rng: Rng) -> Array:
-    """C2 about x."""
-    a = rng.uniform(1.2, 2.2) * TURN * (t - 0.5)
-    return np.column_stack([np.cos(a), np.sin(a), rng.uniform(2.0, 3.0) * (t - 0.5)])
+def helix(turns: tuple[float, float], height: tuple[float, float], t: Array, rng: Rng) -> Array:
+    """C2 about x: between so many turns, and so high."""
+    a = rng.uniform(*turns) * TURN * (t - 0.5)
+    return np.column_stack([np.cos(a), np.sin(a), rng.uniform(*height) * (t - 0.5)])
 
 
 def spiral(t: Array, rng: Rng) -> Array:
@@ -108,7 +108,7 @@ DRAWN: dict[str, tuple[Curve, str, Array]] = {
     "trefoil": (trefoil, "D3", ABOUT_Z_OVER_Y),
     "sigmoid": (sigmoid, "C2h", ABOUT_Z),
     "arch": (arch, "C2v", ABOUT_X),
-    "helix": (helix, "C2", ABOUT_X),
+    "helix": (partial(helix, (1.2, 2.2), (2.0, 3.0)), "C2", ABOUT_X),
     "spiral": (spiral, "Cs", ABOUT_Z),
     "cable": (cable, "C1", ABOUT_Z),
 }

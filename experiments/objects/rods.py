@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from experiments.objects.built_symmetry import Truth
-from experiments.objects.curves import ABOUT_X, ABOUT_Z, CORNERS, DRAWN, TURN, Curve
+from experiments.objects.curves import ABOUT_X, ABOUT_Z, CORNERS, DRAWN, Curve, helix
 from experiments.objects.instances import Build, Instance
 from experiments.objects.lathe import Rng
 from symrefine.geometry import Array, unit
@@ -26,8 +26,7 @@ ASIDE = 0.08
 
 def spring(t: Array, rng: Rng) -> Array:
     """C2 about x: a helix of some turns."""
-    a = rng.uniform(2.5, 6.0) * TURN * (t - 0.5)
-    return np.column_stack([np.cos(a), np.sin(a), rng.uniform(2.0, 4.0) * (t - 0.5)])
+    return helix((2.5, 6.0), (2.0, 4.0), t, rng)
 
 
 def bent(t: Array, rng: Rng) -> Array:

@@ -16,6 +16,7 @@ import numpy as np
 from experiments.objects.curves import Curve
 from experiments.objects.rods import BENT, along
 from experiments.objects.shapes import SHAPES, sample
+from symrefine.detection.measure import PLANES
 from symrefine.geometry import Array, tight_diagonal
 from symrefine.shape import Index, Shape
 from symrefine.surface.misses import disc_distances, halves, needs, noise_distances
@@ -23,8 +24,6 @@ from symrefine.surface.skin import LocalPlanes, Skin, drawn, make_skin
 
 COUNTS = (800, 2000, 6000, 20000)
 NOISES = (0.0, 0.01)
-# Local planes of a cloud, as `detect` takes them.
-PLANES = 8000
 Sampled = Callable[[int, np.random.Generator], Array]
 
 
