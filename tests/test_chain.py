@@ -349,6 +349,11 @@ def test_a_round_group_shows_what_was_seen_across_its_axis_all_around_it(name):
     assert not pool.shows(turned("C3", 2.0, 0.7), 0.03)
     assert not pool.shows(turned("C5", 2.0, tilt), 0.03)
     assert not pool.shows(turned("Cs", 2.0), 0.03)
+    # There it tells of itself, and of what noise leaves no better at a glance.
+    assert pool.shows(turned("Cs", 0.31), 0.03)
+    assert not pool.shows(turned("Cs", 0.35), 0.03)
+    assert not pool.shows(turned("Cs", 0.31), 0.015)
+    assert replace(pool, nothing=0.02).shows(turned("Cs", 0.31), 0.015)
 
 
 def test_a_start_that_looks_no_better_is_not_looked_at_where_a_look_has_been():
@@ -402,7 +407,11 @@ def test_beside_what_is_exact_only_what_goes_with_it_is_wanted():
         assert not pool("C19").wants(start(name, tilt), START_ERROR)
         assert pool("C19", need=0.01).wants(start(name, tilt), START_ERROR)
         assert pool("C19", unseen=0.01).wants(start(name, tilt), START_ERROR)
+        assert pool("C5", unseen=0.01).wants(start(name, tilt), START_ERROR)
+    for name, tilt in (("Cs", oblique), ("C2", oblique), ("S14", 0.0), ("Oh", 0.0), ("C3", 1.38)):
         assert pool("C5").wants(start(name, tilt), START_ERROR)
+    for name, tilt in (("C2", 0.8), ("C7", 0.5), ("C14", 0.0), ("C3", across), ("Cinfv", across), ("C4", oblique)):
+        assert not pool("C5").wants(start(name, tilt), START_ERROR)
     assert not pool("C19").wants(start("Cs", nearly - START_ERROR), START_ERROR)
     assert pool("C19").wants(start("Cs", nearly - START_ERROR), 2.0 * START_ERROR)
     assert not pool("Oh").wants(start("C5", oblique), START_ERROR)

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from itertools import product
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from symrefine.groups import (
     is_subgroup,
     point_group,
 )
+from symrefine.groups.closure import may_be_in_one
 from symrefine.groups.plane import PointGroup2D
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -729,3 +731,20 @@ def test_the_turn_of_a_map_is_the_angle_it_was_made_with(det: int) -> None:
     assert turn_rad(made) == pytest.approx(angle)
     assert turn_rad(det * np.eye(1)) == turn_rad(np.diag([1.0, 1.0, det])) == 0.0
     assert turn_rad(np.diag([-1.0, -1.0, 1.0, det])) == pytest.approx(np.pi)
+
+
+@pytest.mark.parametrize("one", ["Cs", "C2", "C3", "C5", "C7", "C2v", "C3h", "D3", "S4", "S10", "D5", "T"])
+def test_groups_that_generate_a_finite_one_may_be_in_one(one):
+    """Wherever they stand; of turns about crossing axes those that generate none may not."""
+    rng = np.random.default_rng(len(one) + ord(one[-1]))
+    crossed = [math.degrees(math.acos(c)) for c in (1 / math.sqrt(3), math.sqrt(2 / 3), 1 / 3, math.sqrt(5) / 3)]
+    crossed += [63.4349488, 37.3773681, 31.7174744, *range(0, 91, 15), 7.0]
+    for other, degrees in product(["Cs", "Ci", "C2", "C3", "C4", "C5", "C6", "C4v", "D3", "C3h", "S6"], crossed):
+        known = point_group(one, random_orthogonal(rng, det=1))
+        turn = rotation(known.frame[0], math.radians(degrees)) @ known.frame.T @ rotation([0, 0, 1], rng.uniform(0, 6))
+        placed = point_group(other, turn.T)
+        finite = close(np.concatenate([known.operations(), placed.operations()]), 1e-3).finite
+        may = may_be_in_one(known, placed, 1e-4)
+        assert may >= finite
+        if one in ("C2", "C3", "C5", "C7") and other[1:].isdigit() and other[0] == "C" and degrees == 7.0:
+            assert may == (max(known.symbol.fold, placed.symbol.fold) <= 2)

@@ -158,7 +158,6 @@ KIND_OF = {
         "units": "EVERYDAY_M",
     },
     "given": {
-        "decide.pool": "CROSSED",
         "fit.residual": "SIZE",
         "groups.standard": "GOLDEN",
         "ntuples.contract": "PAPER_ORDERS",

@@ -8,15 +8,14 @@ import numpy as np
 
 from symrefine.decide.hypotheses import NOTHING, Hypothesis, has_all
 from symrefine.decide.posterior import ALIKE
-from symrefine.fit.placed import SAMPLED, Placed
+from symrefine.fit.placed import Placed
 from symrefine.groups import PointGroup, is_subgroup
+from symrefine.groups.closure import may_be_in_one
 from symrefine.groups.elements import DIRECTION_ERROR_RAD
 from symrefine.rounding import START_ERROR
 
 # Groups of points that no other one but that of a ball contains.
 MAXIMAL = ("Oh", "Ih")
-# Axes of more folds than this, which an icosahedron has, cross no other axes but those of half turns.
-CROSSED = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -71,14 +70,13 @@ class Pool:
         """Whether a group is in none that is as good as exact, and something may hold both it and the largest.
 
         The largest, if it needs nothing, is in every larger one, and of those that hold all of a cube or an icosahedron
-        there is but that of a ball. Where it keeps all that was seen and turns by more folds than axes that cross
-        others, every larger one has all its operations along or across its axis, from which a start may be so far off.
+        there is but that of a ball. Where it keeps all that was seen, a start that may be so far off has to stand where
+        some point group holds it, too.
         """
         alone = self.largest.group.name in MAXIMAL and self.largest.need <= self.nothing
         if self.has(start) or (alone and start.group.name != "Kh"):
             return False
-        turns = self.largest.group.symbol.fold > CROSSED and self._keeps_all
-        return not turns or _goes_with(start.group, self.largest.group, error_rad)
+        return not self._keeps_all or may_be_in_one(self.largest.group, start.group, error_rad)
 
     def met(self, placed: Placed) -> bool:
         """Whether a group was fitted at this very place."""
@@ -87,13 +85,13 @@ class Pool:
     def shows(self, start: Placed, glance: float, *, whole: bool = True) -> bool:
         """Whether the largest group carries a group that was seen onto this one, which looks no better at a glance.
 
-        Of what is in a continuous group something may hold better than the rest, and a start is too rough to tell.
+        Of what is in a continuous group something may hold better than the rest: there a start tells of itself alone.
         Where the `whole` was not seen, operations carry what was onto what was not: one shows itself alone there. Where
         the largest keeps all that was seen, what it carries a group to needs as much, and looks so but for the sample.
         """
-        if not self.largest.group.is_finite and self.largest.holds(start):
-            return False
+        inside = not self.largest.group.is_finite and self.largest.holds(start)
         exact, fold, name = self._keeps_all, self.largest.group.symbol.fold, start.group.name
+        glance = math.hypot(glance, self.nothing)  # by less no two starts differ
         alike = [p for p, need in self.seen if p.group.name == name and need < ALIKE * glance]
         # From another start, no worse than this one, a look came to where this one stands.
         worst = (ALIKE if exact else 1.0) * glance
@@ -101,10 +99,11 @@ class Pool:
         alike += [end for end in ends if np.linalg.norm(end.center - start.center) < START_ERROR]
         # A quarter of a turn lies half way between mirrors of two kinds.
         within = min(START_ERROR, 0.5 * math.pi / fold) if exact and 0 < fold < math.inf else START_ERROR
+        within = DIRECTION_ERROR_RAD if inside else within
         return any(
             is_same(image, start, within)
             for p in alike
-            for image in (_images(p, self.largest.group, start) if whole or exact else [p])
+            for image in (_images(p, self.largest.group, start) if (whole or exact) and not inside else [p])
         )
 
     @property
@@ -126,22 +125,6 @@ def is_at(a: Placed, b: Placed) -> bool:
 def is_same(a: Placed, b: Placed, within_rad: float = START_ERROR) -> bool:
     """Whether two groups are one, as far as directions tell that may be so far apart."""
     return a.group.name == b.group.name and has_all(a, b, within_rad)
-
-
-def _goes_with(group: PointGroup, exact: PointGroup, error_rad: float) -> bool:
-    """Whether something may hold a group, which may stand so far off, and one that turns by many folds."""
-    if group.name == "Kh":
-        return True
-    axis = exact.frame[2]
-    # What is off by an angle takes an axis to where it is off by twice as much.
-    least = math.cos(2.0 * error_rad)
-    if np.abs(group.sampled(SAMPLED).operations() @ axis @ axis).min() < least:
-        return False
-    one, other = group.symbol.fold, exact.symbol.fold
-    if math.isinf(one) or math.isinf(other) or abs(group.frame[2] @ axis) < least:
-        return True
-    # Of turns too many to be told apart what is round has all, which is asked for by itself.
-    return math.lcm(max(int(one), 1), int(other)) <= max(one, other, math.pi / START_ERROR)
 
 
 def _images(known: Placed, group: PointGroup, wanted: Placed) -> Iterator[Placed]:

@@ -5,8 +5,10 @@ are all known, so the closure is found as the smallest one that, suitably placed
 tolerance: around a common axis by whole steps (`axial`), otherwise by trying the seven polyhedral groups.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +17,7 @@ from symrefine.errors import InputError
 from symrefine.geometry import Array
 from symrefine.groups.axial import axial_operations
 from symrefine.groups.identify import POLYHEDRAL, has_alike, identify, polyhedral_start
-from symrefine.groups.names import parse
+from symrefine.groups.names import TURNS, parse
 from symrefine.groups.orthogonal import Index, nearest_orthogonal, register
 from symrefine.groups.point_group import PointGroup
 from symrefine.groups.standard import standard_operations
@@ -66,6 +68,51 @@ def close(
         if tried[-1].error_rad <= tolerance_rad:
             return tried[-1]
     return _not_finite(tried, tolerance_rad)
+
+
+def may_be_in_one(known: PointGroup, other: PointGroup, error_rad: float) -> bool:
+    """Whether some point group may hold a group where it stands and another one, which may stand so far off.
+
+    The main axes of two that are not polyhedral tell: where they cross they do as in a cube or an icosahedron, or one
+    of them is an axis of half turns, or a mirror, across. What turns by more folds than axes there keeps its axis under
+    all operations of the other.
+    """
+    if {"Kh", "Ci", "C1"} & {known.name, other.name}:
+        return True
+    least = math.cos(2.0 * error_rad)  # what is off by an angle takes an axis to where it is off by twice as much
+    for one, another in ((known, other), (other, known)):
+        members, axis = another.sampled(TURNS).operations(), one.frame[2]
+        if one.symbol.fold > _most_crossed() and np.abs(members @ axis @ axis).min() < least:
+            return False
+    apart, folds = abs(float(known.frame[2] @ other.frame[2])), (known.symbol.fold, other.symbol.fold)
+    if apart >= math.cos(error_rad):
+        # Of turns too many to be told apart what is round has all, which is asked for by itself.
+        return math.inf in folds or math.lcm(*(max(int(f), 1) for f in folds)) <= max(*folds, TURNS)
+    across = apart <= math.sin(error_rad) and min(folds) <= 2
+    if across or min(folds) == 0 or max(folds) <= 2 or max(folds) > _most_crossed():
+        return True  # two mirrors or half turns make a turn by any angle
+    crossings = _crossings(int(folds[0]), int(folds[1]))
+    return bool(np.abs(math.acos(apart) - crossings).min(initial=math.inf) <= error_rad)
+
+
+@cache
+def _most_crossed() -> float:
+    """The most folds of an axis that crosses others than those of half turns: those of an icosahedron."""
+    return max(fold for _, fold in PointGroup(name=POLYHEDRAL[-1]).rotation_axes())
+
+
+@cache
+def _crossings(one: int, other: int) -> Array:
+    """Angles [A] up to a right one at which axes of so many folds cross in a cube or an icosahedron; 1 is a mirror."""
+    found = []
+    for whole in (PointGroup(name=name) for name in ("Oh", "Ih")):
+        turns = whole.rotation_axes()
+        a, b = (
+            whole.mirrors() if fold == 1 else np.array([u for u, most in turns if most % fold == 0]).reshape(-1, 3)
+            for fold in (one, other)
+        )
+        found.append(np.arccos(np.clip(np.abs(a @ b.T), 0.0, 1.0)).ravel())
+    return np.unique(np.concatenate(found).round(6))
 
 
 def _candidates(generators: Array, tolerance_rad: float, orders: Index) -> Iterator[PointGroup]:
