@@ -418,6 +418,33 @@ def test_beside_what_is_exact_only_what_goes_with_it_is_wanted():
     assert pool("Oh").wants(start("Kh", oblique), START_ERROR)
 
 
+def test_what_is_exact_carries_fits_though_something_larger_holds_worse():
+    """A rotor in noise is first found with mirrors through its axis that need more than its turns."""
+    frame = random_orthogonal(np.random.default_rng(8), 3, 1)
+    element = of("C3").elements[0]
+
+    def across(azimuth):
+        axis = rotation(frame[2], azimuth) @ frame[0]
+        return Placed(group=point_group("Cs", frame_with_z(axis)), center=ORIGIN)
+
+    turns, mirrored = (
+        Hypothesis(placed=Placed(group=point_group(name, frame), center=ORIGIN), elements=(element,), need=need)
+        for name, need in (("C23", 0.0), ("C23v", 0.01))
+    )
+    fitted_mirror = Hypothesis(placed=across(0.01), elements=(element,), need=0.01)
+    pool = Pool(largest=mirrored, small=(turns, fitted_mirror), nothing=0.005)
+    assert pool.exact is turns
+    assert pool.met(across(0.01 + 2.0 * np.pi / 23 * 7))
+    assert not pool.met(across(0.08 + 2.0 * np.pi / 23 * 7))
+    assert pool.shows(across(0.01 + 2.0 * np.pi / 23 * 7), 0.01, whole=False)
+    oblique = Placed(group=point_group("C3", frame_with_z(frame[2] + frame[0])), center=ORIGIN)
+    assert not pool.wants(oblique, START_ERROR)
+    worse = replace(pool, small=(replace(turns, need=0.006), fitted_mirror))
+    assert worse.exact is NOTHING
+    assert not worse.met(across(0.01 + 2.0 * np.pi / 23 * 7))
+    assert worse.wants(oblique, START_ERROR)
+
+
 def test_what_needs_but_belief_shows_its_elements():
     """Of what was seen nothing denies it: a look at one of them would end where it stands."""
     frame = random_orthogonal(np.random.default_rng(3), det=1)

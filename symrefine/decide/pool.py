@@ -66,51 +66,52 @@ class Pool:
         most = self.nothing
         return any(h.need <= math.hypot(most, h.believed) and h.holds(placed) for h in (self.largest, *self.small))
 
-    def wants(self, start: Placed, error_rad: float) -> bool:
-        """Whether a group is in none that is as good as exact, and something may hold both it and the largest.
+    @property
+    def exact(self) -> Hypothesis:
+        """The largest group that needs nothing and carries all that was seen onto what was; `NOTHING` if none does."""
+        found = (h for h in (self.largest, *self.small) if h.need <= self.nothing and h.elements)
+        every = (h for h in found if not any(e.coverage.unseen > 0.0 for e in h.elements))
+        return max(every, key=lambda h: h.group.order, default=NOTHING)
 
-        The largest, if it needs nothing, is in every larger one, and of those that hold all of a cube or an icosahedron
-        there is but that of a ball. Where it keeps all that was seen, a start that may be so far off has to stand where
-        some point group holds it, too.
+    def wants(self, start: Placed, error_rad: float) -> bool:
+        """Whether a group is in none that is as good as exact, and something may hold both it and what is.
+
+        What is exact is in every larger group: a start that may be so far off has to stand where some point group holds
+        it, too. Of those that hold all of a cube or an icosahedron there is but that of a ball.
         """
-        alone = self.largest.group.name in MAXIMAL and self.largest.need <= self.nothing
-        if self.has(start) or (alone and start.group.name != "Kh"):
+        exact = self.exact.group
+        if self.has(start) or (exact.name in MAXIMAL and start.group.name != "Kh"):
             return False
-        return not self._keeps_all or may_be_in_one(self.largest.group, start.group, error_rad)
+        return may_be_in_one(exact, start.group, error_rad)
 
     def met(self, placed: Placed) -> bool:
-        """Whether a group was fitted at this very place."""
-        return any(is_at(h.placed, placed) for h in self.small)
+        """Whether a group was fitted at this very place, or where one that is exact carries it."""
+        alike = (h.placed for h in self.small if h.group.name == placed.group.name)
+        return any(is_at(image, placed) for p in alike for image in _images(p, self.exact.group, placed))
 
     def shows(self, start: Placed, glance: float, *, whole: bool = True) -> bool:
         """Whether the largest group carries a group that was seen onto this one, which looks no better at a glance.
 
         Of what is in a continuous group something may hold better than the rest: there a start tells of itself alone.
-        Where the `whole` was not seen, operations carry what was onto what was not: one shows itself alone there. Where
-        the largest keeps all that was seen, what it carries a group to needs as much, and looks so but for the sample.
+        Where the `whole` was not seen, operations carry what was onto what was not: one shows itself alone there. But
+        what is exact carries a group to where it needs as much, and looks so but for the sample.
         """
         inside = not self.largest.group.is_finite and self.largest.holds(start)
-        exact, fold, name = self._keeps_all, self.largest.group.symbol.fold, start.group.name
+        exact, name = self.exact.group, start.group.name
         glance = math.hypot(glance, self.nothing)  # by less no two starts differ
         alike = [p for p, need in self.seen if p.group.name == name and need < ALIKE * glance]
         # From another start, no worse than this one, a look came to where this one stands.
-        worst = (ALIKE if exact else 1.0) * glance
+        worst = (1.0 if exact.name == "C1" else ALIKE) * glance
         ends = (end for seemed, end in self.looks if end.group.name == name and seemed <= worst)
         alike += [end for end in ends if np.linalg.norm(end.center - start.center) < START_ERROR]
         # A quarter of a turn lies half way between mirrors of two kinds.
-        within = min(START_ERROR, 0.5 * math.pi / fold) if exact and 0 < fold < math.inf else START_ERROR
+        fold = exact.symbol.fold
+        within = min(START_ERROR, 0.5 * math.pi / fold) if 0 < fold < math.inf else START_ERROR
         within = DIRECTION_ERROR_RAD if inside else within
-        return any(
-            is_same(image, start, within)
-            for p in alike
-            for image in (_images(p, self.largest.group, start) if (whole or exact) and not inside else [p])
-        )
-
-    @property
-    def _keeps_all(self) -> bool:
-        """Whether the largest group carries all that was seen onto what was."""
-        unseen = (e.coverage.unseen > 0.0 for e in self.largest.elements)
-        return bool(self.largest.elements) and self.largest.need <= self.nothing and not any(unseen)
+        carrying = [self.largest.group] if whole and not inside else []
+        carrying += [exact] if exact.is_finite or not inside else []
+        images = (image for p in alike for group in carrying for image in _images(p, group, start))
+        return any(is_same(image, start, within) for image in images)
 
     def with_failed(self, failed: Hypothesis | None) -> "Pool":
         """The pool that knows of a group, if there is one, that it does not hold."""
