@@ -81,9 +81,10 @@ def may_be_in_one(known: PointGroup, other: PointGroup, error_rad: float) -> boo
         return True
     least = math.cos(2.0 * error_rad)  # what is off by an angle takes an axis to where it is off by twice as much
     for one, another in ((known, other), (other, known)):
-        members, axis = another.sampled(TURNS).operations(), one.frame[2]
-        if one.symbol.fold > _most_crossed() and np.abs(members @ axis @ axis).min() < least:
-            return False
+        if one.symbol.fold > _most_crossed():
+            members, axis = another.sampled(TURNS).operations(), one.frame[2]
+            if np.abs(members @ axis @ axis).min() < least:
+                return False
     apart, folds = abs(float(known.frame[2] @ other.frame[2])), (known.symbol.fold, other.symbol.fold)
     if apart >= math.cos(error_rad):
         # Of turns too many to be told apart what is round has all, which is asked for by itself.
