@@ -94,10 +94,11 @@ class Pool:
 
         Of what is in a continuous group something may hold better than the rest: there a start tells of itself alone.
         Where the `whole` was not seen, operations carry what was onto what was not: one shows itself alone there. But
-        what is exact carries a group to where it needs as much, and looks so but for the sample.
+        what is exact carries a group to where it needs as much, and looks so but for the sample, if it is the largest.
         """
         inside = not self.largest.group.is_finite and self.largest.holds(start)
-        exact, name = self.exact.group, start.group.name
+        # At a glance noise hides how what is larger differs: then each is looked at.
+        exact, name = (self.exact if self.exact is self.largest else NOTHING).group, start.group.name
         glance = math.hypot(glance, self.nothing)  # by less no two starts differ
         alike = [p for p, need in self.seen if p.group.name == name and need < ALIKE * glance]
         # From another start, no worse than this one, a look came to where this one stands.
