@@ -10,12 +10,9 @@ from symrefine.decide.hypotheses import NOTHING, Hypothesis, has_all
 from symrefine.decide.posterior import ALIKE
 from symrefine.fit.placed import Placed
 from symrefine.groups import PointGroup, is_subgroup
-from symrefine.groups.closure import may_be_in_one
+from symrefine.groups.closure import MAXIMAL, may_be_in_one
 from symrefine.groups.elements import DIRECTION_ERROR_RAD
 from symrefine.rounding import START_ERROR
-
-# Groups of points that no other one but that of a ball contains.
-MAXIMAL = ("Oh", "Ih")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -86,8 +83,8 @@ class Pool:
 
     def met(self, placed: Placed) -> bool:
         """Whether a group was fitted at this very place, or where one that is exact carries it."""
-        alike = (h.placed for h in self.small if h.group.name == placed.group.name)
-        return any(is_at(image, placed) for p in alike for image in _images(p, self.exact.group, placed))
+        exact, alike = self.exact.group, (h.placed for h in self.small if h.group.name == placed.group.name)
+        return any(is_at(image, placed) for p in alike for image in _images(p, exact, placed))
 
     def shows(self, start: Placed, glance: float, *, whole: bool = True) -> bool:
         """Whether the largest group carries a group that was seen onto this one, which looks no better at a glance.
@@ -98,7 +95,7 @@ class Pool:
         """
         inside = not self.largest.group.is_finite and self.largest.holds(start)
         # At a glance noise hides how what is larger differs: then each is looked at.
-        exact, name = (self.exact if self.exact is self.largest else NOTHING).group, start.group.name
+        exact, name = (self.largest if self.exact is self.largest else NOTHING).group, start.group.name
         glance = math.hypot(glance, self.nothing)  # by less no two starts differ
         alike = [p for p, need in self.seen if p.group.name == name and need < ALIKE * glance]
         # From another start, no worse than this one, a look came to where this one stands.
@@ -109,10 +106,8 @@ class Pool:
         fold = exact.symbol.fold
         within = min(START_ERROR, 0.5 * math.pi / fold) if 0 < fold < math.inf else START_ERROR
         within = DIRECTION_ERROR_RAD if inside else within
-        carrying = [self.largest.group] if whole and not inside else []
-        carrying += [exact] if exact.is_finite or not inside else []
-        images = (image for p in alike for group in carrying for image in _images(p, group, start))
-        return any(is_same(image, start, within) for image in images)
+        carrying = NOTHING.group if inside else self.largest.group if whole else exact
+        return any(is_same(image, start, within) for p in alike for image in _images(p, carrying, start))
 
     def with_failed(self, failed: Hypothesis | None) -> "Pool":
         """The pool that knows of a group, if there is one, that it does not hold."""
@@ -130,7 +125,8 @@ def is_same(a: Placed, b: Placed, within_rad: float = START_ERROR) -> bool:
 
 
 def _images(known: Placed, group: PointGroup, wanted: Placed) -> Iterator[Placed]:
-    """Where operations carry a placed group that bring its axis near that of another one."""
+    """A placed group, and where operations carry it that bring its axis near that of another one."""
+    yield known  # axes tell nothing of the inversion, and those of half turns may stand for one another
     axis, goal = known.group.frame[2], wanted.group.frame[2]
     for operation in group.bringing(axis, goal):
         if abs(goal @ operation @ axis) > np.cos(START_ERROR):

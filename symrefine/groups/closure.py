@@ -22,6 +22,9 @@ from symrefine.groups.orthogonal import Index, nearest_orthogonal, register
 from symrefine.groups.point_group import PointGroup
 from symrefine.groups.standard import standard_operations
 
+# Groups of points that no other one but that of a ball contains.
+MAXIMAL = ("Oh", "Ih")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Closure:
@@ -99,14 +102,14 @@ def may_be_in_one(known: PointGroup, other: PointGroup, error_rad: float) -> boo
 @cache
 def _most_crossed() -> float:
     """The most folds of an axis that crosses others than those of half turns: those of an icosahedron."""
-    return max(fold for _, fold in PointGroup(name=POLYHEDRAL[-1]).rotation_axes())
+    return max(fold for _, fold in PointGroup(name=MAXIMAL[-1]).rotation_axes())
 
 
 @cache
 def _crossings(one: int, other: int) -> Array:
     """Angles [A] up to a right one at which axes of so many folds cross in a cube or an icosahedron; 1 is a mirror."""
     found = []
-    for whole in (PointGroup(name=name) for name in ("Oh", "Ih")):
+    for whole in (PointGroup(name=name) for name in MAXIMAL):
         turns = whole.rotation_axes()
         a, b = (
             whole.mirrors() if fold == 1 else np.array([u for u, most in turns if most % fold == 0]).reshape(-1, 3)
