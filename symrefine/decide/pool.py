@@ -65,13 +65,16 @@ class Pool:
 
     @property
     def exact(self) -> Hypothesis:
-        """The largest group that needs nothing and carries all that was seen onto what was; `NOTHING` if none does."""
-        found = (h for h in (self.largest, *self.small) if h.need <= self.nothing and h.elements)
-        every = (h for h in found if not any(e.coverage.unseen > 0.0 for e in h.elements))
-        return max(every, key=lambda h: h.group.order, default=NOTHING)
+        """The largest group if it needs nothing and carries all that was seen onto what was, or else `NOTHING`.
+
+        No smaller one: where noise hides what it needs it hides where it stands as well, and something larger tells.
+        """
+        found = self.largest
+        keeps = bool(found.elements) and not any(e.coverage.unseen > 0.0 for e in found.elements)
+        return found if keeps and found.need <= self.nothing else NOTHING
 
     def wants(self, start: Placed, error_rad: float) -> bool:
-        """Whether a group is in none that is as good as exact, and something may hold both it and what is.
+        """Whether a group is in none that is as good as exact, and something may hold both it and the exact largest.
 
         What is exact is in every larger group: a start that may be so far off has to stand where some point group holds
         it, too. Of those that hold all of a cube or an icosahedron there is but that of a ball.
@@ -82,20 +85,18 @@ class Pool:
         return may_be_in_one(exact, start.group, error_rad)
 
     def met(self, placed: Placed) -> bool:
-        """Whether a group was fitted at this very place, or where one that is exact carries it."""
-        exact, alike = self.exact.group, (h.placed for h in self.small if h.group.name == placed.group.name)
-        return any(is_at(image, placed) for p in alike for image in _images(p, exact, placed))
+        """Whether a group was fitted at this very place."""
+        return any(is_at(h.placed, placed) for h in self.small)
 
     def shows(self, start: Placed, glance: float, *, whole: bool = True) -> bool:
         """Whether the largest group carries a group that was seen onto this one, which looks no better at a glance.
 
         Of what is in a continuous group something may hold better than the rest: there a start tells of itself alone.
         Where the `whole` was not seen, operations carry what was onto what was not: one shows itself alone there. But
-        what is exact carries a group to where it needs as much, and looks so but for the sample, if it is the largest.
+        what is exact carries a group to where it needs as much, and looks so but for the sample.
         """
         inside = not self.largest.group.is_finite and self.largest.holds(start)
-        # At a glance noise hides how what is larger differs: then each is looked at.
-        exact, name = (self.largest if self.exact is self.largest else NOTHING).group, start.group.name
+        exact, name = self.exact.group, start.group.name
         glance = math.hypot(glance, self.nothing)  # by less no two starts differ
         alike = [p for p, need in self.seen if p.group.name == name and need < ALIKE * glance]
         # From another start, no worse than this one, a look came to where this one stands.
