@@ -445,6 +445,16 @@ def test_what_noise_hides_the_needs_of_tells_of_nothing_but_itself_once_somethin
     assert not largest.wants(Placed(group=point_group("C3", oblique), center=ORIGIN), START_ERROR)
 
 
+@pytest.mark.parametrize("name", ["Ci", "D2", "O"])
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_group_shows_itself_whichever_of_its_axes_comes_first(name, whole):
+    frame = random_orthogonal(np.random.default_rng(11), 3, 1)
+    known, again = (Placed(group=point_group(name, f), center=ORIGIN) for f in (frame, np.roll(frame, 1, axis=0)))
+    pool = Pool(looked=((known, 0.03),))
+    assert pool.shows(again, 0.03, whole=whole)
+    assert not pool.shows(replace(again, group=point_group("C2", again.group.frame)), 0.03, whole=whole)
+
+
 def test_what_needs_but_belief_shows_its_elements():
     """Of what was seen nothing denies it: a look at one of them would end where it stands."""
     frame = random_orthogonal(np.random.default_rng(3), det=1)
