@@ -179,6 +179,39 @@ def test_what_is_sampled_sparsely_beside_a_dense_part_is_no_stray(name):
     assert len(sampling(made.points, np.random.default_rng(0), outliers=True).strays) < 0.02 * len(made.points)
 
 
+@pytest.mark.parametrize(
+    ("name", "group"),
+    [("bottle", "Cinfv"), *(pytest.param(*k, marks=pytest.mark.slow) for k in (("table", "C4v"), ("fan3", "C3")))],
+)
+def test_patches_that_are_sampled_sparsely_hide_nothing(name, group):
+    points, _ = posed(damage.patchy(specimen("shape", name)[0], 10.0, np.random.default_rng(5)).points, 6)
+    found = detect(points)
+    assert found.point_group == group
+    assert found.confidence > 0.7
+
+
+def test_what_is_known_to_be_of_the_surface_is_no_stray():
+    made = damage.outliers(table(), 0.05, np.random.default_rng(1))
+    every = sampling(made.points, np.random.default_rng(0), outliers=True).strays
+    known = every[::2]
+    left = sampling(made.points, np.random.default_rng(0), outliers=True, sparse=known)
+    assert np.isin(known, left.kept).all()
+    assert not np.isin(known, left.strays).any()
+    assert np.isin(left.strays, every).mean() > 0.95
+
+
+@pytest.mark.slow
+def test_strays_that_a_group_carries_onto_the_surface_are_none():
+    """Sparse parts between dense ones look strewn; strays are far from the surface, and so are their images."""
+    some = np.random.default_rng(0).permutation(damage.POINTS)[:5000]
+    sparse = damage.patchy(specimen("shape", "table")[0], 10.0, np.random.default_rng(1)).points[some]
+    assert len(sampling(sparse, np.random.default_rng(0), outliers=True).strays) > 0.006 * len(sparse)
+    assert len(detect(sparse).outliers) == 0
+    points = damage.outliers(specimen("shape", "skew_box")[0], 0.05, np.random.default_rng(2)).points
+    strays = sampling(points, np.random.default_rng(0), outliers=True).strays
+    np.testing.assert_array_equal(detect(points).outliers, strays)
+
+
 @pytest.mark.parametrize("dense", [12000, 14000])
 def test_walls_near_one_another_are_no_strays_however_dense_another_part_is(dense):
     # The neighbours of a point lie in both walls of a cup, so that they are no plane: but they thin out as a surface.

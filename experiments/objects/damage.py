@@ -1,4 +1,4 @@
-"""What sensors do to a cloud: strays, clumps, a floor, uneven density, holes, cuts, and views from a camera.
+"""What sensors do to a cloud: strays, clumps, a floor, uneven density, patches, holes, cuts, and views from a camera.
 
 Every damage takes a mesh and a strength and returns the points that are left, in the units of the mesh, with what is
 known of each. Strengths are shares of the points, ratios of densities, or numbers of cameras.
@@ -21,6 +21,8 @@ Rng = np.random.Generator
 POINTS, NOISE_REL = 20000, 0.003
 # Strays lie in the bounding box, so many times as large; a clump is so large, in diagonals.
 BOX, CLUMP_REL = 1.5, 0.04
+# Of a surface that is seen badly here and there.
+PATCHES = 6
 # A camera stands so many diagonals away; rays of a view that meet the object, about.
 AWAY, RAYS = 2.0, 10000
 # Noise of the depth and its steps, in diagonals; the share of pixels at edges that fly between front and back.
@@ -107,6 +109,14 @@ def dense(mesh: Shape, ratio: float, rng: Rng) -> Damaged:
     points = _whole(mesh, rng, 10 * POINTS)
     away = np.linalg.norm(points - points[rng.integers(len(points))], axis=1)
     chance = np.where(away < np.quantile(away, 0.1), ratio, 1.0)
+    return _left(points[rng.choice(len(points), POINTS, replace=False, p=chance / chance.sum())])
+
+
+def patchy(mesh: Shape, ratio: float, rng: Rng) -> Damaged:
+    """A fifth of the surface, in patches, so many times less dense than the rest: where it is dark, or shines."""
+    points = _whole(mesh, rng, 10 * POINTS)
+    away, _ = cKDTree(points[rng.choice(len(points), PATCHES, replace=False)]).query(points)
+    chance = np.where(away < np.quantile(away, 0.2), 1.0 / ratio, 1.0)
     return _left(points[rng.choice(len(points), POINTS, replace=False, p=chance / chance.sum())])
 
 
@@ -221,6 +231,7 @@ KINDS: dict[str, tuple[Damage, tuple[float, ...]]] = {
     "floor": (ground, (1.1, 1.5, 3.0)),
     "tabletop": (tabletop, (1.0, 2.0)),
     "dense": (dense, (10.0, 30.0)),
+    "patchy": (patchy, (10.0, 30.0)),
 }
 # Kinds of which it is told that there is a floor.
 FLOORS = ("floor", "tabletop")

@@ -9,7 +9,7 @@ import numpy as np
 from symrefine.clock import Clock
 from symrefine.decide.chain import chain
 from symrefine.decide.explore import explore
-from symrefine.decide.looks import unmet_by
+from symrefine.decide.looks import few_motions, unmet_by
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import ALIKE, least_told
 from symrefine.detection.examined import Examined
@@ -20,7 +20,7 @@ from symrefine.samples import COUNT, FOLLOWED, LOOK
 from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import CLUMP, COUNTERPART, Clump, clump_among
 from symrefine.surface.floor import Floor
-from symrefine.surface.misses import TOLERANCE, disc_distances
+from symrefine.surface.misses import SHARES, TOLERANCE, disc_distances
 from symrefine.surface.tree import Tree
 
 
@@ -71,15 +71,21 @@ def _likeliest(
 ) -> Examined:
     """What is found where that is set apart which alone hides a symmetry, and where no part of the object is.
 
-    What seems to be a part may be a clump by the axis of a larger group all the same, and then hides that.
+    Sparse parts of a surface that look strewn are parts of it, where larger groups say so. What seems to be a part may
+    be a clump by the axis of a larger group all the same, and then hides that.
     """
+    points = (shape.sample if isinstance(shape, Sketch) else shape).points
     found = examine(apart=True)
+    if outliers and (sparse := _carried(found, points, tolerance)).size:
+        fuller = partial(examine, sparse=sparse)
+        told = fuller(apart=True)
+        if _reading(told, tolerance) <= _reading(found, tolerance):
+            found, examine = told, fuller
     own, others = _told_apart(found, tolerance)
     apart, hides = not own, False
     if own:
         without, found = found, examine(apart=False, foreign=others)
         hides = without.size(tolerance) > found.size(tolerance)
-    points = (shape.sample if isinstance(shape, Sketch) else shape).points
     for suspects in (_suspects, _strangers) if outliers else ():
         # What fills a volume beside a surface is taken for a clump only where it alone hides a symmetry.
         if not (foreign := suspects(found, points, tolerance)):
@@ -124,6 +130,35 @@ def _as_atoms(
     if read.doubt(tolerance) or not read.decided(tolerance).index:
         return None
     return replace(read, outliers=found.outliers, outlier_share=found.outlier_share, sparse=True)
+
+
+def _reading(found: Examined, tolerance: float) -> tuple[float, float, float]:
+    """By what one of several readings of the same points is chosen, the least: the larger group is least by chance.
+
+    Where they agree on it, as undetermined does with C1, none is surer than the other lets it be.
+    """
+    order, continuous = max(found.size(tolerance), (1.0, 1.0))
+    decision = found.decided(tolerance)
+    sure = 0.0 if found.doubt(tolerance) else decision.probabilities[decision.index]
+    return -order, -continuous, sure
+
+
+def _carried(found: Examined, points: Array, tolerance: float) -> Index:
+    """Of points [N, 3] the strays that larger groups carry onto the surface, if they are as many as details may be.
+
+    Where a surface is sampled sparsely between dense parts its points look like strays. But of strays, which are far
+    from the surface, hardly any is carried onto it.
+    """
+    surface, strays = found.surface, found.measured.strays
+    if surface.skin is None or found.measured.views or len(strays) <= SHARES[-1] * found.measured.count:
+        return strays[:0]
+    local, carried = found.measured.moments.normalised(points[strays]), np.zeros(len(strays), dtype=bool)
+    for rival in [r for r in found.rivals(tolerance) if r.group.order > 1][:FOLLOWED]:
+        motions = few_motions(rival.placed)
+        moved = np.concatenate([m.apply(local) for m in motions])
+        met = disc_distances(surface.cloud.of_one_class(), moved) <= surface.margin
+        carried |= met.reshape(len(motions), -1).mean(axis=0) > 0.5
+    return strays[carried] if carried.sum() > SHARES[-1] * found.measured.count else strays[:0]
 
 
 def _suspects(found: Examined, _: Array, tolerance: float) -> tuple[Index, ...]:
@@ -173,12 +208,22 @@ def _examined(
     *,
     apart: bool,
     foreign: Sequence[Index] = (),
+    sparse: Index | None = None,
 ) -> Examined:
     sketch = given if isinstance(given, Sketch) else None
     shape = given.sample if isinstance(given, Sketch) else given
     with clock("moments", len(shape.points)):
         whole = sketch.moments if sketch is not None and sketch.seen else None
-        measured = measure(shape, outliers=outliers, apart=apart, foreign=foreign, floor=floor, whole=whole, seed=seed)
+        measured = measure(
+            shape,
+            outliers=outliers,
+            apart=apart,
+            foreign=foreign,
+            sparse=sparse,
+            floor=floor,
+            whole=whole,
+            seed=seed,
+        )
         out, share = set_apart(measured, sketch, outliers=outliers)
     with clock("local_planes"):
         evidence, surface = gather(measured, np.random.default_rng(seed), tolerance)

@@ -71,15 +71,19 @@ def sampling(
     groups: bool = True,
     apart: bool = True,
     foreign: Sequence[Index] = (),
+    sparse: Index | None = None,
 ) -> Sampling:
     """How points [N, 3] were sampled; with `outliers` those that belong to no surface are set apart.
 
     With `apart` clumps apart from the body are as well, and those groups that are known to be `foreign`, indices of
-    each; if none are, it is told what may be. Without `groups` nobody looks for any. Of points that
-    fill a volume only strays are set apart.
+    each; if none are, it is told what may be. Without `groups` nobody looks for any. Of points that fill a volume only
+    strays are set apart. Those that are known to be of the surface, `sparse`, are no strays however far from others.
     """
     size = len(points)
     kept: Index = np.arange(size)
+    sure = np.zeros(size, dtype=bool)
+    if sparse is not None:
+        sure[sparse] = True
     taken: list[Index] = []
     if len(points) <= AROUND or points.std() == 0.0:
         return Sampling.as_given(size)
@@ -89,7 +93,7 @@ def sampling(
     around = Surroundings.of(points[some])
     solid = _is_solid(around, points)
     if outliers and _alone(around).any() and (not solid or _stand_off(around)):
-        kept = _without_strays(points)
+        kept = _without_strays(points, sure)
         around = around_some(points[kept], rng)
     groups = groups and not solid  # nothing tells one volume from another
     if outliers and groups and apart and (found := clumps(points[kept], around)):
@@ -100,7 +104,8 @@ def sampling(
     if foreign:
         taken += [np.intersect1d(group, kept, assume_unique=True) for group in foreign]
         kept = _without(kept, taken, size)
-        kept = kept[_without_strays(points[kept])]  # the rim of what fills a volume is alone once that is gone
+        # The rim of what fills a volume is alone once that is gone.
+        kept = kept[_without_strays(points[kept], sure[kept])]
         around = around_some(points[kept], rng)
     strays = _without(np.arange(size), [kept, *taken], size)
     even, shares = _evened(points[kept], rng) if _is_uneven(around, points[kept]) else (slice(None), None)
@@ -129,15 +134,17 @@ def _without(indices: Index, parts: Sequence[Index], size: int) -> Index:
     return indices[left[indices]]
 
 
-def _without_strays(points: Array) -> Index:
+def _without_strays(points: Array, sure: Mask) -> Index:
     """Indices, ascending, of points [N, 3] but for those on no surface: far from others, in no plane with them.
+
+    Those that are `sure` [N] stay.
 
     Sparse parts of a surface are flat, more so than dense ones; strays near a surface are not in its plane. Each round
     sees clearer, as strays among strays look less alone.
     """
     kept, around = np.arange(len(points)), Surroundings.of(points)
     while True:
-        alone = _alone(around)
+        alone = _alone(around) & ~sure[kept]
         kept = kept[~alone]
         if alone.sum() <= LAST * len(points) or len(kept) <= AROUND:
             return kept
@@ -218,21 +225,31 @@ def _scattered(points: Array, body: Tree) -> bool:
 
 
 def _is_uneven(around: Surroundings, points: Array) -> bool:
-    """Whether the density of points [N, 3] falls off to one side, as a scanner's does, and puts starts off by it.
+    """Whether the density of points [N, 3] puts starts off by falling off to one side, or is much less in patches.
 
-    Flat neighbourhoods must show it as well: on thin parts it is a matter of shape how far away others are. Where those
-    of some of the points, which `around` tells of, are wide enough for that everywhere, all are asked.
+    As a scanner's does, and where a surface is dark. Flat neighbourhoods must show it as well: on thin parts it is a
+    matter of shape how far away others are. Where those of some of the points, which `around` tells of, are wide enough
+    for that everywhere, all are asked.
     """
     if not around.away[:, -1].all():
         return False  # points are repeated
-    evenness, flat = _evenness(around), around.thickness < FLAT
-    if not _drawn_aside(around.points, evenness):
-        return False
-    if flat.sum() > AROUND and not _drawn_aside(around.points[flat], evenness[flat]):
+    flat = around.thickness < FLAT
+    told = [np.ones_like(flat), flat] if flat.sum() > AROUND else [np.ones_like(flat)]
+    evenness, area = _evenness(around), _area(around, around.away[:, -1])
+    aside = all(_drawn_aside(around.points[some], evenness[some]) for some in told)
+    if not aside and not all(_is_patchy(area[some]) for some in told):
         return False
     if np.median(around.away[:, -1]) <= WIDEST:
         return True
     return len(around.points) < len(points) and _is_uneven(Surroundings.of(points), points)
+
+
+def _is_patchy(area: Array) -> bool:
+    """Whether some points stand for FAR times as much surface as most do, [N], and all of them for more than details.
+
+    What they miss is as far off as they are apart, and as dense parts are carried there, it is many more that miss.
+    """
+    return bool(area[area > FAR * np.median(area)].sum() > SHARES[-1] * area.sum())
 
 
 def face_densities(mesh: Shape, samples: Array, face: Index) -> Array | None:
@@ -282,5 +299,9 @@ def _evened(points: Array, rng: np.random.Generator) -> tuple[Index, Array]:
 def _evenness(around: Surroundings) -> Array:
     """How much surface [N] the points around each stand for in the mean, up to a factor."""
     away = around.away[:, -1]
-    area = np.minimum(away, np.quantile(away, 1.0 - SHARES[2])) ** 2
-    return np.asarray(area[around.near].mean(axis=1))
+    return _area(around, np.minimum(away, np.quantile(away, 1.0 - SHARES[2])))
+
+
+def _area(around: Surroundings, reach: Array) -> Array:
+    """The same [N] of points whose neighbours reach so far [N]."""
+    return np.asarray((reach**2)[around.near].mean(axis=1))
