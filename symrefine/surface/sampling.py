@@ -235,21 +235,22 @@ def _is_uneven(around: Surroundings, points: Array) -> bool:
         return False  # points are repeated
     flat = around.thickness < FLAT
     told = [np.ones_like(flat), flat] if flat.sum() > AROUND else [np.ones_like(flat)]
-    evenness, area = _evenness(around), _area(around, around.away[:, -1])
+    evenness, reach = _evenness(around), around.reach
     aside = all(_drawn_aside(around.points[some], evenness[some]) for some in told)
-    if not aside and not all(_is_patchy(area[some]) for some in told):
+    if not aside and not all(_is_patchy(reach[some]) for some in told):
         return False
     if np.median(around.away[:, -1]) <= WIDEST:
         return True
     return len(around.points) < len(points) and _is_uneven(Surroundings.of(points), points)
 
 
-def _is_patchy(area: Array) -> bool:
-    """Whether some points stand for FAR times as much surface as most do, [N], and all of them for more than details.
+def _is_patchy(reach: Array) -> bool:
+    """Whether some points are as far apart as strays would be, and stand together for more than details, by reach [N].
 
     What they miss is as far off as they are apart, and as dense parts are carried there, it is many more that miss.
     """
-    return bool(area[area > FAR * np.median(area)].sum() > SHARES[-1] * area.sum())
+    area = reach**2
+    return bool(area[reach > FAR * np.median(reach)].sum() > SHARES[-1] * area.sum())
 
 
 def face_densities(mesh: Shape, samples: Array, face: Index) -> Array | None:
@@ -299,9 +300,5 @@ def _evened(points: Array, rng: np.random.Generator) -> tuple[Index, Array]:
 def _evenness(around: Surroundings) -> Array:
     """How much surface [N] the points around each stand for in the mean, up to a factor."""
     away = around.away[:, -1]
-    return _area(around, np.minimum(away, np.quantile(away, 1.0 - SHARES[2])))
-
-
-def _area(around: Surroundings, reach: Array) -> Array:
-    """The same [N] of points whose neighbours reach so far [N]."""
-    return np.asarray((reach**2)[around.near].mean(axis=1))
+    area = np.minimum(away, np.quantile(away, 1.0 - SHARES[2])) ** 2
+    return np.asarray(area[around.near].mean(axis=1))
