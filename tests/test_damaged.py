@@ -190,6 +190,12 @@ def test_patches_that_are_sampled_sparsely_hide_nothing(name, group):
     assert found.confidence > 0.7
 
 
+@pytest.mark.parametrize("name", ["bracket", "methane"])
+def test_what_is_left_of_strays_makes_no_patches(name):
+    points = damage.outliers(specimen("shape", name)[0], 0.4, np.random.default_rng(21)).points
+    assert sampling(points, np.random.default_rng(0), outliers=True).shares is None
+
+
 def test_what_is_known_to_be_of_the_surface_is_no_stray():
     made = damage.outliers(table(), 0.05, np.random.default_rng(1))
     every = sampling(made.points, np.random.default_rng(0), outliers=True).strays

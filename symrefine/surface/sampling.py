@@ -108,7 +108,9 @@ def sampling(
         kept = kept[_without_strays(points[kept], sure[kept])]
         around = around_some(points[kept], rng)
     strays = _without(np.arange(size), [kept, *taken], size)
-    even, shares = _evened(points[kept], rng) if _is_uneven(around, points[kept]) else (slice(None), None)
+    # Where strays were set apart, what is left far apart are others.
+    uneven = _is_uneven(around, points[kept], patchy=len(strays) <= SHARES[-1] * size)
+    even, shares = _evened(points[kept], rng) if uneven else (slice(None), None)
     return Sampling(
         kept=kept,
         even=kept[even],
@@ -224,12 +226,12 @@ def _scattered(points: Array, body: Tree) -> bool:
     return growth(points, body) < strewn + ALONG * (spread - strewn)
 
 
-def _is_uneven(around: Surroundings, points: Array) -> bool:
+def _is_uneven(around: Surroundings, points: Array, *, patchy: bool) -> bool:
     """Whether the density of points [N, 3] puts starts off by falling off to one side, or is much less in patches.
 
-    As a scanner's does, and where a surface is dark. Flat neighbourhoods must show it as well: on thin parts it is a
-    matter of shape how far away others are. Where those of some of the points, which `around` tells of, are wide enough
-    for that everywhere, all are asked.
+    As a scanner's does, and where a surface is dark; nobody looks for patches unless they may be `patchy`. Flat
+    neighbourhoods must show it as well: on thin parts it is a matter of shape how far away others are. Where those of
+    some of the points, which `around` tells of, are wide enough for that everywhere, all are asked.
     """
     if not around.away[:, -1].all():
         return False  # points are repeated
@@ -237,11 +239,11 @@ def _is_uneven(around: Surroundings, points: Array) -> bool:
     told = [np.ones_like(flat), flat] if flat.sum() > AROUND else [np.ones_like(flat)]
     evenness, reach = _evenness(around), around.reach
     aside = all(_drawn_aside(around.points[some], evenness[some]) for some in told)
-    if not aside and not all(_is_patchy(reach[some]) for some in told):
+    if not aside and not (patchy and all(_is_patchy(reach[some]) for some in told)):
         return False
     if np.median(around.away[:, -1]) <= WIDEST:
         return True
-    return len(around.points) < len(points) and _is_uneven(Surroundings.of(points), points)
+    return len(around.points) < len(points) and _is_uneven(Surroundings.of(points), points, patchy=patchy)
 
 
 def _is_patchy(reach: Array) -> bool:
