@@ -146,8 +146,8 @@ def _reading(found: Examined, tolerance: float) -> tuple[float, float, float]:
 def _carried(found: Examined, points: Array, tolerance: float) -> Index:
     """Of points [N, 3] the strays that larger groups carry onto the surface, if they are as many as details may be.
 
-    Where a surface is sampled sparsely between dense parts its points look like strays. But of strays, which are far
-    from the surface, hardly any is carried onto it.
+    Where a surface is sampled sparsely between dense parts its points look like strays. But strays are far from the
+    surface, and of a hundred of them one or two are carried onto it.
     """
     surface, strays = found.surface, found.measured.strays
     if surface.skin is None or found.measured.views or len(strays) <= SHARES[-1] * found.measured.count:
@@ -158,7 +158,8 @@ def _carried(found: Examined, points: Array, tolerance: float) -> Index:
         moved = np.concatenate([m.apply(local) for m in motions])
         met = disc_distances(surface.cloud.of_one_class(), moved) <= surface.margin
         carried |= met.reshape(len(motions), -1).mean(axis=0) > 0.5
-    return strays[carried] if carried.sum() > SHARES[-1] * found.measured.count else strays[:0]
+    enough = max(SHARES[-1] * found.measured.count, SHARES[0] * len(strays))
+    return strays[carried] if carried.sum() > enough else strays[:0]
 
 
 def _suspects(found: Examined, _: Array, tolerance: float) -> tuple[Index, ...]:
