@@ -200,7 +200,7 @@ def test_what_is_known_to_be_of_the_surface_is_no_stray():
     made = damage.outliers(table(), 0.05, np.random.default_rng(1))
     every = sampling(made.points, np.random.default_rng(0), outliers=True).strays
     known = every[::2]
-    left = sampling(made.points, np.random.default_rng(0), outliers=True, sparse=known)
+    left = sampling(made.points, np.random.default_rng(0), outliers=True, native=known)
     assert np.isin(known, left.kept).all()
     assert not np.isin(known, left.strays).any()
     assert np.isin(left.strays, every).mean() > 0.95

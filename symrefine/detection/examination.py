@@ -76,8 +76,8 @@ def _likeliest(
     """
     points = (shape.sample if isinstance(shape, Sketch) else shape).points
     found = examine(apart=True)
-    if outliers and (sparse := _carried(found, points, tolerance)).size:
-        fuller = partial(examine, sparse=sparse)
+    if outliers and (native := _carried(found, points, tolerance)).size:
+        fuller = partial(examine, native=native)
         told = fuller(apart=True)
         if _reading(told, tolerance) <= _reading(found, tolerance):
             found, examine = told, fuller
@@ -209,7 +209,7 @@ def _examined(
     *,
     apart: bool,
     foreign: Sequence[Index] = (),
-    sparse: Index | None = None,
+    native: Index | None = None,
 ) -> Examined:
     sketch = given if isinstance(given, Sketch) else None
     shape = given.sample if isinstance(given, Sketch) else given
@@ -220,7 +220,7 @@ def _examined(
             outliers=outliers,
             apart=apart,
             foreign=foreign,
-            sparse=sparse,
+            native=native,
             floor=floor,
             whole=whole,
             seed=seed,

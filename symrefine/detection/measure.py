@@ -113,7 +113,7 @@ def measure(
     outliers: bool = True,
     apart: bool = True,
     foreign: Sequence[Index] = (),
-    sparse: Index | None = None,
+    native: Index | None = None,
     floor: Floor | None = None,
     whole: Moments | None = None,
     seed: int = 0,
@@ -125,7 +125,7 @@ def measure(
         outliers: whether any are set apart.
         apart: whether clumps apart from the body count as outliers.
         foreign: indices of each group of points that is known to be no part of the object.
-        sparse: indices of points that are known to be part of it, however far they are from others.
+        native: indices of points that are known to be part of it, however far they are from others.
         floor: what it stands on, where that was set apart.
         whole: moments of all the points that `shape` is a sample of; they count where no point is set apart.
         seed: of the samples of a mesh.
@@ -144,8 +144,8 @@ def measure(
         # What stands in front parts what a camera sees, and hides its counterparts.
         groups, rng = shape.viewpoint is None, np.random.default_rng(0)
         known = [np.unique(own[np.isin(massive, group)]) for group in foreign]
-        sure = None if sparse is None else np.unique(own[np.isin(massive, sparse)])
-        seen = sampling(shape.points, rng, outliers=outliers, groups=groups, apart=apart, foreign=known, sparse=sure)
+        sure = None if native is None else np.unique(own[np.isin(massive, native)])
+        seen = sampling(shape.points, rng, outliers=outliers, groups=groups, apart=apart, foreign=known, native=sure)
     clumps, blobs = (
         tuple((massive[np.isin(own, g)], shape.points[g]) for g in parts) for parts in (seen.clumps, seen.blobs)
     )

@@ -71,19 +71,19 @@ def sampling(
     groups: bool = True,
     apart: bool = True,
     foreign: Sequence[Index] = (),
-    sparse: Index | None = None,
+    native: Index | None = None,
 ) -> Sampling:
     """How points [N, 3] were sampled; with `outliers` those that belong to no surface are set apart.
 
     With `apart` clumps apart from the body are as well, and those groups that are known to be `foreign`, indices of
     each; if none are, it is told what may be. Without `groups` nobody looks for any. Of points that fill a volume only
-    strays are set apart. Those that are known to be of the surface, `sparse`, are no strays however far from others.
+    strays are set apart. Those that are known to be of the surface, `native`, are no strays however far from others.
     """
     size = len(points)
     kept: Index = np.arange(size)
     sure = np.zeros(size, dtype=bool)
-    if sparse is not None:
-        sure[sparse] = True
+    if native is not None:
+        sure[native] = True
     taken: list[Index] = []
     if len(points) <= AROUND or points.std() == 0.0:
         return Sampling.as_given(size)
