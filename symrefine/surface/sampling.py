@@ -249,10 +249,12 @@ def _is_uneven(around: Surroundings, points: Array, *, patchy: bool) -> bool:
 def _is_patchy(reach: Array) -> bool:
     """Whether some points are as far apart as strays would be, and stand together for more than details, by reach [N].
 
-    What they miss is as far off as they are apart, and as dense parts are carried there, it is many more that miss.
+    What they miss is as far off as they are apart, and as dense parts are carried there, it is many more that miss. One
+    point that is far from all stands for no more than others that are as far apart as strays.
     """
-    area = reach**2
-    return bool(area[reach > FAR * np.median(reach)].sum() > SHARES[-1] * area.sum())
+    far = FAR * np.median(reach)
+    area = np.minimum(reach, far) ** 2
+    return bool(area[reach > far].sum() > SHARES[-1] * area.sum())
 
 
 def face_densities(mesh: Shape, samples: Array, face: Index) -> Array | None:
