@@ -807,7 +807,7 @@ def test_thin_parts_in_noise_leave_the_scale_where_the_moments_have_it(seed: int
     assert found.scale == pytest.approx(0.6, rel=0.015)
 
 
-@pytest.mark.parametrize("det", DETERMINANTS)
+@pytest.mark.parametrize("det", [1, pytest.param(-1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("parts", [False, True])
 def test_classes_choose_between_equivalents(det: int, parts: bool) -> None:
     # Of a box eight maps are as good, of a box without two of its corners several; classes leave one, or two.
@@ -956,7 +956,7 @@ def test_objects_that_have_nothing_in_common_are_not_aligned() -> None:
     assert found.status != "ok"
 
 
-@pytest.mark.parametrize("det", DETERMINANTS)
+@pytest.mark.parametrize("det", [1, pytest.param(-1, marks=pytest.mark.slow)])
 def test_what_is_seen_of_a_symmetric_object_leaves_its_equivalents(det: int) -> None:
     # A box with a knob that is cut off: four operations carry what is left onto itself, so that four maps are as good.
     rng, matrix = rng_of(80), random_orthogonal(rng_of(81), det=det)
@@ -1013,7 +1013,7 @@ def test_turns_of_a_whole_source_leave_equivalents_of_a_part(name: str, seed: in
         assert min(angle_deg(m, matrix @ operation) for m in found.equivalents) < 1.0
 
 
-@pytest.mark.parametrize("view_first", [False, True])
+@pytest.mark.parametrize("view_first", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_all_that_carries_a_whole_object_onto_itself_leaves_equivalents_of_a_view(view_first: bool) -> None:
     """Of 24 maps of a hexagonal prism onto its top and three of its sides the search told 16."""
     prism, rng = join([revolve([(0, -0.3), (1, -0.3), (1, 0.3), (0, 0.3)], 6)]), rng_of(71)

@@ -798,7 +798,7 @@ def test_where_nothing_is_decided_a_person_may_decide():
     assert len(chosen.operations()) == chosen.group.order
 
 
-@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_small_holes_in_a_disc_are_turned_onto_one_another(seed):
     """C5h. Their azimuths do not stand out of chance, so that no fold was told: only the exact plane was left."""
     rng = np.random.default_rng(seed)
