@@ -108,8 +108,8 @@ def sampling(
         kept = kept[_without_strays(points[kept], sure[kept])]
         around = around_some(points[kept], rng)
     strays = _without(np.arange(size), [kept, *taken], size)
-    # Where strays were set apart, what is left far apart are others.
-    uneven = _is_uneven(around, points[kept], patchy=len(strays) <= SHARES[-1] * size)
+    # Where strays or a clump were set apart, what is left far apart are others, or its rim.
+    uneven = _is_uneven(around, points[kept], patchy=size - len(kept) <= SHARES[-1] * size)
     even, shares = _evened(points[kept], rng) if uneven else (slice(None), None)
     return Sampling(
         kept=kept,
