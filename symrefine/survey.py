@@ -248,7 +248,7 @@ def _doubts_of_cloud(cloud: Cloud, count: int) -> Iterator[str]:
     if cloud.floor:
         yield f"{cloud.floor:,} points lie in a plane that all others stand on: if it is a floor, say --outliers floor"
     if not cloud.even:
-        yield "the density falls off to one side: points are drawn more evenly, and weighted"
+        yield "the density differs from place to place: points are drawn more evenly, and weighted"
     if cloud.volume:
         yield "the points fill a volume: only its outline and spread can be compared"
     least = SPARSE_VOLUME if cloud.volume else SPARSE

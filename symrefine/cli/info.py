@@ -117,7 +117,7 @@ def _lines(record: dict[str, Any]) -> Iterator[str]:
     if parts:
         yield f"parts    {parts:,} that hang together"
     if cloud:
-        density = "even" if cloud["even"] else "falls off to one side"
+        density = "even" if cloud["even"] else "differs from place to place"
         yield f"sampling {'of a volume' if cloud['volume'] else 'of a surface'}, density {density}"
         yield f"outliers {cloud['strays']:,} strays, {len(cloud['clumps'])} clumps"
     yield f"repeated {record['repeated']:,} points"

@@ -49,7 +49,7 @@ class Measured:
     """A shape with the classes of its points or faces, its moments and its n-tuples.
 
     Attributes:
-        shape: without what was taken as outliers, and of a density that falls off a more even sample.
+        shape: without what was taken as outliers, and of a density that differs a more even sample.
         count: of its points, with those that were too many in dense parts.
         scan: all of these with where they were seen from, if that is known.
         floor: what it stands on, where that was set apart.

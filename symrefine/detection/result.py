@@ -167,7 +167,7 @@ class Detection(ReadOnly):
         exact: that and how exactly the group maps vertices of a mesh onto vertices, or points of a cloud, if it does.
         sample: what stands for the surface where there are too many points to look at all of them; None where all do.
         verified: what all points say, where they were asked.
-        even_sample: how many points, more evenly spread, it was decided by where the density falls off; None where by
+        even_sample: how many points, more evenly spread, it was decided by where the density differs; None where by
             all.
         timings: seconds by stage; everything else is a function of the input and the options alone.
         examined: what it was decided from, with the chain of groups.

@@ -219,7 +219,7 @@ def sampled(sample: tuple[int, int] | None) -> str:
 
 def evened(sample: int | None) -> str:
     """By how many points it was decided, where that was not all of them."""
-    return "" if sample is None else f"the density falls off: decided by {sample:,} points, more evenly spread"
+    return "" if sample is None else f"the density differs: decided by {sample:,} points, more evenly spread"
 
 
 def as_well(excess: float) -> bool:
