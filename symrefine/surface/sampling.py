@@ -237,24 +237,24 @@ def _is_uneven(around: Surroundings, points: Array, *, patchy: bool) -> bool:
         return False  # points are repeated
     flat = around.thickness < FLAT
     told = [np.ones_like(flat), flat] if flat.sum() > AROUND else [np.ones_like(flat)]
-    evenness, reach = _evenness(around), around.reach
+    evenness = _evenness(around)
     aside = all(_drawn_aside(around.points[some], evenness[some]) for some in told)
-    if not aside and not (patchy and all(_is_patchy(reach[some]) for some in told)):
+    if not aside and not (patchy and all(_is_patchy(around, some) for some in told)):
         return False
     if np.median(around.away[:, -1]) <= WIDEST:
         return True
     return len(around.points) < len(points) and _is_uneven(Surroundings.of(points), points, patchy=patchy)
 
 
-def _is_patchy(reach: Array) -> bool:
-    """Whether some points are as far apart as strays would be, and stand together for more than details, by reach [N].
+def _is_patchy(around: Surroundings, some: Mask) -> bool:
+    """Whether points are as far apart as strays would be, beside one another, and stand for more than details do.
 
-    What they miss is as far off as they are apart, and as dense parts are carried there, it is many more that miss. One
-    point that is far from all stands for no more than others that are as far apart as strays.
+    Of `some` [N] of the points. What they miss is as far off as they are apart, and as dense parts are carried there,
+    it is many more that miss. What is far from all others is no patch.
     """
-    far = FAR * np.median(reach)
-    area = np.minimum(reach, far) ** 2
-    return bool(area[reach > far].sum() > SHARES[-1] * area.sum())
+    far = around.reach > FAR * np.median(around.reach[some])
+    area = around.reach**2
+    return bool(area[some & far & far[around.near].any(axis=1)].sum() > SHARES[-1] * area[some].sum())
 
 
 def face_densities(mesh: Shape, samples: Array, face: Index) -> Array | None:
