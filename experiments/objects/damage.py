@@ -101,6 +101,11 @@ def uneven(mesh: Shape, ratio: float, rng: Rng) -> Damaged:
 def _thinned(points: Array, ratio: float, rng: Rng) -> Array:
     along = points @ unit(rng.normal(size=3))
     chance = ratio ** -((along - along.min()) / np.ptp(along))
+    return _drawn(points, chance, rng)
+
+
+def _drawn(points: Array, chance: Array, rng: Rng) -> Array:
+    """As many of points [N, 3] as a cloud has, or all, each as likely as its chance [N] says."""
     return points[rng.choice(len(points), min(POINTS, len(points)), replace=False, p=chance / chance.sum())]
 
 
@@ -109,7 +114,7 @@ def dense(mesh: Shape, ratio: float, rng: Rng) -> Damaged:
     points = _whole(mesh, rng, 10 * POINTS)
     away = np.linalg.norm(points - points[rng.integers(len(points))], axis=1)
     chance = np.where(away < np.quantile(away, 0.1), ratio, 1.0)
-    return _left(points[rng.choice(len(points), POINTS, replace=False, p=chance / chance.sum())])
+    return _left(_drawn(points, chance, rng))
 
 
 def patchy(mesh: Shape, ratio: float, rng: Rng) -> Damaged:
@@ -117,7 +122,7 @@ def patchy(mesh: Shape, ratio: float, rng: Rng) -> Damaged:
     points = _whole(mesh, rng, 10 * POINTS)
     away, _ = cKDTree(points[rng.choice(len(points), PATCHES, replace=False)]).query(points)
     chance = np.where(away < np.quantile(away, 0.2), 1.0 / ratio, 1.0)
-    return _left(points[rng.choice(len(points), POINTS, replace=False, p=chance / chance.sum())])
+    return _left(_drawn(points, chance, rng))
 
 
 def hole(mesh: Shape, share: float, rng: Rng) -> Damaged:

@@ -143,8 +143,11 @@ def measure(
     if not as_given:
         # What stands in front parts what a camera sees, and hides its counterparts.
         groups, rng = shape.viewpoint is None, np.random.default_rng(0)
-        known = [np.unique(own[np.isin(massive, group)]) for group in foreign]
-        sure = None if native is None else np.unique(own[np.isin(massive, native)])
+
+        def given(group: Index) -> Index:
+            return np.unique(own[np.isin(massive, group)])
+
+        known, sure = [given(group) for group in foreign], None if native is None else given(native)
         seen = sampling(shape.points, rng, outliers=outliers, groups=groups, apart=apart, foreign=known, native=sure)
     clumps, blobs = (
         tuple((massive[np.isin(own, g)], shape.points[g]) for g in parts) for parts in (seen.clumps, seen.blobs)

@@ -81,12 +81,12 @@ def sampling(
     """
     size = len(points)
     kept: Index = np.arange(size)
-    sure = np.zeros(size, dtype=bool)
-    if native is not None:
-        sure[native] = True
     taken: list[Index] = []
     if len(points) <= AROUND or points.std() == 0.0:
         return Sampling.as_given(size)
+    sure = np.zeros(size, dtype=bool)
+    if native is not None:
+        sure[native] = True
     some = some_of(points, rng)
     spread = points[some].std()
     points = (points - points[some].mean(axis=0)) / spread
@@ -139,10 +139,8 @@ def _without(indices: Index, parts: Sequence[Index], size: int) -> Index:
 def _without_strays(points: Array, sure: Mask) -> Index:
     """Indices, ascending, of points [N, 3] but for those on no surface: far from others, in no plane with them.
 
-    Those that are `sure` [N] stay.
-
     Sparse parts of a surface are flat, more so than dense ones; strays near a surface are not in its plane. Each round
-    sees clearer, as strays among strays look less alone.
+    sees clearer, as strays among strays look less alone. Those that are `sure` [N] to be of the surface stay.
     """
     kept, around = np.arange(len(points)), Surroundings.of(points)
     while True:
