@@ -218,6 +218,15 @@ def test_strays_that_a_group_carries_onto_the_surface_are_none():
         # To a smaller tolerance what holds is a rival as well.
         carried = examination._carried(found, points, TOLERANCE if are_of_the_surface else 0.1 * TOLERANCE)
         assert (len(carried) > 0.5 * len(found.measured.strays)) is are_of_the_surface
+        # All is examined once more with what is carried.
+        asked = []
+        examination._likeliest(
+            Shape(points=points),
+            lambda found=found, asked=asked, **how: asked.append(how) or found,
+            TOLERANCE,
+            outliers=True,
+        )
+        assert any("native" in how for how in asked) is are_of_the_surface
 
 
 @pytest.mark.parametrize("dense", [12000, 14000])
