@@ -34,7 +34,8 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     turned_down = pool.turned_down()
     near = [h for h in turned_down if h.need <= COARSE * pool.limit]
     if not (near or pool.small):
-        near = [fitted(surface, h.placed) for h in turned_down[:FOLLOWED] if h.need <= limit]
+        nearest = (h for h in turned_down[:FOLLOWED] if h.need <= ALIKE * limit * lenience(h.group.name))
+        near = [fitted(surface, h.placed) for h in nearest]
     # What is hidden by noise, or by the least tolerance that is asked for, tells no two groups apart.
     hidden = max(hidden_need(surface), pool.nothing / ALIKE)
     worst = partial(_worst, hidden=hidden)

@@ -11,7 +11,7 @@ from symrefine.decide.chain import chain
 from symrefine.decide.explore import explore
 from symrefine.decide.looks import few_motions, unmet_by
 from symrefine.decide.pool import Pool
-from symrefine.decide.posterior import ALIKE, least_told
+from symrefine.decide.posterior import ALIKE, EVEN, least_told
 from symrefine.detection.examined import Examined
 from symrefine.detection.measure import Outliers, by_vertices, doubt, floor_under, gather, measure
 from symrefine.detection.sketch import Sample, Sketch, is_large, sampled, set_apart, sketched
@@ -241,7 +241,8 @@ def _examined(
         every = sorted({max(t, least) for t in (tolerance, *ladder) if t >= tolerance})
         steps = [t for t in every if not doubt(measured, surface, t)]
         pool = explore(surface, evidence, steps[0], min(tolerance, *ladder, 1.0)) if steps else Pool()
-        links = chain(surface, pool, ALIKE * max((least, *ladder)))
+        # Of other tolerances groups are told that they call more likely than not.
+        links = chain(surface, pool, max(ALIKE * least, EVEN * max(ladder, default=0.0)))
     return Examined(
         measured=measured,
         surface=surface,
