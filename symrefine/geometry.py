@@ -4,7 +4,7 @@ Conventions: a plane is `n.x = d` with |n| = 1, and (n, d) ~ (-n, -d); an axis i
 direction u ~ -u; `T_a_b` maps b to a.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cache, lru_cache
 from numbers import Real
@@ -287,6 +287,11 @@ class Isometry(ReadOnly):
     def is_involution(self) -> bool:
         """Whether it is its own inverse, up to rounding, where it leaves a point in place."""
         return np.allclose(self.matrix, self.matrix.T, rtol=0.0, atol=1e-12)
+
+
+def images(motions: Sequence[Isometry], points: Array) -> Array:
+    """Where K operations take points [N, n], those of the first one first [K N, n]."""
+    return np.concatenate([m.apply(points) for m in motions])
 
 
 @lru_cache(maxsize=1)

@@ -15,12 +15,12 @@ from symrefine.decide.posterior import ALIKE, EVEN, least_told
 from symrefine.detection.examined import Examined
 from symrefine.detection.measure import Outliers, by_vertices, doubt, floor_under, gather, measure
 from symrefine.detection.sketch import Sample, Sketch, is_large, sampled, set_apart, sketched
-from symrefine.geometry import Array, Mask, check_tolerance
+from symrefine.geometry import Array, Mask, check_tolerance, images
 from symrefine.samples import COUNT, FOLLOWED, LOOK
 from symrefine.shape import Index, Shape
 from symrefine.surface.clumps import CLUMP, COUNTERPART, Clump, clump_among
 from symrefine.surface.floor import Floor
-from symrefine.surface.misses import SHARES, TOLERANCE, disc_distances
+from symrefine.surface.misses import SHARES, TOLERANCE
 from symrefine.surface.tree import Tree
 
 
@@ -155,8 +155,7 @@ def _carried(found: Examined, points: Array, tolerance: float) -> Index:
     local, carried = found.measured.moments.normalised(points[strays]), np.zeros(len(strays), dtype=bool)
     for rival in [r for r in found.rivals(tolerance) if r.group.order > 1][:FOLLOWED]:
         motions = few_motions(rival.placed)
-        moved = np.concatenate([m.apply(local) for m in motions])
-        met = disc_distances(surface.cloud.of_one_class(), moved) <= surface.margin
+        met = surface.meets(images(motions, local))
         carried |= met.reshape(len(motions), -1).mean(axis=0) > 0.5
     enough = max(SHARES[-1] * found.measured.count, SHARES[0] * len(strays))
     return strays[carried] if carried.sum() > enough else strays[:0]
@@ -269,24 +268,22 @@ def _is_part(found: Examined, blob: Array, tolerance: float) -> bool:
     motions = [m for element in link.elements for m in element.motions]
     if not motions or found.doubt(tolerance):
         return False
-    moved = np.concatenate([m.apply(points) for m in motions])
+    moved = images(motions, points)
     own = (Tree(points).nearest(cloud.points)[0] <= 2.0 * cloud.reach)[cloud.nearest(moved, None)[1]]
     if not link.group.is_polar and own.reshape(len(motions), -1).mean(axis=1).min() > 0.5:
         return True
     others = moved[~own]
-    met = disc_distances(cloud, others) <= found.surface.margin
-    return 2 * len(others) > len(moved) and bool(met.mean() > 0.5)
+    return 2 * len(others) > len(moved) and bool(found.surface.meets(others).mean() > 0.5)
 
 
 def _replaces(found: Examined, clump: Array, tolerance: float) -> bool:
     """Whether about as much of the surface has its image under points set apart as these are: a part out of place."""
-    cloud, there = found.surface.cloud.of_one_class(), Clump.of(found.measured.moments.normalised(clump))
-    own, hidden = cloud.points, [0.0]
+    own, there, hidden = found.surface.cloud.points, Clump.of(found.measured.moments.normalised(clump)), [0.0]
     for element in found.link(tolerance).elements:
         for motion in element.motions:
             moved = motion.apply(own)
             under = moved[there.covers(moved)]
-            hidden.append(float((disc_distances(cloud, under) > found.surface.margin).sum()) if len(under) else 0.0)
+            hidden.append(float((~found.surface.meets(under)).sum()) if len(under) else 0.0)
     return max(hidden) * found.measured.count >= COUNTERPART * len(clump) * len(own)
 
 
@@ -296,15 +293,14 @@ def _belongs(found: Examined, clump: Array, tolerance: float) -> bool:
     That is onto the surface, onto themselves or, where cameras are known, to where they could not see. Of many mirrors
     one passes through any clump by chance; a part of the object is carried by a third of the elements and more.
     """
-    surface, cloud = found.surface, found.surface.cloud.of_one_class()
-    points, margin = found.measured.moments.normalised(clump), surface.margin
-    beside = disc_distances(cloud, points) > margin
+    surface, points = found.surface, found.measured.moments.normalised(clump)
+    beside = ~surface.meets(points)
     points = points[beside] if beside.any() else points  # what lies in the surface is carried with it
     own, carried = Tree(points), []
     for element in found.link(tolerance).elements:
-        moved = np.concatenate([m.apply(points) for m in element.motions])
-        off = (disc_distances(cloud, moved) > margin) & (own.nearest(moved)[0] > margin)
+        moved = images(element.motions, points)
+        off = ~surface.meets(moved) & (own.nearest(moved)[0] > surface.margin)
         for camera in () if surface.openings is None else surface.openings.cameras:
-            off &= camera.sees_through(moved, margin)
+            off &= camera.sees_through(moved, surface.margin)
         carried.append(off.mean() < 0.5)
     return 3 * sum(carried) > len(carried)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symrefine.geometry import Array, Isometry, Mask, ReadOnly, rows
+from symrefine.geometry import Array, Isometry, Mask, ReadOnly, images, rows
 from symrefine.samples import GLANCE
 from symrefine.surface.floor import Floor
 from symrefine.surface.neighbourhoods import NEIGHBOURS, in_cells
@@ -111,8 +111,7 @@ class Drift(ReadOnly):
         """How far `sources` windows of each of K images lie from those of the cloud [K, .]."""
         some = self._some(sources)
         points, offsets, gains = self.sources[some], self.offsets[some], self.gains[some]
-        moved = np.concatenate([m.apply(points) for m in motions])
-        there = self.windows.offsets(moved).reshape(len(motions), -1, 3)
+        there = self.windows.offsets(images(motions, points)).reshape(len(motions), -1, 3)
         # Back where the image came from, the gains are those of the cloud itself.
         back = [_applied(gains, t @ m.matrix - offsets) for t, m in zip(there, motions, strict=True)]
         return np.linalg.norm(np.stack(back), axis=2)

@@ -12,7 +12,7 @@ from functools import reduce
 
 import numpy as np
 
-from symrefine.geometry import Array, Isometry, rows
+from symrefine.geometry import Array, Isometry, images, rows
 from symrefine.moments.moments import BLOCK
 from symrefine.rounding import TOLERANCE as TOLERANCE
 from symrefine.samples import COUNT
@@ -151,9 +151,9 @@ def miss_distances(
     Those beyond `bound` count as `bound`, which is quicker; `discs` as of `disc_distances`.
     """
     sources, classes = cloud.points[::stride], cloud.classes(slice(None, None, stride))
-    moved = np.concatenate([m.apply(sources) for m in motions])
     every = None if classes is None else np.tile(classes, len(motions))
-    return disc_distances(cloud, moved, every, bound=bound, discs=discs).reshape(len(motions), len(sources))
+    away = disc_distances(cloud, images(motions, sources), every, bound=bound, discs=discs)
+    return away.reshape(len(motions), len(sources))
 
 
 def disc_distances(

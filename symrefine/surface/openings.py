@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from symrefine.geometry import Array, Isometry, Mask, rows, unit
+from symrefine.geometry import Array, Isometry, Mask, images, rows, unit
 from symrefine.rounding import DOUBLE
 from symrefine.shape import Index
 from symrefine.surface.cameras import Camera
@@ -212,9 +212,9 @@ class Openings:
         """
         line = np.flatnonzero(self.line)
         which, back = np.unique(line[Tree(cloud.points[line]).nearest(cloud.points[at])[1]], return_inverse=True)
-        images = np.concatenate([m.apply(cloud.points[which]) for m in group])
         classes = cloud.classes(which)
-        away, near = cloud.nearest(images, None if classes is None else np.tile(classes, len(group)))
+        classes = None if classes is None else np.tile(classes, len(group))
+        away, near = cloud.nearest(images(group, cloud.points[which]), classes)
         met = away < cloud.beside
         kept, every = ((met & some).reshape(len(group), -1).mean(axis=0)[back] for some in (self.border[near], met))
         return kept, every

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from symrefine.geometry import Array, Axis, Isometry, read_only
+from symrefine.geometry import Array, Axis, Isometry, Mask, read_only
 from symrefine.moments.moments import PARTS
 from symrefine.samples import COUNT, LOOK
 from symrefine.surface.drift import Drift
@@ -17,6 +17,7 @@ from symrefine.surface.misses import (
     SHARES,
     SURE,
     TOLERANCE,
+    disc_distances,
     miss_distances,
     needs,
     needs_of_atoms,
@@ -161,6 +162,14 @@ class Surface:
         """
         least = PATCHES if self.viewed or (self.is_open and not matched) else 1
         return max(1, len(self.cloud.points) // max(sources, least))
+
+    def meets(self, places: Array) -> Mask:
+        """Which of places [N, 3] lie on the surface, of whatever class it is there."""
+        return disc_distances(self._of_one_class, places) <= self.margin
+
+    @cached_property
+    def _of_one_class(self) -> LocalPlanes:
+        return self.cloud.of_one_class()
 
     def misses(
         self, motions: Sequence[Isometry], *, sources: int = 10**9, bound: float = math.inf, discs: int = DISCS
