@@ -44,11 +44,11 @@ def bolts() -> Iterator[tuple[str, float]]:
             yield f"8-fold prism, {count:,} points, {100 * noise:g} % noise", best_of(lambda c=cloud: detect(c), 2)
 
 
-def meshes(*, full: bool) -> list[float]:
+def meshes(*, full: bool, ladder: tuple[float, ...] = ()) -> list[float]:
     """Seconds of each mesh of `../shared/objects`, of every fourth unless `full`; none where they are not there."""
     files = sorted(OBJECTS.glob("*.ply"))[:: 1 if full else 4]
     shapes = [load(file) for file in files]
-    return [best_of(lambda s=shape: detect(s), 1) for shape in shapes]
+    return [best_of(lambda s=shape: detect(s, ladder=ladder), 1) for shape in shapes]
 
 
 def metrics(*, full: bool = False) -> Iterator[Metric]:
@@ -64,3 +64,5 @@ def metrics(*, full: bool = False) -> Iterator[Metric]:
     if seconds:
         yield Metric(key="meshes of shared/objects, median", value=float(np.median(seconds)), unit="s", target=0.2)
         yield Metric(key="meshes of shared/objects, worst", value=max(seconds), unit="s", target=0.8)
+        ratio = sum(meshes(full=full, ladder=LADDER)) / sum(seconds)
+        yield Metric(key="meshes of shared/objects, with the staircase", value=ratio, unit="ratio", target=1.1)

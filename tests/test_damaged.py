@@ -805,7 +805,14 @@ def test_what_a_view_tells_of_a_plane_is_as_uncertain_as_it_says():
         assert np.quantile(found, 0.9) < 4.0
 
 
-@pytest.mark.parametrize(("name", "seed"), [("bracket", 2), ("stool3", 5), ("flat_bottle", 3), ("swirl4", 5)])
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [
+        ("bracket", 2),
+        ("stool3", 5),
+        *(pytest.param(*c, marks=pytest.mark.slow) for c in (("flat_bottle", 3), ("swirl4", 5))),
+    ],
+)
 def test_beyond_a_short_border_a_detail_may_be_missing(name, seed):
     """Of a closed object a detail on one side denies a mirror; beside a border the other one may have been lost."""
     case = damaged.Case(family="shape", name=name, kind="hole", strength=0.03, seed=seed)
@@ -911,7 +918,9 @@ def test_a_sample_sparser_than_walls_are_thick_tells_no_end_of_one_from_a_hole(n
     assert told.outcome == "right"
 
 
-@pytest.mark.parametrize(("name", "view"), [("thin4 notched", 4), ("thick4 notched", 4)])
+@pytest.mark.parametrize(
+    ("name", "view"), [pytest.param("thin4 notched", 4, marks=pytest.mark.slow), ("thick4 notched", 4)]
+)
 def test_a_notch_in_a_wall_that_ends_all_along_is_no_sure_hole(name, view):
     """The rim of a flight is a border all along, which the group keeps: one more is a hole or an end of its own.
 
@@ -1072,7 +1081,7 @@ def test_pairs_vote_for_the_mirrors_that_exchange_their_normals(outwards):
     [
         ("skew_box", damage.hole, 0.15),  # Ci: neither mirrors nor turns
         pytest.param("swirl4", damage.cut, 0.2, marks=pytest.mark.slow),  # S4
-        ("fan3", damage.hole, 0.05),  # C3
+        pytest.param("fan3", damage.hole, 0.05, marks=pytest.mark.slow),  # C3
         pytest.param("propeller3", damage.cut, 0.2, marks=pytest.mark.slow),  # D3
         pytest.param("swirl6", damage.cut, 0.2, marks=pytest.mark.slow),  # S6
         ("table", damage.cut, 0.2),  # C4v

@@ -120,7 +120,12 @@ MUG_DEG = {0.0: 2.5, 0.01: 3.0}
 
 
 @pytest.mark.parametrize(
-    ("name", "noise"), [*((name, 0.01) for name in SHAPES), ("table", 0.0), ("mug", 0.0), ("asymmetric", 0.0)]
+    ("name", "noise"),
+    [
+        *(pytest.param(n, 0.01, marks=pytest.mark.slow) if n in ("stool5", "stool6") else (n, 0.01) for n in SHAPES),
+        ("table", 0.0),
+        *(pytest.param(n, 0.0, marks=pytest.mark.slow) for n in ("mug", "asymmetric")),
+    ],
 )
 def test_shapes_of_the_first_groups(name, noise):
     group = SHAPES[name][1]

@@ -20,7 +20,15 @@ def found_in_sample(entry, seed):
     return detect(pose.of(points)), [pose.turn @ n for n in listed_normals(entry)]
 
 
-@pytest.mark.parametrize("name", ["mug_vedo", "table_rect_marble", "mailbox", "teddy", "quadknot", "water_tower"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "mug_vedo",
+        "mailbox",
+        "quadknot",
+        *(pytest.param(n, marks=pytest.mark.slow) for n in ("table_rect_marble", "teddy", "water_tower")),
+    ],
+)
 def test_a_few_objects(name):
     entry = catalogue()[name]
     found, normals = found_in_sample(entry, 1)

@@ -27,7 +27,7 @@ BEGIN, END = "<!-- reproduce:begin -->", "<!-- reproduce:end -->"
 
 MIRRORS = {"C1": 0, "Cs": 1, "Cinfv": 0, "D2h": 3, "Oh": 9}
 MIRRORS |= {f"C{b}v": b for b in (3, 4, 5, 6, 8)} | {f"D{b}h": b + 1 for b in (5, 6, 8)}
-SLOW = ("ecins_shipped_est", "ecins_tuned_est")
+SLOW = ("ecins_shipped_est", "ecins_tuned_est", "ecins_tuned", "baseline_start")
 
 
 def case(method: str = "ntuples", shape: str = "table", points: int = 4000, noise: float = 0.0, seed: int = 0) -> Case:

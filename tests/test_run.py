@@ -156,7 +156,10 @@ def rows_done(path: Path) -> int:
 
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.skipif(os.name != "posix", reason="kills a process")
-@pytest.mark.parametrize(("kill", "workers"), [(signal.SIGKILL, "1"), (signal.SIGKILL, "2"), (signal.SIGINT, "2")])
+@pytest.mark.parametrize(
+    ("kill", "workers"),
+    [pytest.param(signal.SIGKILL, "1", marks=pytest.mark.slow), (signal.SIGKILL, "2"), (signal.SIGINT, "2")],
+)
 def test_killed_runs_lose_nothing_and_end_with_the_same_bytes(config: Path, kill: signal.Signals, workers: str) -> None:
     slow = ("--set", "fixed.wait=0.2", "--workers", workers)
     whole = start(config, "whole", *slow)

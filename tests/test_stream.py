@@ -100,8 +100,7 @@ def near(found, other, size):
     ("name", "noise"),
     [
         ("table", 0.0),
-        *(pytest.param(*k, marks=pytest.mark.slow) for k in (("stool5", 0.005), ("mug", 0.002))),
-        ("asymmetric", 0.0),
+        *(pytest.param(*k, marks=pytest.mark.slow) for k in (("stool5", 0.005), ("mug", 0.002), ("asymmetric", 0.0))),
     ],
 )
 def test_answers_of_chunks_are_those_in_memory(name, noise):

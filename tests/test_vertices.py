@@ -45,7 +45,7 @@ def posed(name, seed=0, scale=1.0, away=0.0):
     return shape, near, scale * (turn @ center + there + 1e-4 * mesh.diagonal), truth
 
 
-@pytest.mark.parametrize("name", EXACT)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n == "snub_balls" else n for n in EXACT])
 @pytest.mark.parametrize(
     ("scale", "away"),
     [pytest.param(1.0, 0.0, marks=pytest.mark.slow), (1e-3, 3.0), pytest.param(1e4, 100.0, marks=pytest.mark.slow)],
@@ -441,7 +441,10 @@ def test_points_that_stand_alone_in_their_distance_stay_where_they_are():
 
 @pytest.mark.parametrize(
     ("keep", "group"),
-    [(lambda g: np.abs(g).max(axis=1) < 14, "Oh"), (lambda g: ((g**2).sum(axis=1) < 150) & (g[:, 2] > 0), "C4v")],
+    [
+        (lambda g: np.abs(g).max(axis=1) < 14, "Oh"),
+        pytest.param(lambda g: ((g**2).sum(axis=1) < 150) & (g[:, 2] > 0), "C4v", marks=pytest.mark.slow),
+    ],
     ids=["cube", "half ball"],
 )
 def test_voxels_have_the_group_of_their_grid(keep, group):

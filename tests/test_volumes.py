@@ -224,7 +224,7 @@ def test_large_volumes_are_averaged_and_it_is_told(
 
 
 @pytest.mark.parametrize("measure", ["surface", "solid"])
-@pytest.mark.parametrize("most", [10**6, 700])
+@pytest.mark.parametrize("most", [pytest.param(10**6, marks=pytest.mark.slow), 700])
 def test_slabs_change_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, measure: str, most: int) -> None:
     """Volumes whose longest axis is any of the three, of numbers of any type and order, as one slab and as many.
 
@@ -250,7 +250,9 @@ def test_slabs_change_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, m
 
 
 @pytest.mark.parametrize("measure", ["surface", "solid"])
-@pytest.mark.parametrize("name", ["a.nii", "a.nii.gz", "a.nrrd", "a.mrc"])
+@pytest.mark.parametrize(
+    "name", ["a.nii", "a.nrrd", *(pytest.param(n, marks=pytest.mark.slow) for n in ("a.nii.gz", "a.mrc"))]
+)
 def test_of_a_volume_little_is_held_beside_the_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, measure: str, name: str
 ) -> None:
@@ -297,7 +299,9 @@ def test_volumes_are_refused_wherever_they_are_cut(tmp_path: Path, name: str) ->
     refusal(tmp_path, data + b"x", name)
 
 
-@pytest.mark.parametrize("name", ["a.nii", "a.mrc", "a.nrrd", "b.nrrd"])
+@pytest.mark.parametrize(
+    "name", ["a.nii", "a.nrrd", *(pytest.param(n, marks=pytest.mark.slow) for n in ("a.mrc", "b.nrrd"))]
+)
 def test_damage_never_shows_as_a_foreign_error(tmp_path: Path, name: str) -> None:
     data = files(tmp_path)[name]
     rng = np.random.default_rng(1)
