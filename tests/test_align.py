@@ -347,7 +347,7 @@ def test_exact_points_of_a_symmetric_object_keep_their_determinant() -> None:
         np.testing.assert_allclose(found.matrix, matrix, atol=1e-12)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.1])
+@pytest.mark.parametrize("share", [0.0, pytest.param(0.1, marks=pytest.mark.slow)])
 def test_either_hand_of_what_is_its_own_mirror_image_is_sure_and_nothing_is_detected_for_that(
     share: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -741,7 +741,7 @@ def test_strays_on_both_sides_cost_no_confidence(det: int) -> None:
     assert found.confidence > 0.95
 
 
-@pytest.mark.parametrize("det", DETERMINANTS)
+@pytest.mark.parametrize("det", [1, pytest.param(-1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("seed", [63, pytest.param(65, marks=pytest.mark.slow)])
 def test_a_hand_that_strays_hide_is_not_told_for_sure(det: int, seed: int) -> None:
     # What makes a coffee grinder differ from its mirror image is a crank, which 40 % of strays may hide.
