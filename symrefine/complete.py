@@ -93,7 +93,7 @@ def verdicts(found: Detection, points: Array) -> Verdicts:
     motions = Placed(group=found.group, center=center).motions(TURNS)
     misses = surface.misses(motions)
     unseen = np.isnan(surface.seen(misses, motions))
-    owner = surface.cloud.of_one_class().nearest(local, None)[1]
+    owner = surface.of_one_class.nearest(local, None)[1]
     images: Array = np.empty((0, 3))
     for motion, hidden in zip(motions, unseen, strict=True):
         new = motion.apply(local[hidden[owner]])

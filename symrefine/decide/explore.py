@@ -82,16 +82,12 @@ def explore(surface: Surface, evidence: Evidence, limit: float, finest: float = 
             return replace(_believed(surface, part, found), at_least=True)
     # What a border hides may be why a larger group is in doubt.
     doubted = (h for h in (part.largest, *part.small) if size_of(h.placed) > size_of(whole.largest.placed))
-    hides = not ends and any(meant(_alone(h), surface.tolerance) > LEAST for h in doubted)
+    links = (Link.of(h.group, h.need, math.inf) for h in doubted)
+    hides = not ends and any(meant(link, surface.tolerance) > LEAST for link in links)
     if not more:
         return replace(whole, at_least=hides or opens or surface.openings.floor is not None)
     whole = replace(whole, at_least=evident or hides or missing)
     return replace(whole, small=(*whole.small, _as_rival(surface, part.largest)))
-
-
-def _alone(found: Hypothesis) -> Link:
-    """A group as the only one beyond what the object has, as the decision sees it."""
-    return Link(need=found.need, lone_mirror=found.group.name == "Cs")
 
 
 def _larger(part: Pool, than: Hypothesis) -> list[Hypothesis]:

@@ -79,7 +79,14 @@ class Link:
 
     @classmethod
     def of(
-        cls, group: PointGroup, need: float, beyond: float, *, believed: float, placed: float, proven: bool = False
+        cls,
+        group: PointGroup,
+        need: float,
+        beyond: float,
+        *,
+        believed: float = 0.0,
+        placed: float = 1.0,
+        proven: bool = False,
     ) -> "Link":
         """That of a group in space, where the next one of the chain needs so much."""
         return cls(

@@ -263,7 +263,7 @@ def _is_part(found: Examined, blob: Array, tolerance: float) -> bool:
     point of space in place lies about that point, as all larger groups of the rest do, which a clump there, round as it
     is, would not break.
     """
-    cloud, points = found.surface.cloud.of_one_class(), found.measured.moments.normalised(blob)
+    cloud, points = found.surface.of_one_class, found.measured.moments.normalised(blob)
     link = found.link(tolerance)
     motions = [m for element in link.elements for m in element.motions]
     if not motions or found.doubt(tolerance):

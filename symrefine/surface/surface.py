@@ -165,10 +165,11 @@ class Surface:
 
     def meets(self, places: Array) -> Mask:
         """Which of places [N, 3] lie on the surface, of whatever class it is there."""
-        return disc_distances(self._of_one_class, places) <= self.margin
+        return disc_distances(self.of_one_class, places) <= self.margin
 
     @cached_property
-    def _of_one_class(self) -> LocalPlanes:
+    def of_one_class(self) -> LocalPlanes:
+        """Its local planes, where any point may meet any other."""
         return self.cloud.of_one_class()
 
     def misses(
