@@ -232,7 +232,7 @@ def _polished(chosen: Hypothesis, on: OnVertices, measured: Measured) -> Hypothe
 
     def turned(element: Element) -> Element:
         own = element.operations
-        matrices = tuple(turn @ m @ turn.T for m in own.matrices)
+        matrices = turn @ own.matrices @ turn.T
         return replace(
             element, center=center, operations=replace(own, direction=turn @ own.direction, matrices=matrices)
         )

@@ -3,6 +3,8 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import accumulate
 from typing import TypeVar
 
 import numpy as np
@@ -54,12 +56,12 @@ class Placed(ReadOnly):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Operations:
-    """One element of a group: its kind ("plane", "axis", "improper", "inversion"), and matrices that stand for it."""
+    """One element of a group: its kind ("plane", "axis", "improper", "inversion"), and [m, 3, 3] that stand for it."""
 
     kind: str
     direction: Array
     order: float
-    matrices: tuple[Array, ...]
+    matrices: Array
 
     def motions(self, center: Array) -> tuple[Isometry, ...]:
         """The operations about a centre."""
@@ -78,24 +80,41 @@ def elements(group: PointGroup, *, powers: int = 0) -> list[Operations]:
     An axis stands for its smallest turn and a wide one, and for at most so many `powers` of the first, forth and back:
     of a part of a surface these carry other things out of sight.
     """
+    parts, own, directions, matrices = _standard_parts(group.name, powers)
+    directions, matrices = directions @ group.frame, group.frame.T @ matrices @ group.frame
+    each = zip(parts, own, directions, strict=True)
+    return [Operations(kind=p.kind, direction=u, order=p.order, matrices=matrices[of]) for p, of, u in each]
+
+
+@lru_cache(maxsize=512)
+def _standard_parts(name: str, powers: int) -> tuple[tuple[Operations, ...], tuple[slice, ...], Array, Array]:
+    """The same in the standard placement; which of all their matrices are those of each, directions, and matrices.
+
+    They are asked of every candidate wherever it stands, and made once.
+
+    Returns: P elements, P slices, [P, 3] directions and [M, 3, 3] matrices.
+    """
+    group = PointGroup(name=name)
     normals = group.mirrors()
-    if group.name in ("Cinfv", "Kh"):
-        normals = group.frame[:0]
-    elif group.name == "Dinfh":
+    if name in ("Cinfv", "Kh"):
+        normals = normals[:0]
+    elif name == "Dinfh":
         normals = group.frame[2:]
-    found = [Operations(kind="plane", direction=n, order=1.0, matrices=(householder(n),)) for n in normals]
+    found = [Operations(kind="plane", direction=n, order=1.0, matrices=householder(n)[None]) for n in normals]
     # Of a continuous group the endless axes; of a sphere all three that stand for it.
     for direction, order in (a for a in group.rotation_axes() if group.is_finite or math.isinf(a[1])):
-        turns = tuple(rotation(direction, float(a)) for a in _angles(order, powers))
+        turns = np.array([rotation(direction, a) for a in _angles(order, powers)])
         found.append(Operations(kind="axis", direction=direction, order=order, matrices=turns))
     for direction, order in group.improper_axes() if group.is_finite else []:
         turn = rotoreflection(direction, wide_angle_rad(int(order)))
-        both = (turn, turn.T) if powers else (turn,)
+        both = np.array([turn, turn.T] if powers else [turn])
         found.append(Operations(kind="improper", direction=direction, order=order, matrices=both))
     if group.has_inversion:
-        z = np.array([0.0, 0.0, 1.0])
-        found.append(Operations(kind="inversion", direction=z, order=2.0, matrices=(-np.eye(3),)))
-    return found
+        found.append(Operations(kind="inversion", direction=group.frame[2], order=2.0, matrices=-np.eye(3)[None]))
+    ends = accumulate(len(p.matrices) for p in found)
+    own = tuple(slice(end - len(p.matrices), end) for p, end in zip(found, ends, strict=True))
+    directions, matrices = [p.direction for p in found], [m for p in found for m in p.matrices]
+    return tuple(found), own, np.reshape(directions, (-1, 3)), np.reshape(matrices, (-1, 3, 3))
 
 
 def _angles(order: float, powers: int) -> tuple[float, ...]:
