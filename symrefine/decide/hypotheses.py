@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from symrefine.decide.looks import COARSE, Look, exact_need, least_around, mended, seems, slid
-from symrefine.decide.place import is_told, least_elsewhere, told_apart
+from symrefine.decide.place import is_told, least_elsewhere, nowhere, told_apart
 from symrefine.decide.posterior import certain, lenience
 from symrefine.fit.placed import FITTED, Operations, Placed, elements
 from symrefine.fit.refine import SHORT, Iterate, refine
@@ -168,8 +168,9 @@ def fitted(
             found = _moved(surface, found, every, was_slid=best is not first)
     if not surface.viewed or not found.elements:
         return found
-    told = is_told(found.placed, [(e.operations, e.coverage.supported) for e in found.elements])
-    return replace(found, told=told, elsewhere=least_elsewhere(surface, found.placed))
+    if not is_told(found.placed, [(e.operations, e.coverage.supported) for e in found.elements]):
+        return replace(found, told=False)
+    return replace(found, elsewhere=least_elsewhere(surface, found.placed, nowhere(surface)))
 
 
 def doubtless(surface: Surface) -> float:

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 from symrefine.decide.hypotheses import NOTHING, Hypothesis, fitted, has_all, roughly_judged, single
 from symrefine.decide.looks import COARSE, by_chance, looked_at
+from symrefine.decide.place import nowhere
 from symrefine.decide.pool import is_at
-from symrefine.decide.posterior import ALIKE, EVEN
+from symrefine.decide.posterior import ALIKE
 from symrefine.fit.placed import Placed, joined
 from symrefine.groups import PointGroup
 from symrefine.rounding import START_ERROR
@@ -58,7 +59,7 @@ def is_loose(surface: Surface, found: Hypothesis) -> bool:
 
     Of atoms that are no more likely than not to have it, whatever it needs, nothing was.
     """
-    return not found.told or found.elsewhere <= EVEN * surface.tolerance or found.apart < 0.5
+    return not found.told or found.elsewhere <= nowhere(surface) or found.apart < 0.5
 
 
 def size_of(placed: Placed) -> float:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from symrefine.decide.looks import GLANCED, exact_need, few_motions, start_error
-from symrefine.decide.posterior import Link, meant
+from symrefine.decide.posterior import EVEN, Link, meant
 from symrefine.fit.matching import match
 from symrefine.fit.placed import Operations, Placed, elements, joined
 from symrefine.fit.refine import Framed, pair_gram
@@ -21,7 +21,7 @@ from symrefine.groups import is_subgroup
 from symrefine.groups.names import MAX_FOLD
 from symrefine.samples import COUNT, GLANCE, LOOK
 from symrefine.shape import Index
-from symrefine.surface.misses import DISCS
+from symrefine.surface.misses import DISCS, LIMITS
 from symrefine.surface.skin import LocalPlanes
 from symrefine.surface.surface import Surface
 
@@ -31,15 +31,25 @@ SUPPORTED = 0.15
 HALVED = 5
 
 
-def least_elsewhere(surface: Surface, placed: Placed) -> float:
-    """What a group needs at least where it is moved as far as starts may be off.
+def least_elsewhere(surface: Surface, placed: Placed, enough: float = 0.0) -> float:
+    """What a group needs at least where it is moved as far as starts may be off, or something up to `enough`.
 
     It says nothing of the object unless something would contradict it elsewhere: moved to either side, in the ways that
     change what it is and that the surface tells least of, until its images lie as far aside as those of a mirror that
     is off so much. Turns go no farther than a quarter of a wedge.
     """
     state, ways = _ways(surface, placed)
-    return float(_needs(surface, placed, state, np.concatenate([-ways, ways])).min())
+    least = math.inf
+    for way in ways:  # it needs least where least is told, most often
+        least = min(least, float(_needs(surface, placed, state, np.stack([-way, way]), most=least).min()))
+        if least <= enough:
+            break
+    return least
+
+
+def nowhere(surface: Surface) -> float:
+    """The need up to which a group, elsewhere, holds there as likely as not: then nothing says where it stands."""
+    return EVEN * surface.tolerance
 
 
 def slack(surface: Surface, placed: Placed) -> Array:
@@ -142,14 +152,19 @@ def freest(cloud: LocalPlanes, state: Framed, *, turns: bool = True, stride: int
     return np.pad(found, ((0, 0), (first, 0)))
 
 
-def _needs(surface: Surface, placed: Placed, state: Framed, ways: Array, *, rough: bool = False) -> Array:
-    """What a group needs [W] where it is moved by each of some ways [W, 6]; `rough`ly, if that is little or much."""
+def _needs(
+    surface: Surface, placed: Placed, state: Framed, ways: Array, *, most: float = math.inf, rough: bool = False
+) -> Array:
+    """What a group needs [W] where it is moved by each of some ways [W, 6], from `most` on a lower bound.
+
+    Or `rough`ly, if that is little or much.
+    """
     motions = [few_motions(placed.moved(state.moved(way))) for way in ways]
     every = [m for part in motions for m in part]
     if rough:
-        needs = surface.needs(every, sources=GLANCE, bound=2.0 * surface.far, tests=GLANCED)
+        needs = surface.needs(every, sources=GLANCE, bound=2.0 * surface.far, discs=1, tests=GLANCED)
     else:
-        needs = surface.needs(every, sources=LOOK, tests=GLANCED)
+        needs = surface.needs(every, sources=LOOK, bound=LIMITS[-1] * most, tests=GLANCED)
     return needs.reshape(len(ways), -1).max(axis=1)
 
 
