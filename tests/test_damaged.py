@@ -22,7 +22,7 @@ from experiments.objects.catalogue import catalogue
 from experiments.objects.constructions import polygon
 from experiments.objects.parts import extruded
 from experiments.objects.poses import Pose
-from experiments.objects.shapes import bottle, box, join, mug, revolve, sample, stool, table
+from experiments.objects.shapes import bottle, box, join, mug, revolve, sample, stool, table, tube
 from experiments.studies import boundary, damaged, groups, single_views
 from symrefine.cli import invoke
 from symrefine.cli.tables import record_lines
@@ -755,6 +755,22 @@ def test_a_border_may_hide_why_a_lone_mirror_is_in_doubt():
     made, _ = damaged.damaged(damaged.Case(family="catalogue", name="car_porsche", kind="hole", strength=0.05, seed=31))
     found = detect(made.points)
     assert found.point_group == "Cs" or found.at_least
+
+
+def shackle():
+    """A bow, and a pin through its ends that has one head."""
+    turn = np.linspace(0.0, math.pi, 33)
+    arc = np.column_stack([0.7 + 0.35 * np.sin(turn), 0.0 * turn, 0.35 * np.cos(turn)])
+    pin = revolve([(0, -0.5), (0.09, -0.5), (0.09, 0.5), (0.2, 0.5), (0.2, 0.65), (0, 0.65)], 24)
+    return join([tube(np.concatenate([[[0, 0, 0.35]], arc, [[0, 0, -0.35]]]), 0.1), pin])
+
+
+@pytest.mark.slow
+def test_a_short_border_that_narrow_neighbourhoods_deny_makes_no_larger_group_likely():
+    """Noise as thick as half a pin leaves a border where it ends, beyond which a second head would be hidden."""
+    rng = np.random.default_rng(19)
+    found = detect(Pose.random(rng).of(sample(shackle(), 20000, 0.005, rng)))
+    assert found.point_group == "Cs"
 
 
 def desk(ends):

@@ -102,9 +102,12 @@ def _larger(part: Pool, than: Hypothesis) -> list[Hypothesis]:
 def _believed(surface: Surface, part: Pool, found: Hypothesis) -> Pool:
     """The pool where one of its groups is the largest that may be believed in, and what it has not asks for more.
 
-    Where the object mostly ends at its borders, one more is a hole or such an end: as likely as not.
+    Where the object mostly ends at its borders, one more is a hole or such an end: as likely as not. So is a border
+    that narrow neighbourhoods deny, and wide ones tell no longer than chance may.
     """
-    as_end = EVEN * surface.tolerance if ends_elsewhere(surface, found) else 0.0
+    assert surface.openings is not None
+    denied = not surface.openings.evident and thin_ends(surface)
+    as_end = EVEN * surface.tolerance if denied or ends_elsewhere(surface, found) else 0.0
     if found is part.largest and not as_end:
         return part
 
