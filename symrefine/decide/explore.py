@@ -272,13 +272,14 @@ def _tried(surface: Surface, pool: Pool, starts: Iterable[Placed], *, anew: bool
         look = looked_at(surface, start, COARSE * pool.limit, pool.has_as_seen, useful=useful, follow=follow)
         moved, needs = look.placed, look.needs
         pool = replace(pool, looks=(*pool.looks, (glance, moved)))
-        if needs > useful:
+        if needs > useful or pool.denies(needs):
             pool = replace(pool, looked=(*pool.looked, (moved, needs)))
             parts += _holding(surface, moved, useful)
         elif not pool.has(moved, needs) and not pool.met(moved):
             pool = _joined_at_once(surface, pool, moved) if needs <= pool.nothing and pool.largest.elements else pool
             if not pool.has(moved, needs):
                 found = fitted(surface, moved, error_rad=look.error_rad, close=useful)
+                pool = pool if found.need <= pool.limit else replace(pool, vain=(*pool.vain, needs))
                 if surface.openings is None or surface.viewed or found.supported >= SUPPORTED:
                     pool = _grown(surface, pool, found)
                     # What does not hold may have elements that do, which nothing else proposes.

@@ -13,6 +13,7 @@ from symrefine.groups import PointGroup, is_subgroup
 from symrefine.groups.closure import MAXIMAL, may_be_in_one
 from symrefine.groups.elements import DIRECTION_ERROR_RAD
 from symrefine.rounding import START_ERROR
+from symrefine.samples import FOLLOWED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -26,6 +27,7 @@ class Pool:
         looks: what candidates that were looked at seemed to need at a glance, and where the look put them.
         looked: candidates turned down after a look, where a coarse fit put them, with what they seem to need.
         hopeless: the same of those turned down at a glance.
+        vain: what candidates seemed to need that no fit brought within the limit.
         whole: whether the surface was taken as whole, and not as what was seen of one.
         at_least: whether there may be more that was not seen.
         nothing: what is as good as no need: noise hides it, or no tolerance that is asked for makes a doubt of it.
@@ -38,6 +40,7 @@ class Pool:
     looks: tuple[tuple[float, Placed], ...] = ()
     looked: tuple[tuple[Placed, float], ...] = ()
     hopeless: tuple[tuple[Placed, float], ...] = ()
+    vain: tuple[float, ...] = ()
     whole: bool = False
     at_least: bool = False
     nothing: float = 0.0
@@ -83,6 +86,13 @@ class Pool:
         if self.has(start) or (exact.name in MAXIMAL and start.group.name != "Kh"):
             return False
         return may_be_in_one(exact, start.group, error_rad)
+
+    def denies(self, needs: float) -> bool:
+        """Whether a group seems to need more than the limit, and several that seemed no worse do when fitted.
+
+        Of what is nearly a ball any axis seems to hold within little more than the limit, and fits say the same.
+        """
+        return needs > self.limit and sum(seemed <= needs for seemed in self.vain) >= FOLLOWED
 
     def met(self, placed: Placed) -> bool:
         """Whether a group was fitted at this very place."""
