@@ -30,6 +30,7 @@ from symrefine.geometry import frame_with_z, line_angle_rad, random_orthogonal, 
 from symrefine.groups import is_subgroup, point_group
 from symrefine.propose.candidates import proposals
 from symrefine.rounding import START_ERROR
+from symrefine.samples import FOLLOWED
 from symrefine.shape import Shape
 from symrefine.surface.misses import LIMITS
 
@@ -264,6 +265,14 @@ def test_a_mirror_shows_its_image_where_all_was_seen_and_itself_anywhere():
     assert pool.shows(image, 0.05)
     assert not pool.shows(image, 0.05, whole=False)
     assert pool.shows(seen, 0.05, whole=False)
+
+
+def test_what_seems_beyond_the_limit_is_denied_once_fits_of_what_seemed_no_worse_came_to_nothing():
+    pool = Pool(limit=LIMIT, vain=(1.1 * LIMIT,) * FOLLOWED)
+    assert pool.denies(1.1 * LIMIT)
+    assert not pool.denies(1.05 * LIMIT)
+    assert not replace(pool, vain=pool.vain[1:]).denies(1.1 * LIMIT)
+    assert not replace(pool, vain=(0.5 * LIMIT,) * FOLLOWED).denies(LIMIT)
 
 
 def test_what_needs_more_than_the_limit_is_left_out():

@@ -1079,6 +1079,14 @@ def test_votes_know_no_centroid(seed):
     assert len(again[0]) > 0
 
 
+def test_of_what_is_flat_some_votes_tell_its_mirrors():
+    """Most of a slab agrees with any mirror across it, and few pairs of its rims tell which are its own."""
+    surface = surface_of(sample(join([box((0, 0, 0), (1.0, 0.7, 0.02))]), 8000, 0.0, np.random.default_rng(0)))
+    normals, _ = mirror_votes(surface.cloud.points, surface.cloud.normals, np.random.default_rng(0))
+    for axis in np.eye(3)[:2]:
+        assert min(line_angle_rad(told, axis) for told in normals) < AGREE_RAD
+
+
 @pytest.mark.parametrize("outwards", [False, True])
 def test_pairs_vote_for_the_mirrors_that_exchange_their_normals(outwards):
     rng = np.random.default_rng(17)

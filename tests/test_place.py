@@ -13,7 +13,7 @@ from experiments.objects.parts import assembled, extruded
 from experiments.objects.shapes import bottle, box, join, mug, revolve, sample, table
 from symrefine.decide.hypotheses import fitted, judged
 from symrefine.decide.looks import few_motions, looked_at
-from symrefine.decide.place import SUPPORTED, freest, is_told, least_elsewhere, slack
+from symrefine.decide.place import SUPPORTED, _needs, _ways, freest, is_told, least_elsewhere, nowhere, slack
 from symrefine.detection.measure import gather, measure
 from symrefine.detection.story import detect
 from symrefine.fit.placed import FITTED, Placed, elements
@@ -123,6 +123,18 @@ def test_a_group_of_many_folds_is_turned_by_a_part_of_its_wedge(fold):
     assert least_elsewhere(star, Placed(group=group, center=center)) > 2.0 * star.tolerance
     bottle_seen, center = view("bottle", ABOVE)
     assert least_elsewhere(bottle_seen, Placed(group=group, center=center)) < bottle_seen.tolerance
+
+
+@pytest.mark.parametrize(("name", "group"), [("star16", "C16v"), ("bottle", "C16v"), ("bottle", "Cinfv")])
+def test_the_least_elsewhere_is_that_of_all_places_unless_less_is_enough(name, group):
+    """One after the other they are asked less and less closely, as what needs more than another does not matter."""
+    surface, center = view(name, ABOVE)
+    placed = Placed(group=PointGroup(name=group), center=center)
+    state, ways = _ways(surface, placed)
+    least = least_elsewhere(surface, placed)
+    assert least == pytest.approx(_needs(surface, placed, state, np.concatenate([-ways, ways])).min(), rel=1e-9)
+    enough = least_elsewhere(surface, placed, nowhere(surface))
+    assert least <= enough <= max(least, nowhere(surface))
 
 
 def test_what_is_freest_is_a_turn_about_the_axis_of_what_is_round():
