@@ -56,7 +56,8 @@ class Hypothesis:
     part, in squares, of what it needs that is belief. `rivals` are those that may be meant as well as it, and
     instead of it. Of atoms, `apart` says how likely they have it by more than standing densely. Where cameras are
     known, `told` says whether what they saw of its elements makes up the group, and `elsewhere` what it needs at least
-    where it does not stand. What is `proven` holds by what was not measured.
+    where it does not stand, or that it needs so little that it may stand there. What is `proven` holds by what was not
+    measured.
     """
 
     placed: Placed
