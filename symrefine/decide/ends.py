@@ -48,6 +48,11 @@ def thin_ends(surface: Surface) -> bool:
     return openings is not None and openings.ends is not None and bool(openings.ends[openings.line].mean() > KEPT)
 
 
+def is_denied(surface: Surface) -> bool:
+    """Whether narrow neighbourhoods deny the open borders, and wide ones tell them no longer than chance may."""
+    return surface.openings is not None and not surface.openings.evident and thin_ends(surface)
+
+
 def ends_too(surface: Surface, found: Hypothesis, hidden: Sequence[tuple[Isometry, Mask]], limit: float) -> bool:
     """Whether an object ends at its open borders if it has a group that what lies beyond them was to hide.
 

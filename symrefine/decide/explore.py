@@ -12,6 +12,7 @@ from symrefine.decide.ends import (
     hidden_by,
     hides_surely,
     hides_there,
+    is_denied,
     often_kept,
     often_left,
     thin_ends,
@@ -105,9 +106,7 @@ def _believed(surface: Surface, part: Pool, found: Hypothesis) -> Pool:
     Where the object mostly ends at its borders, one more is a hole or such an end: as likely as not. So is a border
     that narrow neighbourhoods deny, and wide ones tell no longer than chance may.
     """
-    assert surface.openings is not None
-    denied = not surface.openings.evident and thin_ends(surface)
-    as_end = EVEN * surface.tolerance if denied or ends_elsewhere(surface, found) else 0.0
+    as_end = EVEN * surface.tolerance if is_denied(surface) or ends_elsewhere(surface, found) else 0.0
     if found is part.largest and not as_end:
         return part
 

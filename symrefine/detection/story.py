@@ -230,15 +230,9 @@ def _polished(chosen: Hypothesis, on: OnVertices, measured: Measured) -> Hypothe
     center = measured.moments.normalised(on.center)
     turn = on.group.frame.T @ chosen.group.frame
 
-    def turned(element: Element) -> Element:
-        own = element.operations
-        matrices = turn @ own.matrices @ turn.T
-        return replace(
-            element, center=center, operations=replace(own, direction=turn @ own.direction, matrices=matrices)
-        )
-
     placed = Placed(group=on.group, center=center)
-    return replace(chosen, placed=placed, elements=tuple(turned(e) for e in chosen.elements))
+    turned = (replace(e, center=center, operations=e.operations.turned(turn)) for e in chosen.elements)
+    return replace(chosen, placed=placed, elements=tuple(turned))
 
 
 def _confidence(element: Element, links: Sequence[Hypothesis], decision: Decision) -> float:

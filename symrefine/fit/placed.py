@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import accumulate
 from typing import TypeVar
 
 import numpy as np
@@ -67,6 +66,10 @@ class Operations:
         """The operations about a centre."""
         return tuple(Isometry.about(center, m) for m in self.matrices)
 
+    def turned(self, turn: Array) -> "Operations":
+        """The element after a rotation [3, 3] of space."""
+        return replace(self, direction=turn @ self.direction, matrices=turn @ self.matrices @ turn.T)
+
     def alone(self, center: Array) -> Placed:
         """The group that the element generates about a centre."""
         number = "inf" if math.isinf(self.order) else f"{self.order:.0f}"
@@ -80,20 +83,12 @@ def elements(group: PointGroup, *, powers: int = 0) -> list[Operations]:
     An axis stands for its smallest turn and a wide one, and for at most so many `powers` of the first, forth and back:
     of a part of a surface these carry other things out of sight.
     """
-    parts, own, directions, matrices = _standard_parts(group.name, powers)
-    directions, matrices = directions @ group.frame, group.frame.T @ matrices @ group.frame
-    each = zip(parts, own, directions, strict=True)
-    return [Operations(kind=p.kind, direction=u, order=p.order, matrices=matrices[of]) for p, of, u in each]
+    return [part.turned(group.frame.T) for part in _standard_elements(group.name, powers)]
 
 
 @lru_cache(maxsize=512)
-def _standard_parts(name: str, powers: int) -> tuple[tuple[Operations, ...], tuple[slice, ...], Array, Array]:
-    """The same in the standard placement; which of all their matrices are those of each, directions, and matrices.
-
-    They are asked of every candidate wherever it stands, and made once.
-
-    Returns: P elements, P slices, [P, 3] directions and [M, 3, 3] matrices.
-    """
+def _standard_elements(name: str, powers: int) -> tuple[Operations, ...]:
+    """The same in the standard placement: they are asked of every candidate wherever it stands, and made once."""
     group = PointGroup(name=name)
     normals = group.mirrors()
     if name in ("Cinfv", "Kh"):
@@ -111,10 +106,7 @@ def _standard_parts(name: str, powers: int) -> tuple[tuple[Operations, ...], tup
         found.append(Operations(kind="improper", direction=direction, order=order, matrices=both))
     if group.has_inversion:
         found.append(Operations(kind="inversion", direction=group.frame[2], order=2.0, matrices=-np.eye(3)[None]))
-    ends = accumulate(len(p.matrices) for p in found)
-    own = tuple(slice(end - len(p.matrices), end) for p, end in zip(found, ends, strict=True))
-    directions, matrices = [p.direction for p in found], [m for p in found for m in p.matrices]
-    return tuple(found), own, np.reshape(directions, (-1, 3)), np.reshape(matrices, (-1, 3, 3))
+    return tuple(found)
 
 
 def _angles(order: float, powers: int) -> tuple[float, ...]:
