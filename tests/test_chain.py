@@ -16,13 +16,13 @@ from experiments.objects.parts import hull
 from experiments.objects.shapes import box, join, revolve, sample
 from experiments.studies import groups
 from experiments.studies.boundary import Case, look
-from symrefine.decide.chain import _best, _excluded, chain
+from symrefine.decide.chain import _best, chain, excluding
 from symrefine.decide.explore import _holding, _with, explore
 from symrefine.decide.hypotheses import NOTHING, Hypothesis, fitted, single
 from symrefine.decide.joins import _told_apart, better_parts
 from symrefine.decide.looks import by_chance
 from symrefine.decide.pool import Pool
-from symrefine.decide.posterior import Link, decide
+from symrefine.decide.posterior import ALIKE, Link, decide, lenience
 from symrefine.detection.measure import gather, measure
 from symrefine.detection.story import detect
 from symrefine.fit.placed import Placed, joined
@@ -245,6 +245,16 @@ def test_of_mirrors_that_need_as_much_each_may_be_meant():
         assert best.share == pytest.approx(1.0 / (1.0 + rivals))
 
 
+def test_a_lone_mirror_rivals_what_asks_for_as_much_belief():
+    """Belief in what nobody saw of it takes more of what it is forgiven, as it is forgiven more, and no more doubt."""
+    frame, more = rotation([1, 0, 0], np.pi / 3), lenience("Cs")
+    assert more > ALIKE
+    mirror = replace(of("Cs"), placed=Placed(group=point_group("Cs", frame), center=ORIGIN), need=0.01 * more)
+    turn = replace(of("C2"), need=0.01, believed=0.01)
+    for believed, rivals in ((0.01 * more, 1), (0.0, 0)):
+        assert len(_best([turn, replace(mirror, believed=believed)], 0.001, 0.001).rivals) == rivals
+
+
 def test_of_two_that_need_as_little_each_may_be_off():
     """Of what is round but for a label noise leaves any mirror near its own, which was a rival: C1, at .5."""
     for tilt, rivals in ((1.5, 0), (2.5, 1)):
@@ -335,8 +345,18 @@ def test_what_a_larger_group_may_hold_as_well_excludes_nothing(need, kept):
         Placed(group=point_group(name, rotation([1, 0, 0], np.radians(30.0))), center=ORIGIN) for name in ("C2", "C6")
     )
     ball = Hypothesis(placed=Placed(group=point_group("Kh"), center=ORIGIN), elements=(), need=need)
-    link = _excluded(replace(of("C6"), rivals=(tilted, turned)), [ball], LIMIT)
+    _, link, _ = excluding((NOTHING, replace(of("C6"), rivals=(tilted, turned)), ball), LIMIT)
     assert [r.group.name for r in link.rivals] == ["C2", "C6"][2 - kept :]
+
+
+def test_which_groups_exclude_one_another_is_a_matter_of_the_tolerance():
+    """Whichever was asked for: the staircase reads the same table."""
+    tilted = Placed(group=point_group("C2", rotation([1, 0, 0], np.radians(30.0))), center=ORIGIN)
+    ball = Hypothesis(placed=Placed(group=point_group("Kh"), center=ORIGIN), elements=(), need=ALIKE * TOLERANCE)
+    links = (NOTHING, replace(of("C6"), rivals=(tilted,)), ball)
+    found = replace(detect(atoms()).examined, links=links)
+    assert found.decided(0.9 * TOLERANCE).inside[1] == pytest.approx(0.5, abs=1e-3)
+    assert found.decided(TOLERANCE).inside[1] == pytest.approx(1.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("name", ["Cinfv", "Dinfh"])

@@ -757,6 +757,16 @@ def test_a_border_may_hide_why_a_lone_mirror_is_in_doubt():
     assert found.point_group == "Cs" or found.at_least
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("ladder", [{}, {"ladder": ()}], ids=["ladder", "none"])
+def test_of_two_groups_that_a_hole_leaves_possible_none_is_sure(ladder):
+    """One end of a bar slants: the other, which is missing, may slant as its mirror image or as it turned by half."""
+    made, _ = damaged.damaged(damaged.Case(family="catalogue", name="kinect", kind="hole", strength=0.15, seed=101))
+    found = detect(made.points, **ladder)
+    assert found.at_least
+    assert found.point_group == "C1" or found.confidence < 0.6
+
+
 def shackle():
     """A bow, and a pin through its ends that has one head."""
     turn = np.linspace(0.0, math.pi, 33)

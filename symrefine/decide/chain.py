@@ -52,10 +52,10 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
         most *= 1.0 if here.elements else lenience(rest[0].group.name)
         if rest[0].need > most:
             break
-        level = max(ALIKE * rest[0].need, here.need, hidden)
-        batch = [h for h in rest if h.need <= level]
+        level = max(ALIKE * _asked(rest[0]), here.need, hidden)
+        batch = [h for h in rest if _asked(h) <= level]
         found = join(surface, [here, *batch], known, most, pool.limit)
-        if found is None or is_loose(surface, found) or not found.elements or found.need > level:
+        if found is None or is_loose(surface, found) or not found.elements or _asked(found) > level:
             tried = [] if found is None else [found]
             for other in batch[:FOLLOWED]:
                 one = join(surface, [here, other], [*known, *tried], most, pool.limit)
@@ -73,7 +73,6 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
         links.append(replace(found, need=asks.need, believed=asks.believed))
         if asks.need > limit:
             break
-    links = [_excluded(link, links[i + 1 :], limit) for i, link in enumerate(links)]
     told = [NOTHING]
     for link in links[1:]:
         part = _unbroken(surface, link)
@@ -113,9 +112,15 @@ def _unbroken(surface: Surface, found: Hypothesis) -> Hypothesis | None:
     return None
 
 
+def _asked(found: Hypothesis) -> float:
+    """What a group needs, if nobody believed more of a lone mirror than of others because it is forgiven more."""
+    belief = found.believed / lenience(found.group.name)
+    return math.sqrt(max(found.need**2 - found.believed**2, 0.0) + belief**2)
+
+
 def _worst(found: Hypothesis, hidden: float) -> tuple[float, float]:
     """What a group needs; of those that need no more than is hidden, the mean miss of its worst element."""
-    return max(found.need, hidden), max((e.deviation.mean for e in found.elements), default=0.0)
+    return max(_asked(found), hidden), max((e.deviation.mean for e in found.elements), default=0.0)
 
 
 def _best(tried: Sequence[Hypothesis], hidden: float, noise: float) -> Hypothesis | None:
@@ -138,14 +143,18 @@ def _best(tried: Sequence[Hypothesis], hidden: float, noise: float) -> Hypothesi
     best = min((h for h in tried if h.elements), key=rank, default=None)
     if best is None:
         return None
-    apart, most = [best.placed], max(ALIKE * best.need, noise)
-    for other in sorted((h for h in tried if h.elements and h.need <= most), key=rank):
+    apart, most = [best.placed], max(ALIKE * _asked(best), noise)
+    for other in sorted((h for h in tried if h.elements and _asked(h) <= most), key=rank):
         apart += [] if any(is_in(p, other.placed) or is_in(other.placed, p) for p in apart) else [other.placed]
     return replace(best, rivals=tuple(apart[1:]))
 
 
-def _excluded(link: Hypothesis, larger: Sequence[Hypothesis], limit: float) -> Hypothesis:
-    """A link without rivals of another name that a larger group within the limit may hold as well."""
-    both = [h for h in larger if h.need <= limit]
-    kept = [r for r in link.rivals if r.group.name == link.group.name or not any(h.holds(r) for h in both)]
-    return replace(link, rivals=tuple(kept))
+def excluding(links: Sequence[Hypothesis], limit: float) -> tuple[Hypothesis, ...]:
+    """Links of a chain without rivals of another name that a larger group within the limit holds as well."""
+
+    def alone(link: Hypothesis, larger: Sequence[Hypothesis]) -> Hypothesis:
+        both = [h for h in larger if h.need <= limit]
+        kept = [r for r in link.rivals if r.group.name == link.group.name or not any(h.holds(r) for h in both)]
+        return replace(link, rivals=tuple(kept))
+
+    return tuple(alone(link, links[i + 1 :]) if link.rivals else link for i, link in enumerate(links))

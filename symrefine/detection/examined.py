@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from symrefine.decide.chain import excluding
 from symrefine.decide.hypotheses import Hypothesis
 from symrefine.decide.looks import exact_need
 from symrefine.decide.pool import Pool
-from symrefine.decide.posterior import Alternative, Decision, Link, decide, least_told, meant, odd
+from symrefine.decide.posterior import ALIKE, Alternative, Decision, Link, decide, least_told, meant, odd
 from symrefine.detection.measure import Measured, doubt
 from symrefine.detection.sketch import Sample
 from symrefine.fit.placed import SAMPLED
@@ -111,8 +112,12 @@ class Examined:
 
     def known(self, tolerance: float) -> list[Link]:
         """The groups beyond C1 as the decision sees them at a tolerance."""
-        needs = [*(h.need for h in self.links), math.inf]
-        return [self._link(h, beyond, tolerance) for h, beyond in zip(self.links, needs[1:], strict=True)][1:]
+        needs, links = [*(h.need for h in self.links), math.inf], self.links_at(tolerance)
+        return [self._link(h, beyond, tolerance) for h, beyond in zip(links, needs[1:], strict=True)][1:]
+
+    def links_at(self, tolerance: float) -> tuple[Hypothesis, ...]:
+        """The links with those of their rivals that exclude them at a tolerance."""
+        return excluding(self.links, ALIKE * tolerance)
 
     def _link(self, found: Hypothesis, beyond: float, tolerance: float) -> Link:
         """A group of the chain, where the next one needs so much."""
