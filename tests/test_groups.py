@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from symrefine.cli.rows import turn_rad
 from symrefine.errors import DegenerateShapeError, InputError
-from symrefine.geometry import frame_with_z, householder, random_orthogonal, rotation, rotoreflection
+from symrefine.geometry import frame_with_z, householder, orthogonal_factor, random_orthogonal, rotation, rotoreflection
 from symrefine.groups import (
     MAX_FOLD,
     close,
@@ -337,6 +337,30 @@ def test_subgroup_relations_hold_one_way_only(a, b):
 )
 def test_groups_that_are_not_subgroups(a, b):
     assert not is_subgroup(point_group(a), point_group(b))
+
+
+@pytest.mark.parametrize("tolerance_rad", [1e-9, 1e-6, 0.05])
+def test_a_subgroup_is_one_by_the_distances_of_its_operations(tolerance_rad):
+    names = ("C1", "Ci", "Cs", "C3", "C4v", "S4", "D2", "D3h", "Td", "Oh", "I", *CONTINUOUS)
+    rng = rng_of("distances", tolerance_rad)
+    for a, b in product(names, names):
+        frame = random_orthogonal(rng)
+        larger = point_group(b, frame)
+        for factor in (0.0, 0.4, 3.0):
+            tilt = rotation(rng.standard_normal(3), factor * tolerance_rad)
+            smaller = point_group(a, tilt @ frame)
+            away = larger.distance_rad(smaller.sampled(7).operations()).max()
+            within = smaller.order <= larger.order and away <= tolerance_rad
+            assert is_subgroup(smaller, larger, tolerance_rad) == within, (a, b, factor)
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-15, 1e-9, 5e-7])
+def test_a_frame_is_the_nearest_rotation(off):
+    rng = rng_of("nearest", off)
+    frame = random_orthogonal(rng) + off * rng.uniform(-1.0, 1.0, (3, 3))
+    kept = point_group("C3v", frame).frame
+    assert np.abs(kept - orthogonal_factor(frame)).max() < 1e-14  # what a singular value decomposition is off by itself
+    assert np.abs(kept @ kept.T - np.eye(3)).max() < 1e-15
 
 
 def test_subgroups_within_a_tolerance():

@@ -8,6 +8,7 @@ it is the i-th itself is `inside[i] - inside[i + 1]`: the worst element kept and
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from typing import Any, TypeVar
 
@@ -94,19 +95,21 @@ class Link:
             lone_mirror=group.name == "Cs" and beyond >= ALONE * need,
             believed=believed,
             placed=placed,
-            broken=_broken(group),
+            broken=_broken(group.name),
             proven=proven,
         )
 
 
-def _broken(group: PointGroup) -> float:
+@cache
+def _broken(point_group: str) -> float:
+    group = PointGroup(name=point_group)
     alone = len(group.lone_mirrors()) + (not group.is_finite)
     return BROKEN[min(alone, len(BROKEN) - 1)]
 
 
 def odd(group: PointGroup) -> float:
     """Probability that an object which else has a group has a single thing that breaks it, as what nobody saw does."""
-    return min(_broken(group), BROKEN[1])
+    return min(_broken(group.name), BROKEN[1])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

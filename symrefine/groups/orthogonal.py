@@ -4,12 +4,14 @@ A quaternion is (w, x, y, z) with w >= 0. An improper matrix (determinant -1) is
 negative: -1 commutes with everything, so it plays no part in any fit.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symrefine.errors import InputError
 from symrefine.geometry import Array, batches
-from symrefine.rounding import SINGLE
+from symrefine.rounding import DOUBLE, SINGLE
 
 Index = NDArray[np.intp]
 # What is farther than this from an operation is none: angles of the classes of a polyhedral group differ by 0.6 and
@@ -30,6 +32,25 @@ def nearest_orthogonal(matrices: ArrayLike) -> Array:
     if worst > ROUGH:
         raise InputError(f"operations must be orthogonal; a singular value is off 1 by {worst:.2g}")
     return np.asarray(u @ vt)
+
+
+def nearest_rotation(matrix: Array) -> Array | None:
+    """The rotation [3, 3] nearest to a matrix that is one to single precision; None if it is none.
+
+    Each step of Newton's iteration squares by how much it is none (Higham 1986); a fifth of the time of a `svd`.
+    """
+    if matrix.shape != (3, 3):
+        return None
+    off = math.inf
+    while off > DOUBLE:
+        gram = matrix @ matrix.T
+        off = float(np.abs(gram - np.eye(3)).max())
+        if not off <= 2.0 * SINGLE:
+            return None
+        matrix = 1.5 * matrix - 0.5 * (gram @ matrix)
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    determinant = a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g)
+    return matrix if determinant > 0.0 else None
 
 
 def determinants(operations: Array) -> Array:
@@ -77,8 +98,8 @@ def half_turns(directions: Array) -> Array:
 
 def chord_angles(a: Array, b: Array) -> Array:
     """Angle [...] of `a' b` for orthogonal matrices [..., 3, 3]; pi where the determinants differ much."""
-    chord = np.linalg.norm(a - b, axis=(-2, -1))
-    return np.asarray(2.0 * np.arcsin(np.minimum(chord / np.sqrt(8.0), 1.0)))
+    squares = ((a - b) ** 2).sum(axis=(-2, -1))
+    return np.asarray(2.0 * np.arcsin(np.minimum(np.sqrt(squares / 8.0), 1.0)))
 
 
 def about_z(ends: ArrayLike, dets: ArrayLike, angles_rad: Array) -> Array:
@@ -118,6 +139,23 @@ def nearest_operations(operations: Array, group: Array, frame: Array) -> tuple[I
     for batch in batches(len(turned), len(group)):
         index[batch] = np.argmax(given[batch] @ known, axis=1)
     return index, chord_angles(turned, group[index])
+
+
+def overlaps(operations: Array, group: Array) -> Array:
+    """Traces [k] of `A' G` for each of operations [k, 3, 3] and the G of a group [m, 3, 3] that is nearest to it."""
+    given, known = operations.reshape(len(operations), 9), group.reshape(len(group), 9).T
+    return np.concatenate([(given[batch] @ known).max(axis=1) for batch in batches(len(given), len(group))])
+
+
+def angle_of_overlap(trace: float) -> float:
+    """The angle that `chord_angles` tells of orthogonal matrices A and B, from the trace of `A' B`."""
+    return 2.0 * math.asin(math.sqrt(min(max(3.0 - trace, 0.0) / 4.0, 1.0)))
+
+
+def overlaps_about_z(operations: Array, end: float, det: float) -> Array:
+    """The same [k] of all that `about_z` makes of an end and a determinant."""
+    x, y = operations[:, 0], operations[:, 1]
+    return np.asarray(np.hypot(x[:, 0] + det * y[:, 1], y[:, 0] - det * x[:, 1]) + end * operations[:, 2, 2])
 
 
 def fit_frame(sources: Array, targets: Array, start: Array) -> Array:

@@ -8,6 +8,7 @@ group acts on the object as `F' G F`.
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -18,11 +19,15 @@ from symrefine.geometry import Array, frame_with_z, numbers, orthogonal_factor, 
 from symrefine.groups.names import Symbol, parse
 from symrefine.groups.orthogonal import (
     about_z,
+    angle_of_overlap,
     angles_about_z,
     chord_angles,
     determinants,
     nearest_operations,
     nearest_orthogonal,
+    nearest_rotation,
+    overlaps,
+    overlaps_about_z,
 )
 from symrefine.groups.standard import Elements, OrderedAxis, standard_elements, standard_operations
 from symrefine.rounding import SINGLE
@@ -44,8 +49,8 @@ class PointGroup:
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", parse(str(self.name)).name)
         frame = numbers(self.frame, f"components of the frame of {self.name}")
-        nearest = orthogonal_factor(frame) if frame.shape == (3, 3) and np.isfinite(frame).all() else np.zeros((3, 3))
-        if np.linalg.det(nearest) <= 0.0 or np.abs(nearest - frame).max() > SINGLE:
+        nearest = nearest_rotation(frame)
+        if nearest is None:
             raise InputError(f"the frame of {self.name} must be a rotation matrix [3, 3], determinant +1")
         object.__setattr__(self, "frame", read_only(nearest))
 
@@ -197,10 +202,7 @@ class PointGroup:
             return [turned]
         if family == "K":
             return [orthogonal_factor(turned, proper=True)]
-        # What it does to its axis (sign of z) and to the plane across (determinant there), each finite member does too.
-        members = standard_operations(Symbol(family=family, fold=2))
-        parts = {(round(m[2, 2]), round(det * m[2, 2])) for m, det in zip(members, determinants(members), strict=True)}
-        return [about_z(end, det, angles_about_z(turned, det)) for end, det in parts]
+        return [about_z(end, det, angles_about_z(turned, det)) for end, det in _connected_parts(family)]
 
 
 def point_group(name: str, frame: ArrayLike | None = None) -> PointGroup:
@@ -222,8 +224,11 @@ def is_subgroup(a: PointGroup, b: PointGroup, tolerance_rad: float = SINGLE) -> 
     """Whether every operation of `a` is, within `tolerance_rad`, an operation of `b`, both where they stand."""
     if a.order > b.order:
         return False
-    members = a.frame.T @ standard_operations(_sampled(a.symbol, 7)) @ a.frame
-    return bool(_away_rad(b, members).max() <= tolerance_rad)
+    members = standard_operations(_sampled(a.symbol, 7))
+    if tolerance_rad < SINGLE:  # the trace tells an angle to the square root of what rounding leaves
+        return bool(_away_rad(b, a.frame.T @ members @ a.frame).max() <= tolerance_rad)
+    turn = b.frame @ a.frame.T
+    return angle_of_overlap(_overlap(b, turn @ members @ turn.T)) <= tolerance_rad
 
 
 def _away_rad(group: PointGroup, matrices: Array) -> Array:
@@ -231,6 +236,17 @@ def _away_rad(group: PointGroup, matrices: Array) -> Array:
     if group.is_finite:
         return nearest_operations(matrices, standard_operations(group.symbol), group.frame)[1]
     return chord_angles(matrices, group.nearest(matrices))
+
+
+def _overlap(group: PointGroup, turned: Array) -> float:
+    """The least trace of `A' G` for operations A [k, 3, 3] in the standard placement and the G nearest to each."""
+    family = group.symbol.family
+    if group.is_finite:
+        return float(overlaps(turned, standard_operations(group.symbol)).min())
+    if family in ("K", "Kh"):
+        return 3.0 if family == "Kh" or (determinants(turned) > 0.0).all() else 1.0
+    parts = [overlaps_about_z(turned, end, det) for end, det in _connected_parts(family)]
+    return float(np.max(parts, axis=0).min())
 
 
 def _sampled(symbol: Symbol, fold: int) -> Symbol:
@@ -242,6 +258,14 @@ def _sampled(symbol: Symbol, fold: int) -> Symbol:
 
 def _turned(axes: Iterable[OrderedAxis], frame: Array) -> list[OrderedAxis]:
     return [(u @ frame, order) for u, order in axes]
+
+
+@cache
+def _connected_parts(family: str) -> tuple[tuple[int, int], ...]:
+    """What those of a continuous group do to its axis (sign of z) and to the plane across (determinant there)."""
+    members = standard_operations(Symbol(family=family, fold=2))  # each finite member has them, too
+    signs = zip(members, determinants(members), strict=True)
+    return tuple(sorted({(round(m[2, 2]), round(det * m[2, 2])) for m, det in signs}))
 
 
 def _continuous_elements(family: str) -> Elements:
