@@ -268,12 +268,12 @@ def _turned_down(found: Examined, chosen: Hypothesis, most: float) -> list[Eleme
             break
         if not chosen.holds(start.placed):
             beyond += judged(found.surface, start.placed).elements
-    told: list[Element] = []
-    for e in sorted(beyond, key=lambda e: e.need):
-        matrix = e.operations.matrices[0][None]
-        others = [chosen.group.distance_rad(matrix)[0]] if chosen.elements else []
-        others += [float(np.linalg.norm(matrix[0] - o.operations.matrices[0])) for o in told]
-        if min(others, default=math.inf) > math.radians(5.0):
+    beyond, told = sorted(beyond, key=lambda e: e.need), list[Element]()
+    matrices = np.array([e.operations.matrices[0] for e in beyond]).reshape(-1, 3, 3)
+    away = chosen.group.distance_rad(matrices) if chosen.elements else np.full(len(beyond), math.inf)
+    for e, matrix, own in zip(beyond, matrices, away, strict=True):
+        others = [float(np.linalg.norm(matrix - o.operations.matrices[0])) for o in told]
+        if min(own, *others, math.inf) > math.radians(5.0):
             told.append(e)
     return told[:NEAR]
 
