@@ -79,9 +79,8 @@ class Shape:
             for name, checked in self._checked():
                 object.__setattr__(self, name, checked)
         if (self.points[-1] == self.points[0]).all() and (self.points == self.points[0]).all():
-            raise DegenerateShapeError(
-                f"{self.source}: all {len(self.points)} points coincide; a shape needs at least two distinct points"
-            )
+            some = f"all {len(self.points)} points coincide" if len(self.points) > 1 else "one point"
+            raise DegenerateShapeError(f"{self.source}: {some}; a shape needs at least two distinct points")
 
     def _checked(self) -> Iterator[tuple[str, Any]]:
         """Fields as they are kept, one after the other: those that come later are checked against them."""

@@ -38,6 +38,13 @@ def standing(mesh, seed, size=1.5):
     return pose.of(made.points), made.strays == 1, pose
 
 
+@pytest.mark.parametrize("places", [300, 2], ids=["a line", "two places"])
+def test_points_on_a_line_stand_on_nothing(places):
+    """No three of them make a plane; two places, told many times over, are a line as well."""
+    points = np.outer(np.arange(600) % places, [1.0, 2.0, 3.0])
+    assert floor_of(points) is None
+
+
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("make", [lambda: stool(3), mug, lambda: BRICK])
 def test_a_floor_is_found_wherever_it_lies(make, seed):

@@ -513,6 +513,7 @@ BAD_TEXT = [
     ("a.xyz", "1 2 3\n", "only one point, [1.0, 2.0, 3.0]"),
     ("a.xyz", "1 2 3\n1 2 3\n1 2 3\n", "all 3 points are [1.0, 2.0, 3.0]"),
     ("a.csv", "a,b,c\n1,2,3\n", "line 1: columns 'a,b,c'; expected x,y or x,y,z"),
+    ("a.csv", "x,y,z,w\n1,2,3,1\n2,2,3,1\n", "columns 'x,y,z,w'; expected x,y or x,y,z"),
     ("a.csv", "x,y,z\n1,2\n", "line 2 has 2 columns; expected 3 columns as in the first line"),
     ("a.csv", "1,2,3\n1,,3\n", "line 2, column 2: '' is not a number"),
     ("a.csv", "1\n2\n", "2 rows of 1 number; expected one row [N, n] for each point"),

@@ -114,7 +114,7 @@ def test_few_samples_are_not_decided() -> None:
 
 def test_what_is_refused() -> None:
     rng = np.random.default_rng(0)
-    with pytest.raises(InputError, match="9 coordinates; detect_nd takes points of 2 to 8 coordinates"):
+    with pytest.raises(InputError, match="9 coordinates; expected points of 2 to 8 coordinates"):
         detect_nd(rng.normal(size=(40, 9)))
     with pytest.raises(InputError, match=r"tolerance is 0\.5"):
         detect_nd(rng.normal(size=(40, 4)), tolerance=0.5)
@@ -143,7 +143,7 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert f"is for objects in space; {path} has 4 coordinates; use --report" in capsys.readouterr().err
     np.save(path, rng.normal(size=(40, 9)))
     assert invoke(["detect", str(path)]) == 2
-    assert "9 coordinates; detect_nd takes points of 2 to 8 coordinates" in capsys.readouterr().err
+    assert "9 coordinates; expected points of 2 to 8 coordinates" in capsys.readouterr().err
 
 
 # --- reflection groups ------------------------------------------------------------------------------------------------

@@ -75,11 +75,11 @@ def run(args: argparse.Namespace) -> int:
 
     does, out = executor(args), Path(args.out)
     models, is_told = models_of(Path(args.dir), numbers_before(out))
-    if not is_told:
-        note(f"{args.dir}: no name tells a number, as obj_000001.ply does; {out / LABELS} has those that were given")
     asked = heads(models, detection_options(args), float(args.scale or 1.0))
     given = read_decisions(Path(args.decisions)) if args.decisions else {}
     _check(args.decisions, given, asked)
+    if not is_told:
+        note(f"{args.dir}: no name tells a number, as obj_000001.ply does; {out / LABELS} has those that were given")
     with opened(out) as held:
         kept = read_decisions(out / DECISIONS) if (out / DECISIONS).is_file() else {}
         rows = _detected(args, does, asked, held, merged(kept, given))

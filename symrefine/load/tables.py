@@ -129,7 +129,7 @@ def _check_names(names: list[str], line: int) -> bool:
     numbered = [[f"x{k + first}" for k in range(len(names))] for first in (0, 1)]
     if names == ["x", "y", "z", "nx", "ny", "nz"]:
         return True
-    if names in (["x", "y"], ["x", "y", "z"], ["x", "y", "z", "w"]) or names in numbered:
+    if names in (["x", "y"], ["x", "y", "z"]) or names in numbered:  # a w may be a weight
         return False
     raise InputError(
         f"line {line}: columns {shorten(','.join(names))}; expected x,y or x,y,z or x,y,z,nx,ny,nz or "

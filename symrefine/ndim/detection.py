@@ -99,7 +99,7 @@ def detect_nd(
     if not 2 <= shape.dim <= LARGEST_DIM or shape.faces is not None:
         what = "a mesh" if shape.faces is not None else f"{shape.dim} coordinates"
         rows = "; a row is a point, transpose them?" if len(shape.points) <= LARGEST_DIM < shape.dim else ""
-        raise InputError(f"{shape.source}: {what}; detect_nd takes points of 2 to {LARGEST_DIM} coordinates{rows}")
+        raise InputError(f"{shape.source}: {what}; expected points of 2 to {LARGEST_DIM} coordinates{rows}")
     sampled = not shape.atoms if sampled is None else sampled
     clock = Clock()
     with clock("moments"):

@@ -87,7 +87,7 @@ def floor_of(points: Array, seen_from: Array | None = None) -> Floor | None:
     for thick in tight_diagonal(points) * np.array(THICK):
         on = np.abs(heights) <= thick
         held = np.where(_has_sides(heights, thick), on.mean(axis=1), 0.0)
-        while held.max() > SHARES[0]:
+        while held.max(initial=0.0) > SHARES[0]:  # points on a line make no plane
             best = int(held.argmax())
             found = _about(some, places[best], across[best], thick)
             found = found and _about(points, found.offset * found.normal, found.normal, thick)
