@@ -23,7 +23,7 @@ from symrefine.align.judge import Judge, Met
 from symrefine.align.landscape import grid_rotations, harmonic_pair, hills, landscape, least_misfit
 from symrefine.align.moment_fit import as_good, best_fits, covariance, exact, fit, misfit
 from symrefine.align.pair import Evidence
-from symrefine.align.partial import _first
+from symrefine.align.partial import _first, _weighed
 from symrefine.align.polish import Polished, Similarity, polish
 from symrefine.align.procrustes import procrustes
 from symrefine.align.rivals import Choice, choose, polished
@@ -987,16 +987,36 @@ def test_what_carries_a_whole_source_onto_itself_leaves_equivalents_whatever_the
     assert found.determinant_confidence < 0.7
 
 
+def met(sign: float, well: float, denied: float = 0.0) -> Met:
+    """A map of a determinant, well met by so much of both sides; the target denies it by so much."""
+    sides = (Merit(well=well, less=0.05, nothing=0.0), Merit(well=well - denied, less=0.05, nothing=denied))
+    motion = Similarity(matrix=np.diag([1.0, 1.0, sign]), shift=np.zeros(3))
+    return Met(motion=motion, covariance=np.eye(6), sides=sides, overlap=(0.8, 0.8), rms=0.0, sigma=0.02)
+
+
 @pytest.mark.parametrize(("lead", "det"), [(0.0, 1), (0.02, 1), (0.1, -1)])
 def test_a_rotation_comes_first_where_a_reflection_leads_by_what_chance_explains(lead: float, det: int) -> None:
-    def met(sign: float, well: float) -> Met:
-        side = Merit(well=well, less=0.05, nothing=0.0)
-        motion = Similarity(matrix=np.diag([1.0, 1.0, sign]), shift=np.zeros(3))
-        return Met(motion=motion, covariance=np.eye(6), sides=(side, side), overlap=(0.8, 0.8), rms=0.0, sigma=0.02)
-
     every = [met(1.0, 0.6), met(-1.0, 0.6 + 0.5 * lead), met(-1.0, 0.5)]
     for maps in (every, every[::-1]):
         assert _first(maps).determinant == det
+
+
+@pytest.mark.parametrize(("lead", "sure"), [(-0.1, True), (0.03, True), (0.17, False), (0.4, False)])
+def test_a_map_of_the_hand_that_is_not_admitted_tells_against_others_where_it_does_better(
+    lead: float, sure: bool
+) -> None:
+    """The mirror image of a desk lay on it as a turn at .97, where nobody asked for the reflection that fits."""
+    told = _weighed(met(1.0, 0.6), [met(-1.0, 0.6 + lead)], -1.0, reflections=False, open_=False)
+    assert told.confidence > 0.9 if sure else told.confidence < 0.2
+    assert told.equals == ()
+
+
+@pytest.mark.parametrize(("denied", "equals"), [(0.0, 1), (0.01, 1), (0.2, 0)])
+def test_a_map_that_one_side_denies_is_no_equal_of_one_that_both_take(denied: float, equals: int) -> None:
+    """As well by the source alone, but a quarter of the target met nothing."""
+    told = _weighed(met(1.0, 0.6), [met(1.0, 0.6, denied)], -1.0, reflections=True, open_=False)
+    assert len(told.equals) == equals
+    assert told.confidence > 0.9
 
 
 @pytest.mark.parametrize(("name", "seed"), [("propeller5", 0), ("rotor3", 2)])

@@ -77,16 +77,22 @@ def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool
     A map of a determinant that is not admitted tells against them only where it does better.
     """
     fitting = fits(best.sides)
-    alike = [r for r in rivals if as_good(best.score, r.score) and as_good(r.score, best.score)]
-    others = [r.score for r in rivals if r not in alike]
+    admitted = [r for r in rivals if reflections or r.determinant > 0]
+    barred = max((r.score for r in rivals if r not in admitted), default=-math.inf)
+    alike = [r for r in admitted if as_good(best.score, r.score) and as_good(r.score, best.score)]
+    others = [r.score for r in admitted if r not in alike]
     slides = best.is_loose or ahead(best.score, [slid]) < 0.5
-    certain = 0.0 if slides else fitting * ahead(best.score, [*others, slid])
-    every = [best, *(r for r in alike if reflections or r.determinant > 0)]
-    first = _first(every)
+    first = _first([best, *alike])
+    # What one side alone takes for as good the other one may deny.
+    both = {id(m): said_by_both(m.sides) for m in (best, *alike)}
+    equals = [m for m in (best, *alike) if m is not first and as_good(both[id(first)], both[id(m)])]
+    denied = [both[id(m)] for m in (best, *alike) if m is not first and m not in equals]
+    ahead_of_all = ahead(best.score, [*others, slid]) * ahead(both[id(first)], denied)
+    certain = 0.0 if slides else fitting * ahead_of_all * (1.0 - ahead(barred, [best.score]))
     other_hand = [m.score for m in (best, *rivals) if m.determinant != first.determinant]
     return Meeting(
         best=first,
-        equals=tuple(m for m in every if m is not first),
+        equals=tuple(equals),
         confidence=certain,
         # Where nothing fits, either is as likely; where one is not admitted, nobody asks.
         determinant_confidence=0.5 + fitting * (max(ahead(first.score, other_hand), 0.5) - 0.5) if reflections else 1.0,
