@@ -255,6 +255,21 @@ def test_a_lone_mirror_rivals_what_asks_for_as_much_belief():
         assert len(_best([turn, replace(mirror, believed=believed)], 0.001, 0.001).rivals) == rivals
 
 
+def test_of_mirrors_that_need_nothing_the_one_is_told_that_most_speaks_for():
+    """The diagonal of a seat, most of which nobody saw, missed by a little less in what was seen than the true one."""
+
+    def mirror(angle, mean, supported):
+        placed = Placed(group=point_group("Cs", rotation([1, 0, 0], angle)), center=ORIGIN)
+        (element,) = of("Cs").elements
+        coverage = replace(element.coverage, supported=supported, unseen=1.0 - supported)
+        element = replace(element, deviation=replace(element.deviation, mean=mean), coverage=coverage)
+        return replace(of("Cs"), placed=placed, need=0.0, elements=(element,))
+
+    diagonal, true = mirror(0.0, 0.00036, 0.26), mirror(np.pi / 4, 0.00039, 0.76)
+    assert _best([diagonal, true], 0.008, 0.008).placed is true.placed
+    assert _best([diagonal, mirror(np.pi / 4, 0.00039, 0.26)], 0.008, 0.008).placed is diagonal.placed
+
+
 def test_of_two_that_need_as_little_each_may_be_off():
     """Of what is round but for a label noise leaves any mirror near its own, which was a rival: C1, at .5."""
     for tilt, rivals in ((1.5, 0), (2.5, 1)):

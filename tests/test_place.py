@@ -11,6 +11,7 @@ from experiments.objects import damage, household
 from experiments.objects.constructions import polygon
 from experiments.objects.parts import assembled, extruded
 from experiments.objects.shapes import bottle, box, join, mug, revolve, sample, table
+from experiments.studies import single_views
 from symrefine.decide.hypotheses import fitted, judged
 from symrefine.decide.looks import few_motions, looked_at
 from symrefine.decide.place import SUPPORTED, _needs, _ways, freest, is_told, least_elsewhere, nowhere, slack
@@ -203,6 +204,14 @@ def test_what_no_camera_saw_may_break_one_of_two_mirrors_and_leave_the_other():
     assert others["C1"] < others["Cs"] < found.confidence
     assert [p.confidence for p in found.planes] == pytest.approx([found.confidence + 0.5 * others["Cs"]] * 2)
     assert [a.confidence for a in found.axes] == pytest.approx([found.confidence])
+
+
+@pytest.mark.slow
+def test_of_two_mirrors_that_exclude_one_another_none_is_sure_as_it_was_seen_less():
+    """From below a chair without arms may have the mirror of its seat's diagonal, most of which is unseen."""
+    family = next(c.family for c in single_views.cases(80, clean=False) if c.name == "chair")
+    told = single_views.run(single_views.Case(family=family, name="chair", clean=False, seed=80)).told
+    assert all(t.is_true >= 0 or t.confidence < 0.5 for t in told)
 
 
 def test_a_wall_is_not_met_by_its_other_side():

@@ -10,14 +10,14 @@ from dataclasses import replace
 from functools import partial
 from operator import attrgetter
 
-from symrefine.decide.hypotheses import NOTHING, Hypothesis, fitted, has_all, hidden_need, single
+from symrefine.decide.hypotheses import NOTHING, Hypothesis, doubtless, fitted, has_all, hidden_need, single
 from symrefine.decide.joins import better_parts, is_loose, join, size_of
 from symrefine.decide.looks import COARSE, by_chance
 from symrefine.decide.place import is_told, least_elsewhere, told_apart
 from symrefine.decide.pool import Pool
 from symrefine.decide.posterior import ALIKE, ALONE, lenience
 from symrefine.fit.placed import Placed, joined
-from symrefine.rounding import START_ERROR
+from symrefine.rounding import DOUBLE, START_ERROR
 from symrefine.samples import FOLLOWED
 from symrefine.surface.surface import Surface
 
@@ -36,8 +36,9 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
     if not (near or pool.small):
         nearest = (h for h in turned_down[:FOLLOWED] if h.need <= ALIKE * limit * lenience(h.group.name))
         near = [fitted(surface, h.placed) for h in nearest]
-    # What is hidden by noise, or by the least tolerance that is asked for, tells no two groups apart.
-    hidden = max(hidden_need(surface), pool.nothing / ALIKE)
+    # What is hidden by noise, or by the least tolerance that is asked for, tells no two groups apart; nor does, of what
+    # cameras saw a part of, what leaves no doubt, as a group needs the less the more of it is unseen.
+    hidden = max(hidden_need(surface), pool.nothing / ALIKE, doubtless(surface) if surface.viewed else 0.0)
     worst = partial(_worst, hidden=hidden)
     # What does not hold within the limit had its better elements tried.
     holding = (h for h in (*pool.small, pool.largest) if h.need <= pool.limit)
@@ -62,7 +63,7 @@ def chain(surface: Surface, pool: Pool, limit: float) -> tuple[Hypothesis, ...]:
                 tried += [] if one is None else [one]
             tried = [h for h in tried if not is_loose(surface, h)]
             known += tried
-            found = _best(tried, hidden, hidden_need(surface))
+            found = _best(tried, hidden, hidden if surface.viewed else hidden_need(surface))
         # Directions may part what together makes the same group again.
         if found is None or found.group.name == here.group.name:
             rest = [h for h in rest if h not in batch]
@@ -119,8 +120,12 @@ def _asked(found: Hypothesis) -> float:
 
 
 def _worst(found: Hypothesis, hidden: float) -> tuple[float, float]:
-    """What a group needs; of those that need no more than is hidden, the mean miss of its worst element."""
-    return max(_asked(found), hidden), max((e.deviation.mean for e in found.elements), default=0.0)
+    """What a group needs; of those that need no more than is hidden, the mean miss of its worst element.
+
+    For as much of the surface as speaks for it: what is mostly unseen hardly misses.
+    """
+    mean = max((e.deviation.mean for e in found.elements), default=0.0)
+    return max(_asked(found), hidden), mean / max(found.supported, DOUBLE)
 
 
 def _best(tried: Sequence[Hypothesis], hidden: float, noise: float) -> Hypothesis | None:
