@@ -18,7 +18,7 @@ from experiments.studies.measure import score_planes
 from symrefine import Detection, Shape, detect
 from symrefine.detection import story
 from symrefine.errors import DegenerateShapeError, InputError
-from symrefine.geometry import line_angle_rad, random_orthogonal
+from symrefine.geometry import householder, line_angle_rad, random_orthogonal
 from symrefine.groups import is_subgroup, point_group
 from symrefine.moments.quadrature import sample_surface
 
@@ -436,6 +436,15 @@ def test_a_larger_tolerance_never_loses_a_plane():
     dented = TABLE + [0, 0, 0.05] * (TABLE[:, :1] > 0.2)
     loose, strict = (detect(dented, tolerance=t) for t in (0.1, 0.005))
     assert len(loose.planes) > len(strict.planes)
+
+
+def test_what_the_group_has_is_no_near_miss():
+    """Of a brick that is nearly a square prism the turns by a quarter are, and none of its own mirrors."""
+    found = detect(join([box((0, 0, 0), (1.0, 1.05, 1.6))]))
+    planes = [m for m in found.near_misses if m.kind == "plane"]
+    assert (found.point_group, len(planes)) == ("D2h", 2)
+    for plane in planes:
+        assert found.group.distance_rad(householder(plane.direction)[None])[0] > 0.5
 
 
 def test_near_misses_name_the_rejected_planes_and_by_how_much():

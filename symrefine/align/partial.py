@@ -83,16 +83,17 @@ def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool
     others = [r.score for r in admitted if r not in alike]
     slides = best.is_loose or ahead(best.score, [slid]) < 0.5
     first = _first([best, *alike])
+    rest = [(m, said_by_both(m.sides)) for m in (best, *alike) if m is not first]
     # What one side alone takes for as good the other one may deny.
-    both = {id(m): said_by_both(m.sides) for m in (best, *alike)}
-    equals = [m for m in (best, *alike) if m is not first and as_good(both[id(first)], both[id(m)])]
-    denied = [both[id(m)] for m in (best, *alike) if m is not first and m not in equals]
-    ahead_of_all = ahead(best.score, [*others, slid]) * ahead(both[id(first)], denied)
-    certain = 0.0 if slides else fitting * ahead_of_all * (1.0 - ahead(barred, [best.score]))
+    most = said_by_both(first.sides)
+    equals = tuple(m for m, said in rest if as_good(most, said))
+    denied = [said for _, said in rest if not as_good(most, said)]
+    leads = ahead(best.score, [*others, slid]) * ahead(most, denied) * (1.0 - ahead(barred, [best.score]))
+    certain = 0.0 if slides else fitting * leads
     other_hand = [m.score for m in (best, *rivals) if m.determinant != first.determinant]
     return Meeting(
         best=first,
-        equals=tuple(equals),
+        equals=equals,
         confidence=certain,
         # Where nothing fits, either is as likely; where one is not admitted, nobody asks.
         determinant_confidence=0.5 + fitting * (max(ahead(first.score, other_hand), 0.5) - 0.5) if reflections else 1.0,

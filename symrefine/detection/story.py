@@ -140,8 +140,8 @@ def _report(
     on = found.vertices_of(chosen)
     exact = on or found.exact_part(chosen)
     chosen = chosen if on is None else _polished(chosen, on, measured)
-    excluding = found.links_at(tolerance)
-    sure = {id(e): _confidence(e, excluding, decision) for e in chosen.elements}
+    with_rivals = found.links_at(tolerance)
+    sure = {id(e): _confidence(e, with_rivals, decision) for e in chosen.elements}
     planes = [e for e in chosen.elements if e.operations.kind == "plane"]
     turns = [e for e in chosen.elements if e.operations.kind in ("axis", "improper")]
     turned_down = [] if reason else _turned_down(found, chosen, COARSE * tolerance)
