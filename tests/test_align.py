@@ -1009,6 +1009,7 @@ def test_a_map_of_the_hand_that_is_not_admitted_tells_against_others_where_it_do
     told = _weighed(met(1.0, 0.6), [met(-1.0, 0.6 + lead)], -1.0, reflections=False, open_=False)
     assert told.confidence > 0.9 if sure else told.confidence < 0.2
     assert told.equals == ()
+    assert ("a reflection lays the objects on one another better" in told.status) == (0.1 < lead < 0.2)
 
 
 @pytest.mark.parametrize(("denied", "equals"), [(0.0, 1), (0.01, 1), (0.2, 0)])

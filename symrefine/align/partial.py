@@ -98,7 +98,7 @@ def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool
         # Where nothing fits, either is as likely; where one is not admitted, nobody asks.
         determinant_confidence=0.5 + fitting * (max(ahead(first.score, other_hand), 0.5) - 0.5) if reflections else 1.0,
         slides=slides,
-        status=OK if certain > 0.5 else _doubt(best, rivals, fitting, slides, open_),
+        status=OK if certain > 0.5 else _doubt(best, rivals, fitting, slides, open_, barred),
     )
 
 
@@ -112,12 +112,14 @@ def _first(every: Sequence[Met]) -> Met:
     return next((m for m in level if m.determinant > 0), first)
 
 
-def _doubt(best: Met, rivals: Sequence[Met], fitting: float, slides: bool, open_: bool) -> str:
+def _doubt(best: Met, rivals: Sequence[Met], fitting: float, slides: bool, open_: bool, barred: float) -> str:
     """Why the best map is not to be relied upon; nothing where the objects do not fit, and nothing may be missing."""
     if any(not as_good(r.score, best.score) for r in rivals) or (fitting < 0.5 and not open_):
         return ""
     if slides:
         return f"{OPEN}: what the objects share may slide or turn in itself"
+    if ahead(barred, [best.score]) > 0.5:
+        return f"{OPEN}: a reflection lays the objects on one another better, and none is admitted"
     met = " and ".join(f"{100 * share:.0f} %" for share in best.overlap)
     well = 100 * max(side.well for side in best.sides)
     return f"{OPEN}: {met} of source and target meet, {well:.0f} % as well as one object does, which may be chance"
