@@ -354,6 +354,17 @@ def test_a_subgroup_is_one_by_the_distances_of_its_operations(tolerance_rad):
             assert is_subgroup(smaller, larger, tolerance_rad) == within, (a, b, factor)
 
 
+@pytest.mark.parametrize(("stretched", "is_one"), [(1.4e-6, True), (1.6e-6, False), (-1.6e-6, False)])
+def test_a_frame_is_one_if_no_component_is_off_by_more_than_single_precision(stretched, is_one):
+    """The largest component here is 2/3."""
+    frame = (1.0 + stretched) / 3.0 * np.array([[2.0, -1.0, 2.0], [2.0, 2.0, -1.0], [-1.0, 2.0, 2.0]])
+    if is_one:
+        assert np.abs(point_group("C2", frame).frame - frame).max() < 1e-6
+    else:
+        with pytest.raises(InputError, match="rotation matrix"):
+            point_group("C2", frame)
+
+
 @pytest.mark.parametrize("off", [0.0, 1e-15, 1e-9, 5e-7])
 def test_a_frame_is_the_nearest_rotation(off):
     rng = rng_of("nearest", off)

@@ -79,6 +79,7 @@ def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool
     fitting = fits(best.sides)
     admitted = [r for r in rivals if reflections or r.determinant > 0]
     barred = max((r.score for r in rivals if r not in admitted), default=-math.inf)
+    reflected = ahead(barred, [best.score])
     alike = [r for r in admitted if as_good(best.score, r.score) and as_good(r.score, best.score)]
     others = [r.score for r in admitted if r not in alike]
     slides = best.is_loose or ahead(best.score, [slid]) < 0.5
@@ -88,7 +89,7 @@ def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool
     most = said_by_both(first.sides)
     equals = tuple(m for m, said in rest if as_good(most, said))
     denied = [said for _, said in rest if not as_good(most, said)]
-    leads = ahead(best.score, [*others, slid]) * ahead(most, denied) * (1.0 - ahead(barred, [best.score]))
+    leads = ahead(best.score, [*others, slid]) * ahead(most, denied) * (1.0 - reflected)
     certain = 0.0 if slides else fitting * leads
     other_hand = [m.score for m in (best, *rivals) if m.determinant != first.determinant]
     return Meeting(
@@ -98,7 +99,7 @@ def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool
         # Where nothing fits, either is as likely; where one is not admitted, nobody asks.
         determinant_confidence=0.5 + fitting * (max(ahead(first.score, other_hand), 0.5) - 0.5) if reflections else 1.0,
         slides=slides,
-        status=OK if certain > 0.5 else _doubt(best, rivals, fitting, slides, open_, barred),
+        status=OK if certain > 0.5 else _doubt(best, rivals, fitting, slides, open_, reflected),
     )
 
 
@@ -112,13 +113,13 @@ def _first(every: Sequence[Met]) -> Met:
     return next((m for m in level if m.determinant > 0), first)
 
 
-def _doubt(best: Met, rivals: Sequence[Met], fitting: float, slides: bool, open_: bool, barred: float) -> str:
+def _doubt(best: Met, rivals: Sequence[Met], fitting: float, slides: bool, open_: bool, reflected: float) -> str:
     """Why the best map is not to be relied upon; nothing where the objects do not fit, and nothing may be missing."""
     if any(not as_good(r.score, best.score) for r in rivals) or (fitting < 0.5 and not open_):
         return ""
     if slides:
         return f"{OPEN}: what the objects share may slide or turn in itself"
-    if ahead(barred, [best.score]) > 0.5:
+    if reflected > 0.5:
         return f"{OPEN}: a reflection lays the objects on one another better, and none is admitted"
     met = " and ".join(f"{100 * share:.0f} %" for share in best.overlap)
     well = 100 * max(side.well for side in best.sides)

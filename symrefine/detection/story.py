@@ -273,7 +273,7 @@ def _turned_down(found: Examined, chosen: Hypothesis, most: float) -> list[Eleme
     away = chosen.group.distance_rad(matrices) if chosen.elements else np.full(len(beyond), math.inf)
     for e, matrix, own in zip(beyond, matrices, away, strict=True):
         others = [float(np.linalg.norm(matrix - o.operations.matrices[0])) for o in told]
-        if min(own, *others, math.inf) > math.radians(5.0):
+        if min([own, *others]) > math.radians(5.0):
             told.append(e)
     return told[:NEAR]
 

@@ -5,6 +5,7 @@ negative: -1 commutes with everything, so it plays no part in any fit.
 """
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,13 +42,17 @@ def nearest_rotation(matrix: Array) -> Array | None:
     """
     if matrix.shape != (3, 3):
         return None
-    off = math.inf
+    given, off = matrix, math.inf
     while off > DOUBLE:
         gram = matrix @ matrix.T
         off = float(np.abs(gram - np.eye(3)).max())
-        if not off <= 2.0 * SINGLE:
+        if (
+            not off <= 4.0 * SINGLE
+        ):  # rows that are off by SINGLE in each component have products off by 2 sqrt(3) of it
             return None
         matrix = 1.5 * matrix - 0.5 * (gram @ matrix)
+    if np.abs(matrix - given).max() > SINGLE:
+        return None
     (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
     determinant = a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g)
     return matrix if determinant > 0.0 else None
@@ -134,17 +139,22 @@ def unique_lines(directions: Array) -> tuple[Array, Index]:
 def nearest_operations(operations: Array, group: Array, frame: Array) -> tuple[Index, Array]:
     """For each operation [k, 3, 3] the nearest `F' G F`, G in `group` [m, 3, 3]: its index [k] and angle away [k]."""
     turned = frame @ operations @ frame.T
-    given, known = turned.reshape(len(turned), 9), group.reshape(len(group), 9).T
     index = np.empty(len(turned), dtype=np.intp)
-    for batch in batches(len(turned), len(group)):
-        index[batch] = np.argmax(given[batch] @ known, axis=1)
+    for batch, traces in _traces(turned, group):
+        index[batch] = np.argmax(traces, axis=1)
     return index, chord_angles(turned, group[index])
 
 
 def overlaps(operations: Array, group: Array) -> Array:
     """Traces [k] of `A' G` for each of operations [k, 3, 3] and the G of a group [m, 3, 3] that is nearest to it."""
+    return np.concatenate([traces.max(axis=1) for _, traces in _traces(operations, group)])
+
+
+def _traces(operations: Array, group: Array) -> Iterator[tuple[slice, Array]]:
+    """Batches of operations [k, 3, 3], and the traces [.., m] of `A' G` for each and every G of a group [m, 3, 3]."""
     given, known = operations.reshape(len(operations), 9), group.reshape(len(group), 9).T
-    return np.concatenate([(given[batch] @ known).max(axis=1) for batch in batches(len(given), len(group))])
+    for batch in batches(len(given), len(group)):
+        yield batch, given[batch] @ known
 
 
 def angle_of_overlap(trace: float) -> float:
