@@ -8,6 +8,7 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from dataclasses import fields
+from decimal import Decimal
 from html.parser import HTMLParser
 from importlib.util import find_spec
 from pathlib import Path
@@ -148,6 +149,14 @@ def python_blocks(page: str) -> str:
     return "\n".join(re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL))
 
 
+def alike(shown: str, said: str) -> bool:
+    """The same words and layout; decimals to one in their last digit, which an answer's own rounding can move."""
+    decimal = r"[ -]\d+\.\d+"
+    old, new = ([Decimal(number.strip()) for number in re.findall(decimal, text)] for text in (shown, said))
+    same = re.sub(decimal, "#", shown) == re.sub(decimal, "#", said)
+    return same and all(abs(a - b) <= Decimal(1).scaleb(a.as_tuple().exponent) for a, b in zip(old, new, strict=True))
+
+
 @pytest.mark.slow
 def test_the_first_page_does_what_it_says(tmp_path: Path) -> None:
     """Its Python runs, its commands say what is printed there: the group, the confidence, the rows of figures."""
@@ -158,7 +167,9 @@ def test_the_first_page_does_what_it_says(tmp_path: Path) -> None:
     assert shown
     said = run("-m", "symrefine", "detect", "stool.csv", cwd=tmp_path).stdout
     timeless = [re.sub(r", [\d.]+ s$", "", text.strip(), flags=re.MULTILINE) for text in (shown[1], said)]
-    assert timeless[0] == timeless[1]
+    assert alike(*timeless), said
+    assert not alike(timeless[0], timeless[1].replace("C3v", "C3"))
+    assert not alike("offset -0.5001  0.00015", "offset -0.5003  0.00015")
 
 
 def test_the_page_on_poses_does_what_it_says() -> None:
