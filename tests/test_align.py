@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from experiments.objects import damage
 from experiments.objects.built_symmetry import specimen
-from experiments.objects.household import camera
+from experiments.objects.household import camera, prism
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, revolve, sample, table
 from experiments.studies import partial_alignment
 from symrefine.align import story
@@ -985,6 +985,22 @@ def test_what_carries_a_whole_source_onto_itself_leaves_equivalents_whatever_the
     for wanted in (matrix, matrix @ householder(normal)):
         assert min(angle_deg(m, wanted) for m in found.equivalents) < 0.3
     assert found.determinant_confidence < 0.7
+
+
+@pytest.mark.parametrize("seed", [4, pytest.param(5, marks=pytest.mark.slow)])
+def test_what_is_its_own_mirror_image_tells_no_determinant(seed: int) -> None:
+    # Both sides of a thin plate are next to one another, so that its own mirror is no map that is found by itself.
+    angle, far = np.arange(9) * np.pi / 4.5, np.array([1.0, 0.55, 0.9, 0.5, 1.0, 0.7, 0.45, 0.85, 0.6])
+    plate = join([prism(np.column_stack([far * np.cos(angle), far * np.sin(angle)]), 0.06)])
+    rng = np.random.default_rng(seed)
+    source, target = (sample(plate, 6000, 0.002, rng) for _ in range(2))
+    matrix = random_orthogonal(rng, det=1)
+    found = align(source, target[target[:, 0] > -0.45] @ matrix.T + 2.0)
+    assert found.status == "ok"
+    for wanted in (matrix, matrix @ np.diag([1.0, 1.0, -1.0])):
+        assert min(angle_deg(m, wanted) for m in found.equivalents) < 1.0
+    assert "the determinant is free" in found.observable
+    assert found.determinant_confidence == 0.5
 
 
 def met(sign: float, well: float, denied: float = 0.0) -> Met:

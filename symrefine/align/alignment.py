@@ -187,9 +187,8 @@ class Alignment(ReadOnly):
     @property
     def determinant_confidence(self) -> float:
         """Probability that the determinant is right, 0.5 where a reflection does as well; 1 where none is admitted."""
-        told, of_part = self._said.determinant_confidence, self._said.confidence is not None
-        # Maps of parts are told that do about as well, which was weighed.
-        return told if of_part or not self.coset.has_both_hands else min(told, 0.5)
+        told = self._said.determinant_confidence
+        return min(told, 0.5) if self.coset.has_both_hands else told
 
     @property
     def is_misfit(self) -> bool:

@@ -28,6 +28,7 @@ class Coset(ReadOnly):
             as good: j = 0, or j >= 2. In 3-space two directions mean any turn about the axis normal to both.
         symmetry: Schoenflies symbol of the target in 3-space, "" elsewhere.
         observable: what is determined, in words; "full" if everything is.
+        has_both_hands: whether a rotation and a reflection do equally well.
     """
 
     matrices: Array
@@ -35,11 +36,7 @@ class Coset(ReadOnly):
     free: Array
     symmetry: str
     observable: str
-
-    @property
-    def has_both_hands(self) -> bool:
-        """Whether a rotation and a reflection do equally well."""
-        return _both_signs(self.matrices)
+    has_both_hands: bool
 
 
 def coset_of_group(
@@ -73,7 +70,11 @@ def coset_of_group(
         translations=center + (translation - center) @ operations.transpose(0, 2, 1),
         free=free,
         symmetry=group.name,
-        observable=observable or _in_words(f"the {len(operations)} operations of {group.name}", operations),
+        has_both_hands=_both_signs(operations),
+        observable=observable
+        or _in_words(
+            f"the {len(operations)} operations of {group.name}", len(operations), both_hands=_both_signs(operations)
+        ),
     )
 
 
@@ -83,11 +84,11 @@ def _continuous_in_words(group: PointGroup) -> str:
     return f"up to any turn about {spelled(group.frame[2])}: the target is a body of revolution ({group.name})"
 
 
-def _in_words(many: str, matrices: Array) -> str:
+def _in_words(many: str, count: int, *, both_hands: bool) -> str:
     """What finitely many maps leave open: nothing if there is only one."""
-    if len(matrices) == 1:
+    if count == 1:
         return "full"
-    return f"up to {many}" + (", and the determinant is free" if _both_signs(matrices) else "")
+    return f"up to {many}" + (", and the determinant is free" if both_hands else "")
 
 
 def _both_signs(matrices: Array) -> bool:
@@ -104,24 +105,31 @@ def coset_of_list(
         observable = f"up to any orthogonal map within {len(free)} of the {dim} dimensions"
     else:
         least = "" if every or dim <= 3 else "at least "
-        observable = _in_words(f"{least}{len(matrices)} maps that do equally well", matrices)
+        many = f"{least}{len(matrices)} maps that do equally well"
+        observable = _in_words(many, len(matrices), both_hands=_both_signs(matrices))
     return Coset(
         matrices=matrices,
         translations=target_center - scale * (matrices @ source_center),
         free=free,
         symmetry="",
         observable=observable,
+        has_both_hands=_both_signs(matrices),
     )
 
 
-def coset_of_maps(matrices: Array, translations: Array) -> Coset:
-    """The coset where what two objects share of one another allows these maps [k, n, n] and [k, n], the best first."""
+def coset_of_maps(matrices: Array, translations: Array, *, both_hands: bool) -> Coset:
+    """The coset where what two objects share of one another allows these maps [k, n, n] and [k, n], the best first.
+
+    They do about as well as one another, those of the other determinant equally well only where `both_hands` says so.
+    """
+    many = f"{len(matrices)} maps that lay what is seen on one another about as well"
     return Coset(
         matrices=matrices,
         translations=translations,
         free=np.zeros((0, matrices.shape[1])),
         symmetry="",
-        observable=_in_words(f"{len(matrices)} maps that lay what is seen on one another about as well", matrices),
+        observable=_in_words(many, len(matrices), both_hands=both_hands),
+        has_both_hands=both_hands,
     )
 
 
@@ -189,6 +197,7 @@ def lifted(
         free=np.concatenate(parts) if parts else np.zeros((0, dim)),
         symmetry="",
         observable=f"{missing} is free{within_words}",
+        has_both_hands=_both_signs(matrices),
     )
 
 

@@ -235,8 +235,9 @@ def _met_in_part(meeting: Meeting, evidence: Evidence, size: Size, clock: Clock,
     (matrix, translation), best = maps[0], meeting.best
 
     def coset() -> Coset:
-        every = _with_copies(evidence, maps, meeting, size.factor, reflections=reflections)
-        return coset_of_maps(*(np.array(parts) for parts in zip(*every, strict=True)))
+        every, achiral = _with_copies(evidence, maps, meeting, size.factor, reflections=reflections)
+        either = reflections and (achiral or meeting.determinant_confidence <= 0.5)
+        return coset_of_maps(*(np.array(parts) for parts in zip(*every, strict=True)), both_hands=either)
 
     rms = best.rms * evidence.target.moments.scale / evidence.target.shape.diagonal
     verdict = Verdict(
@@ -288,11 +289,12 @@ def _symmetry(evidence: Evidence, motion: Similarity) -> tuple[PointGroup, Array
 
 def _with_copies(
     evidence: Evidence, maps: list[tuple[Array, Array]], meeting: Meeting, factor: float, *, reflections: bool
-) -> list[tuple[Array, Array]]:
+) -> tuple[list[tuple[Array, Array]], bool]:
     """Maps, and what else does as well because one of the two was seen whole and is carried onto itself.
 
-    That is the one of which less meets the other, if either is.
+    That is the one of which less meets the other, if either is. And whether a reflection carries it onto itself.
     """
+    achiral = False
     sides = zip(meeting.best.overlap, (evidence.source, evidence.target), strict=True)
     for _, side in sorted(sides, key=lambda met: met[0]):
         found = detect(side.shape, tolerance=evidence.tolerance, seed=evidence.seed)
@@ -300,8 +302,9 @@ def _with_copies(
             continue
         if found.group.is_finite:
             maps = with_copies(maps, found.group, found.center, factor, of_target=side is evidence.target)
+        achiral = not found.group.is_chiral
         break
-    return [m for m in maps if reflections or np.linalg.det(m[0]) > 0.0]
+    return [m for m in maps if reflections or np.linalg.det(m[0]) > 0.0], achiral
 
 
 def _in_input_units(evidence: Evidence, motion: Similarity, scale: bool) -> tuple[Array, Array, float]:
