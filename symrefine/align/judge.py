@@ -107,8 +107,8 @@ class Judge:
 
     @cached_property
     def near(self) -> float:
-        """Miss up to which local planes are well met, diagonals."""
-        return well_met(np.concatenate([self.source.noise, self.target.noise])) / self.diagonal
+        """Miss up to which local planes are well met, diagonals: as the noisier side has it, as both miss by that."""
+        return max(well_met(side.noise) for side in (self.source, self.target)) / self.diagonal
 
     @property
     def beside(self) -> float:
