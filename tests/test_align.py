@@ -1170,9 +1170,12 @@ def test_what_is_known_of_a_cleaned_side_is_what_a_look_at_it_says() -> None:
     assert abs(np.average(even, weights=seen.shares) - true) < 0.5 * abs(every.mean() - true)
 
 
-@pytest.mark.parametrize("seed", [56, 57, 58])
+PLACED = pytest.param(55, marks=pytest.mark.xfail(reason="of 24 seeds this one finds a place", strict=False))
+
+
+@pytest.mark.parametrize("seed", [PLACED, 56, 57, 58])
 def test_a_flat_part_in_common_says_that_it_slides_or_is_chance(seed: int) -> None:
-    # All that a square plate and a round one share is a piece of a plane. Of 24 seeds one, 55, finds a place for it.
+    # All that a square plate and a round one share is a piece of a plane.
     rng = rng_of(seed)
     square, disc = (np.column_stack([rng.uniform(-1, 1, (9000, 2)), np.zeros(9000)]) for _ in range(2))
     disc = 1.2 * disc[np.linalg.norm(disc, axis=1) < 1.0]

@@ -65,16 +65,14 @@ def coset_of_group(
         operations = group.operations()
     if not reflections:
         operations = operations[np.linalg.det(operations) > 0.0]
+    both_hands, many = _both_signs(operations), f"the {len(operations)} operations of {group.name}"
     return Coset(
         matrices=operations @ matrix,
         translations=center + (translation - center) @ operations.transpose(0, 2, 1),
         free=free,
         symmetry=group.name,
-        has_both_hands=_both_signs(operations),
-        observable=observable
-        or _in_words(
-            f"the {len(operations)} operations of {group.name}", len(operations), both_hands=_both_signs(operations)
-        ),
+        observable=observable or _in_words(many, len(operations), both_hands=both_hands),
+        has_both_hands=both_hands,
     )
 
 
@@ -100,20 +98,20 @@ def coset_of_list(
     matrices: Array, source_center: Array, target_center: Array, scale: float, free: Array, *, every: bool
 ) -> Coset:
     """The coset of maps that do equally well, about the two centres; `every` if no others can, in any dimension."""
-    dim = matrices.shape[1]
+    dim, both_hands = matrices.shape[1], _both_signs(matrices)
     if len(free):
         observable = f"up to any orthogonal map within {len(free)} of the {dim} dimensions"
     else:
         least = "" if every or dim <= 3 else "at least "
         many = f"{least}{len(matrices)} maps that do equally well"
-        observable = _in_words(many, len(matrices), both_hands=_both_signs(matrices))
+        observable = _in_words(many, len(matrices), both_hands=both_hands)
     return Coset(
         matrices=matrices,
         translations=target_center - scale * (matrices @ source_center),
         free=free,
         symmetry="",
         observable=observable,
-        has_both_hands=_both_signs(matrices),
+        has_both_hands=both_hands,
     )
 
 

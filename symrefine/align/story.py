@@ -19,7 +19,7 @@ from symrefine.align.elsewhere import align_in_span
 from symrefine.align.kinds import nearness, with_one_set_of_classes
 from symrefine.align.landscape import least_misfit
 from symrefine.align.moment_fit import MISFIT, ROUNDING, unlikely
-from symrefine.align.pair import Evidence, few
+from symrefine.align.pair import Evidence, Side, few
 from symrefine.align.partial import Meeting, partial_meeting
 from symrefine.align.polish import Polished, Similarity
 from symrefine.align.rivals import Choice, choose, information, polished
@@ -28,6 +28,7 @@ from symrefine.align.sides import ORDERS, differ_in_size, rank_of, same_size, si
 from symrefine.clock import Clock
 from symrefine.decide.maps import SURE
 from symrefine.decide.posterior import Link, certain, meant
+from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, check_tolerance, cross_matrix
@@ -235,9 +236,17 @@ def _met_in_part(meeting: Meeting, evidence: Evidence, size: Size, clock: Clock,
     (matrix, translation), best = maps[0], meeting.best
 
     def coset() -> Coset:
-        every, achiral = _with_copies(evidence, maps, meeting, size.factor, reflections=reflections)
-        either = reflections and (achiral or meeting.determinant_confidence <= 0.5)
-        return coset_of_maps(*(np.array(parts) for parts in zip(*every, strict=True)), both_hands=either)
+        # What carries a whole side onto itself makes maps that do as well.
+        every, either = maps, meeting.determinant_confidence <= 0.5
+        if (known := _seen_whole(evidence, meeting)) is not None:
+            side, found = known
+            either |= not found.group.is_chiral
+            if found.group.is_finite:
+                of_target = side is evidence.target
+                every = with_copies(maps, found.group, found.center, size.factor, of_target=of_target)
+        every = [m for m in every if reflections or np.linalg.det(m[0]) > 0.0]
+        matrices, shifts = (np.array(parts) for parts in zip(*every, strict=True))
+        return coset_of_maps(matrices, shifts, both_hands=reflections and either)
 
     rms = best.rms * evidence.target.moments.scale / evidence.target.shape.diagonal
     verdict = Verdict(
@@ -287,24 +296,14 @@ def _symmetry(evidence: Evidence, motion: Similarity) -> tuple[PointGroup, Array
     return PointGroup(name=found.group.name, frame=frame), factor * (matrix @ found.center) + translation
 
 
-def _with_copies(
-    evidence: Evidence, maps: list[tuple[Array, Array]], meeting: Meeting, factor: float, *, reflections: bool
-) -> tuple[list[tuple[Array, Array]], bool]:
-    """Maps, and what else does as well because one of the two was seen whole and is carried onto itself.
-
-    That is the one of which less meets the other, if either is. And whether a reflection carries it onto itself.
-    """
-    achiral = False
+def _seen_whole(evidence: Evidence, meeting: Meeting) -> tuple[Side, Detection] | None:
+    """The side that was seen whole, and what it is; of both the one of which less meets the other, None if neither."""
     sides = zip(meeting.best.overlap, (evidence.source, evidence.target), strict=True)
     for _, side in sorted(sides, key=lambda met: met[0]):
         found = detect(side.shape, tolerance=evidence.tolerance, seed=evidence.seed)
-        if found.undetermined or found.at_least:
-            continue
-        if found.group.is_finite:
-            maps = with_copies(maps, found.group, found.center, factor, of_target=side is evidence.target)
-        achiral = not found.group.is_chiral
-        break
-    return [m for m in maps if reflections or np.linalg.det(m[0]) > 0.0], achiral
+        if not (found.undetermined or found.at_least):
+            return side, found
+    return None
 
 
 def _in_input_units(evidence: Evidence, motion: Similarity, scale: bool) -> tuple[Array, Array, float]:
