@@ -44,10 +44,13 @@ def bolts() -> Iterator[tuple[str, float]]:
             yield f"8-fold prism, {count:,} points, {100 * noise:g} % noise", best_of(lambda c=cloud: detect(c), 2)
 
 
-def meshes(*, full: bool, ladder: tuple[float, ...] = ()) -> list[float]:
-    """Seconds of each mesh of `../shared/objects`, of every fourth unless `full`; none where they are not there."""
-    files = sorted(OBJECTS.glob("*.ply"))[:: 1 if full else 4]
-    shapes = [load(file) for file in files]
+def meshes(*, full: bool) -> list[Shape]:
+    """The meshes of `../shared/objects`, every fourth unless `full`; none where they are not there."""
+    return [load(file) for file in sorted(OBJECTS.glob("*.ply"))[:: 1 if full else 4]]
+
+
+def seconds_of(shapes: list[Shape], *, ladder: tuple[float, ...] = ()) -> list[float]:
+    """Processor seconds of `detect` on each."""
     return [best_of(lambda s=shape: detect(s, ladder=ladder), 1) for shape in shapes]
 
 
@@ -60,9 +63,9 @@ def metrics(*, full: bool = False) -> Iterator[Metric]:
     cloud = sample(table(), 20_000, 0.003, np.random.default_rng(5))
     ratio = best_of(lambda: detect(cloud, ladder=LADDER), 5) / best_of(lambda: detect(cloud), 5)
     yield Metric(key="with the staircase", value=ratio, unit="ratio", target=1.1)
-    seconds = meshes(full=full)
-    if seconds:
+    if shapes := meshes(full=full):
+        seconds = seconds_of(shapes)
         yield Metric(key="meshes of shared/objects, median", value=float(np.median(seconds)), unit="s", target=0.2)
         yield Metric(key="meshes of shared/objects, worst", value=max(seconds), unit="s", target=0.8)
-        ratio = sum(meshes(full=full, ladder=LADDER)) / sum(seconds)
+        ratio = sum(seconds_of(shapes, ladder=LADDER)) / sum(seconds)
         yield Metric(key="meshes of shared/objects, with the staircase", value=ratio, unit="ratio", target=1.1)

@@ -329,7 +329,7 @@ def test_what_is_no_cloud_in_chunks_is_refused(files, tmp_path):
     with pytest.raises(InputError, match="no such file"):
         stream(tmp_path / "none.npy")
     (tmp_path / "huge.npy").write_bytes((files / "c.npy").read_bytes()[:-8] + np.float64(1e70).tobytes())
-    with pytest.raises(InputError, match="1e\\+70; expected at most"):
+    with pytest.raises(InputError, match=r"huge.npy: point \d+ is .*1e\+70\]; coordinates must be finite and at most"):
         list(stream(tmp_path / "huge.npy"))
 
 

@@ -164,7 +164,7 @@ KIND_OF = {
         "ntuples.nullspace": "_LARGEST_PRIME",
         "plane.doublets": "PLANAR_ORDERS",
         "surface.openings": "TELLING",
-        "surface.skin": "APART",
+        "surface.tree": "APART",
         "surface.surface": "NEAREST_SPREAD",
         "units": "METRES",
     },

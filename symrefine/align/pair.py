@@ -203,7 +203,7 @@ class Evidence:
         here, there = self.target.moments, clean.target.moments
         at = motion.apply((there.center - here.center)[None] / here.scale)[0]
         own = Similarity(matrix=motion.matrix, shift=(here.center + here.scale * at - there.center) / there.scale)
-        return float(clean.judge.needs([own], bound=1.0)[0]) / self.tolerance
+        return float(clean.judge.needs([own], most=1.0)[0]) / self.tolerance
 
     def excess_without_noise(self, done: Polished, enough: float) -> float:
         """The excess after a polish on `met`, of one size, if none of it is noise; infinite if the polish did not end.

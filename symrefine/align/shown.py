@@ -14,8 +14,8 @@ from symrefine.surface.cameras import cameras
 from symrefine.surface.misses import disc_distances
 from symrefine.surface.neighbourhoods import fills_volume
 from symrefine.surface.openings import NEIGHBOURS, Openings, openings
-from symrefine.surface.skin import LocalPlanes, Patches, Skin, drawn, make_skin, with_class
-from symrefine.surface.tree import Tree
+from symrefine.surface.skin import LocalPlanes, Patches, Skin, drawn, make_skin
+from symrefine.surface.tree import Tree, with_class
 
 # A side with so many times the surface gets as many more local planes, up to a number.
 COARSER, MOST_PLANES = 1.5, 6000

@@ -39,7 +39,7 @@ def glances(
     owner = np.repeat(np.arange(len(starts)), [len(motions) for motions in each])
     every, found = [m for motions in each for m in motions], np.zeros(len(starts))
     if every:
-        needs = surface.needs(every, sources=sources, bound=LIMITS[-1] * most, discs=1, tests=GLANCED)
+        needs = surface.needs(every, sources=sources, most=most, discs=1, tests=GLANCED)
         np.maximum.at(found, owner, needs)
     return found.tolist()
 

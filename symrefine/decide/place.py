@@ -21,7 +21,7 @@ from symrefine.groups import is_subgroup
 from symrefine.groups.names import MAX_FOLD
 from symrefine.samples import COUNT, GLANCE, LOOK
 from symrefine.shape import Index
-from symrefine.surface.misses import DISCS, LIMITS
+from symrefine.surface.misses import DISCS
 from symrefine.surface.skin import LocalPlanes
 from symrefine.surface.surface import Surface
 
@@ -162,9 +162,9 @@ def _needs(
     motions = [few_motions(placed.moved(state.moved(way))) for way in ways]
     every = [m for part in motions for m in part]
     if rough:
-        needs = surface.needs(every, sources=GLANCE, bound=2.0 * surface.far, discs=1, tests=GLANCED)
+        needs = surface.needs(every, sources=GLANCE, most=surface.tolerance, discs=1, tests=GLANCED)
     else:
-        needs = surface.needs(every, sources=LOOK, bound=LIMITS[-1] * most, tests=GLANCED)
+        needs = surface.needs(every, sources=LOOK, most=most, tests=GLANCED)
     return needs.reshape(len(ways), -1).max(axis=1)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from symrefine.geometry import Array
 from symrefine.shape import Index
-from symrefine.surface.tree import Tree
+from symrefine.surface.tree import Tree, with_class
 
 
 def mean_back(counterparts: Iterable[Array], operations: Array) -> Array:
@@ -15,16 +15,16 @@ def mean_back(counterparts: Iterable[Array], operations: Array) -> Array:
 
 
 def permutations(points: Array, operations: Array, labels: Index | None, reach: float) -> Index | None:
-    """Counterparts [K, N] of points that every operation permutes, up to `reach` away; None where one does not.
+    """Counterparts [K, N] of points [N, 3] that every operation permutes, up to `reach` away; None where one does not.
 
-    Only generators are looked up, the others follow from them.
+    Labels [N], small numbers, tell which may be which. Only generators are looked up, the others follow from them.
     """
-    tree, shifted = labelled(points, labels)
+    tree = Tree(with_class(points, labels))
     images = np.empty((len(operations), len(points)), dtype=np.intp)
     images[0] = np.arange(len(points))
     known, found = [0], []
     for h, table in generators(operations):
-        distance, own = tree.nearest(np.column_stack([points @ operations[h].T, shifted]))
+        distance, own = tree.nearest(with_class(points @ operations[h].T, labels))
         if distance.max() > reach or not (np.bincount(own, minlength=len(points)) == 1).all():
             return None
         found.append((table, own))
@@ -38,13 +38,6 @@ def permutations(points: Array, operations: Array, labels: Index | None, reach: 
                     known.append(product)
                     waiting.append(product)
     return images
-
-
-def labelled(points: Array, labels: Index | None) -> tuple[Tree, Array]:
-    """A kd-tree in which other labels are far away, and the coordinate that makes them so."""
-    size = 0.0 if labels is None else 4.0 * float(np.abs(points).max())
-    shifted = np.zeros(len(points)) if labels is None else np.unique(labels, return_inverse=True)[1] * size
-    return Tree(np.column_stack([points, shifted])), shifted
 
 
 def generators(operations: Array) -> list[tuple[int, Index]]:

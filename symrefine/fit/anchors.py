@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from symrefine.errors import InputError
-from symrefine.fit.action import labelled
 from symrefine.geometry import Array, Mask, unit
 from symrefine.groups import PointGroup
 from symrefine.groups.identify import identify
 from symrefine.groups.names import MAX_FOLD
 from symrefine.shape import Index
+from symrefine.surface.tree import APART, Tree, with_class
 
 # Anchors are at least so far out, and so far off the line through the other, as a fraction of the farthest point: what
 # rounding moves them by turns an operation by twenty times as much at most.
@@ -50,7 +50,7 @@ def permuting_groups(points: Array, labels: Index | None, within: float) -> Iter
 
     Args:
         points: [N, 3] distinct, about their centroid.
-        labels: [N], or None.
+        labels: [N] small numbers, or None.
         within: by how much a point may be out of place.
 
     Yields:
@@ -58,10 +58,10 @@ def permuting_groups(points: Array, labels: Index | None, within: float) -> Iter
         Nothing where none of them can tell: where points lie on a line, where too many operations would have to be
         asked. None for folds beyond `MAX_FOLD`, and where some points are mapped by what makes no group.
     """
-    tree, shifted = labelled(points, labels)
+    tree = Tree(with_class(points, labels))
     radii = np.linalg.norm(points, axis=1)
     distant, reach = LEVER * radii.max(), 2.0 * within
-    traits = (radii + shifted)[None]
+    traits = radii[None] if labels is None else (radii + APART * labels)[None]
     kinds = _Kinds.of(traits, [reach])
     first, second = _anchors(points, kinds, distant)
     if kinds.alike[first] * kinds.alike[second] > CANDIDATES:
@@ -90,8 +90,8 @@ def permuting_groups(points: Array, labels: Index | None, within: float) -> Iter
                 return
             some = np.arange(0, len(points), max(1, len(points) // probes))
             moved = points[some] @ np.swapaxes(operations, 1, 2)
-            goal = np.dstack([moved, np.broadcast_to(shifted[some], moved.shape[:2])])
-            operations = operations[(tree.nearest(goal)[0] <= miss).all(axis=1)]
+            classes = None if labels is None else np.broadcast_to(labels[some], moved.shape[:2])
+            operations = operations[(tree.nearest(with_class(moved, classes))[0] <= miss).all(axis=1)]
         yield _identified(operations)
 
 

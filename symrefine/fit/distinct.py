@@ -16,7 +16,8 @@ from symrefine.surface.tree import pairs_within
 class Distinct:
     """The distinct points (and labels) of a shape, in units of a diagonal about a centre.
 
-    `rows` [M] are those of the distinct points in the shape, `back` [N] tells which of them each point is.
+    `rows` [M] are those of the distinct points in the shape, `back` [N] tells which of them each point is. Labels are
+    numbered from 0.
     """
 
     points: Array
@@ -32,7 +33,9 @@ class Distinct:
         farther apart: whatever the grid, some of those that touch lie on two sides of its walls.
         """
         local = (shape.points - center) / diagonal
-        labels = shape.labels if shape.faces is None else None
+        labels = None
+        if shape.labels is not None and shape.faces is None:
+            labels = np.unique(shape.labels, return_inverse=True)[1]
         # Round numbers, of which designs are full, lie nowhere near the walls of this grid.
         place = np.floor(local / weld + GOLDEN) if weld else local
         order, first = ordered([*place.T] if labels is None else [*place.T, labels])

@@ -21,7 +21,6 @@ from symrefine.load.ply_body import Values, row_type
 from symrefine.load.ply_header import parse_header
 from symrefine.load.scans import check_room, las_fault
 from symrefine.load.text import count, shorten
-from symrefine.shape import LARGEST
 from symrefine.stream import CHUNK, Stream
 
 # Points beyond which a file is read in chunks without being asked to: there memory is what ends first.
@@ -79,18 +78,15 @@ def _stream(file: Path) -> Stream | None:
             raise InputError("no such file") from None
         except OSError as error:
             raise InputError(f"cannot be read: {error.strerror or error}") from None
-    return None if found is None else Stream(count=found[0], read=_checked(found[1], str(file)), source=str(file))
+    return None if found is None else Stream(count=found[0], read=_named(found[1], str(file)), source=str(file))
 
 
-def _checked(read: _Chunks, source: str) -> _Chunks:
-    """Chunks whose faults are told with the file, and of which areas do not overflow."""
+def _named(read: _Chunks, source: str) -> _Chunks:
+    """Chunks whose faults are told with the file."""
 
     def chunks() -> Iterator[Array]:
         with about(source):
-            for chunk in read():
-                if len(chunk) and (largest := float(np.abs(chunk).max())) > LARGEST and np.isfinite(largest):
-                    raise InputError(f"holds a coordinate of {largest:.3g}; expected at most {LARGEST:g}")
-                yield chunk
+            yield from read()
 
     return chunks
 

@@ -22,12 +22,10 @@ from symrefine.surface.neighbourhoods import (
     fit_planes,
     flatness_of,
 )
-from symrefine.surface.tree import Tree, pairs_within
+from symrefine.surface.tree import Tree, pairs_within, with_class
 
 # Points whose distances tell the spacing and the reach of discs, the first of them the point itself.
 AROUND = 6
-# Classes stand so far apart along a fourth coordinate (RMS radii) that no query finds a point of another class first.
-APART = 1e3
 
 Body = Literal["surface", "atoms", "volume"]
 
@@ -310,11 +308,6 @@ def _spacing(away: Array) -> float:
     nearest = np.where(away > 0.0, away, np.inf).min(axis=1)
     apart = nearest[np.isfinite(nearest)]
     return float(np.median(apart)) if apart.size else 0.0
-
-
-def with_class(points: Array, classes: Index | None) -> Array:
-    """Points [N, 3] with the class [N] as a fourth coordinate where there are classes."""
-    return points if classes is None else np.column_stack([points, APART * classes])
 
 
 def local_planes(points: Array, count: int, rng: np.random.Generator) -> LocalPlanes:

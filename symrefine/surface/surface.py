@@ -314,16 +314,17 @@ class Surface:
         motions: Sequence[Isometry],
         *,
         sources: int = 10**9,
-        bound: float = math.inf,
+        most: float = math.inf,
         discs: int = DISCS,
         tests: int = 1,
         together: bool = False,
     ) -> Array:
         """The smallest tolerances [K] at which each of K operations holds, as far as it was seen.
 
-        `sources`, `bound` and `discs` as of `misses`, `tests` as of `needed`, `together` as of `seen`.
+        From `most` on they are lower bounds, which is quicker. `sources` and `discs` as of `misses`, `tests` as of
+        `needed`, `together` as of `seen`.
         """
-        misses = self.misses(motions, sources=sources, bound=bound, discs=discs)
+        misses = self.misses(motions, sources=sources, bound=LIMITS[-1] * most, discs=discs)
         return self.needed(self.seen(misses, motions, sources=sources, together=together), motions, tests)
 
     def need(self, motions: Sequence[Isometry], *, sources: int = 10**9) -> float:

@@ -13,6 +13,9 @@ from symrefine.threads import one_thread
 # Points in a leaf: of 6 to 32 the quickest for 1 to 12 neighbours. Of more neighbours than so many scipy's tree is
 # quicker, which keeps them in a heap and not in a row.
 LEAF, ROW = 24, 128
+# Classes stand so far apart along one more coordinate that no query finds a point of another class first: where points
+# are told in RMS radii or diagonals, none is a thousand of them away.
+APART = 1e3
 
 
 class Tree:
@@ -71,6 +74,11 @@ class Tree:
         """Distance and index, both [...], of the point nearest to each of queries [..., d]; see `query`."""
         away, near = self.query(queries.reshape(-1, queries.shape[-1]), 1, bound=bound)
         return away.reshape(queries.shape[:-1]), near.reshape(queries.shape[:-1])
+
+
+def with_class(points: Array, classes: Index | None) -> Array:
+    """Points [..., d] with the class [...] as one more coordinate where there are classes."""
+    return points if classes is None else np.concatenate([points, APART * classes[..., None]], axis=-1)
 
 
 def morton_order(points: Array) -> Index:

@@ -12,10 +12,10 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-from symrefine.fit.action import generators, labelled, mean_back
+from symrefine.fit.action import generators, mean_back
 from symrefine.geometry import Array, Mask
 from symrefine.shape import Index
-from symrefine.surface.tree import Tree
+from symrefine.surface.tree import Tree, with_class
 
 # More points, or larger groups, than this are left alone: it costs their product for each orbit.
 LARGEST, LARGEST_GROUP = 1500, 240
@@ -46,10 +46,10 @@ class Action:
 
 def act(points: Array, operations: Array, labels: Index | None, reach: float) -> Action:
     """The nearest point of the same label as counterpart of each image, up to `reach`."""
-    tree, shifted = labelled(points, labels)
+    tree = Tree(with_class(points, labels))
     images, miss = np.empty((len(operations), len(points)), dtype=np.intp), np.zeros(len(points))
     for k, g in enumerate(operations):
-        distance, images[k] = tree.nearest(np.column_stack([points @ g.T, shifted]))
+        distance, images[k] = tree.nearest(with_class(points @ g.T, labels))
         miss = np.maximum(miss, distance)
     closed = miss <= reach
     for h, table in generators(operations):
