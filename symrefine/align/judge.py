@@ -24,6 +24,7 @@ from symrefine.geometry import Array, Isometry, Mask, householder, tight_diagona
 from symrefine.ntuples.rank import SIGNIFICANT
 from symrefine.propose.maps import PLANES, WITHIN, maps_onto_itself
 from symrefine.propose.votes import mirror_votes
+from symrefine.rounding import SINGLE
 from symrefine.samples import FOLLOWED
 from symrefine.shape import Index
 from symrefine.surface.misses import LIMITS, disc_distances
@@ -229,18 +230,19 @@ class Judge:
         The polish ends where too few of the local planes tell it to go on along a ridge.
         """
         for _ in range(MAX_OUTER):
-            aside, slid = self._aside(met)
+            aside, slid = self.aside(met)
             if slid <= met.score or (further := self.polished(aside)).score <= met.score:
                 break
             met = further
         return met, slid
 
-    def _aside(self, met: Met) -> tuple[Similarity, float]:
+    def aside(self, met: Met, free: Array | None = None) -> tuple[Similarity, float]:
         """A map slid or turned in the way that is known worst, to the better side, and its score, at most.
 
-        The score is the bound `within_reach` where that leaves less doubt than is worth telling.
+        The score is the bound `within_reach` where that leaves less doubt than is worth telling. Ways [k, 6] that are
+        `free` anyway are not asked; of the others what nothing tells is known worst.
         """
-        worst = np.linalg.eigh(met.covariance)[1][:, -1]
+        worst = np.linalg.eigh(met.covariance if free is None else _beside(met.covariance, free))[1][:, -1]
         arms = met.motion.turn(self.source.moving.points)
         travel = np.linalg.norm(np.cross(worst[:3], arms) + worst[3:], axis=1).mean()
         step = WITHIN * self.diagonal / travel * worst
@@ -308,6 +310,14 @@ class Judge:
             every = self.polished_all(every, [fresh], error=self.beside)
             tried.append(every[-1].motion)
         return every
+
+
+def _beside(covariance: Array, free: Array) -> Array:
+    """A covariance [6, 6], zero along what nothing tells, across some ways [k, 6], and large along that."""
+    known, ways = np.linalg.eigh(covariance)
+    told = known > np.finfo(float).eps * len(known) * known[-1]
+    across = np.eye(len(known)) - np.linalg.pinv(free) @ free
+    return across @ (ways * np.where(told, known / known[-1], 1.0 / SINGLE)) @ ways.T @ across
 
 
 def _mirrors(points: Array, normals: Array) -> list[Similarity]:

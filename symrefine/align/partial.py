@@ -6,13 +6,14 @@ upon -> the polish on the points -> what each map lays on the other side, where 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from symrefine.align.alignment import OK, OPEN
 from symrefine.align.judge import Judge, Met
 from symrefine.align.pair import Evidence
+from symrefine.align.revolved import Turns, shown_by, turns_between
 from symrefine.decide.maps import ahead, as_good, fits, said_by_both
 
 
@@ -27,6 +28,7 @@ class Meeting:
         determinant_confidence: probability that its determinant is.
         slides: whether it does as well where it slides or turns a little.
         status: "ok", or why it should not be relied upon.
+        turns: what it is right up to, of parts of a body of revolution.
     """
 
     best: Met
@@ -35,6 +37,7 @@ class Meeting:
     determinant_confidence: float
     slides: bool
     status: str
+    turns: Turns | None = None
 
 
 def partial_meeting(evidence: Evidence, *, reflections: bool, factor: float = 1.0) -> Meeting | None:
@@ -68,7 +71,29 @@ def partial_meeting(evidence: Evidence, *, reflections: bool, factor: float = 1.
     best, slid = judge.uphill(ridge)
     rivals = [m for m in found if m is not ridge and not judge.same(m.motion, best.motion)]  # what leads to it is none
     open_ = judge.source.openings.evident or judge.target.openings.evident
-    return _weighed(best, sorted(rivals, key=lambda m: -m.score), slid, reflections=reflections, open_=open_)
+    rivals = sorted(rivals, key=lambda m: -m.score)
+    met = _weighed(best, rivals, math.inf if best.is_loose else slid, reflections=reflections, open_=open_)
+    if not (met.slides and best.is_promising):
+        return met
+    turns = turns_between(shown_by(evidence, best), evidence, best.motion, factor)
+    return met if turns is None else _but_for(turns, judge, best, rivals, reflections=reflections, open_=open_)
+
+
+def _but_for(
+    turns: Turns, judge: Judge, best: Met, rivals: Sequence[Met], *, reflections: bool, open_: bool
+) -> Meeting:
+    """How sure the best map is where those that differ from it by turns of the objects themselves are one with it."""
+    related = [turns.relate(judge, best, r) for r in rivals]
+    others = [r for r, same in zip(rivals, related, strict=True) if not same]
+    if best.determinant < 0:
+        best = _first([best, *(r for r, same in zip(rivals, related, strict=True) if same)])
+    if best.determinant < 0 and as_good(best.score, (image := judge.polished(turns.mirrored(best.motion))).score):
+        best = image
+    slid = judge.aside(best, turns.ways(best.motion))[1]
+    met = _weighed(best, others, slid, reflections=reflections, open_=open_)
+    sure = met.confidence * turns.confidence
+    status = met.status if met.status != OK or sure > 0.5 else f"{OPEN}: the objects may be no bodies of revolution"
+    return replace(met, confidence=sure, status=status, turns=turns, determinant_confidence=0.5 if reflections else 1.0)
 
 
 def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool, open_: bool) -> Meeting:
@@ -82,7 +107,7 @@ def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool
     reflected = ahead(barred, [best.score])
     alike = [r for r in admitted if as_good(best.score, r.score) and as_good(r.score, best.score)]
     others = [r.score for r in admitted if r not in alike]
-    slides = best.is_loose or ahead(best.score, [slid]) < 0.5
+    slides = ahead(best.score, [slid]) < 0.5
     first = _first([best, *alike])
     rest = [(m, said_by_both(m.sides)) for m in (best, *alike) if m is not first]
     # What one side alone takes for as good the other one may deny.

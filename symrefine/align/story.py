@@ -19,16 +19,16 @@ from symrefine.align.elsewhere import align_in_span
 from symrefine.align.kinds import nearness, with_one_set_of_classes
 from symrefine.align.landscape import least_misfit
 from symrefine.align.moment_fit import MISFIT, ROUNDING, unlikely
-from symrefine.align.pair import Evidence, Side, few
+from symrefine.align.pair import Evidence, few
 from symrefine.align.partial import Meeting, partial_meeting
 from symrefine.align.polish import Polished, Similarity
+from symrefine.align.revolved import shown_by, turns_between
 from symrefine.align.rivals import Choice, choose, information, polished
 from symrefine.align.scaled import Size, size_of_parts
 from symrefine.align.sides import ORDERS, differ_in_size, rank_of, same_size, side_of, size_sigma, thinned, unlike_sizes
 from symrefine.clock import Clock
 from symrefine.decide.maps import SURE
 from symrefine.decide.posterior import Link, certain, meant
-from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, check_tolerance, cross_matrix
@@ -236,10 +236,14 @@ def _met_in_part(meeting: Meeting, evidence: Evidence, size: Size, clock: Clock,
     (matrix, translation), best = maps[0], meeting.best
 
     def coset() -> Coset:
+        shown = [] if meeting.turns else shown_by(evidence, best)
+        if turns := meeting.turns or turns_between(shown, evidence, best.motion, size.factor):
+            center = evidence.target.moments.center + evidence.target.moments.scale * turns.placed.center
+            return coset_of_group(matrix, translation, turns.placed.group, center, reflections=reflections)
         # What carries a whole side onto itself makes maps that do as well.
         every, either = maps, meeting.determinant_confidence <= 0.5
-        if (known := _seen_whole(evidence, meeting)) is not None:
-            side, found = known
+        if shown[0].whole:
+            side, found = shown[0].side, shown[0].found
             either |= not found.group.is_chiral
             if found.group.is_finite:
                 of_target = side is evidence.target
@@ -260,7 +264,7 @@ def _met_in_part(meeting: Meeting, evidence: Evidence, size: Size, clock: Clock,
         translation=translation,
         scale=size.factor,
         scale_sigma=size.factor * size.sigma,
-        sigma_rad=np.inf if meeting.slides else float(np.sqrt(np.trace(best.covariance[:3, :3]))),
+        sigma_rad=np.inf if meeting.slides or meeting.turns else float(np.sqrt(np.trace(best.covariance[:3, :3]))),
         covariance=_of_transform(best.covariance, evidence, matrix, size.factor),
         exact=False,
         timings=clock.seconds,
@@ -294,16 +298,6 @@ def _symmetry(evidence: Evidence, motion: Similarity) -> tuple[PointGroup, Array
     matrix, translation, factor = _in_input_units(evidence, motion, evidence.scale)
     frame = found.group.frame @ matrix.T * np.sign(np.linalg.det(matrix))
     return PointGroup(name=found.group.name, frame=frame), factor * (matrix @ found.center) + translation
-
-
-def _seen_whole(evidence: Evidence, meeting: Meeting) -> tuple[Side, Detection] | None:
-    """The side that was seen whole, and what it is; of both the one of which less meets the other, None if neither."""
-    sides = zip(meeting.best.overlap, (evidence.source, evidence.target), strict=True)
-    for _, side in sorted(sides, key=lambda met: met[0]):
-        found = detect(side.shape, tolerance=evidence.tolerance, seed=evidence.seed)
-        if not (found.undetermined or found.at_least):
-            return side, found
-    return None
 
 
 def _in_input_units(evidence: Evidence, motion: Similarity, scale: bool) -> tuple[Array, Array, float]:
