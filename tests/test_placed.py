@@ -5,7 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from symrefine.fit.placed import FITTED, Operations, Placed, common_center, elements, fitted_matrices
+from symrefine.fit.placed import (
+    FITTED,
+    Operations,
+    Placed,
+    common_center,
+    elements,
+    fitted_matrices,
+    wide_angle_rad,
+)
 from symrefine.fit.residual import SIZE, frame_model
 from symrefine.geometry import frame_with_z, householder, line_angle_rad, random_orthogonal, rotation
 from symrefine.groups import close, from_elements, point_group
@@ -34,6 +42,18 @@ def order_of(matrix):
 
 
 # Elements
+
+
+@pytest.mark.parametrize("fold", range(2, 61))
+def test_the_wide_turn_of_an_axis_goes_far_for_whatever_has_but_a_part_of_its_folds(fold):
+    """By 137 degrees a 50-fold axis turns what has a five-fold one by 7 only, as its smallest turn does."""
+    steps = wide_angle_rad(fold) * fold / (2.0 * math.pi)
+    assert math.gcd(round(steps), fold) == 1
+    assert steps == pytest.approx(round(steps))
+    for less in (p for p in range(1, fold) if fold % p == 0):
+        part = steps * less / fold % 1.0
+        # Of six steps only the first and the last come to all of them.
+        assert min(part, 1.0 - part) > (0.13 if fold // less > 6 else 0.16)
 
 
 @pytest.mark.parametrize("name", [*FINITE, *ENDLESS])

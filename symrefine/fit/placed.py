@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -121,15 +121,24 @@ def _angles(order: float, powers: int) -> tuple[float, ...]:
 def wide_angle_rad(order: int) -> float:
     """Angle of the generator of C_n nearest to the golden section of a full turn, which moves every part far.
 
-    The smaller part of the section: no turn by few steps comes near it.
+    No turn by few steps comes near it. An object that has but a part of the folds looks the same after each of its own
+    wedges: of a turn by 137 degrees a five-fold axis leaves 7. So the turn is near the golden section of these, too.
     """
     return 2.0 * math.pi * _wide(order) / order
 
 
+@cache
 def _wide(order: int) -> int:
     """By how many steps it turns."""
-    powers = [k for k in range(1, order) if math.gcd(k, order) == 1]
-    return min(powers, key=lambda k: abs(k / order - 2.0 + GOLDEN))
+    powers = [k for k in range(1, order // 2 + 1) if math.gcd(k, order) == 1]
+    folds = [p for p in range(1, order) if order % p == 0]
+
+    def off(steps: int) -> list[float]:
+        """How far from the golden section of a wedge of each fold, the worst first."""
+        parts = (steps * fold / order % 1.0 for fold in folds)
+        return sorted((abs(min(part, 1.0 - part) - 2.0 + GOLDEN) for part in parts), reverse=True)
+
+    return min(powers, key=off)
 
 
 def fitted_matrices(group: PointGroup) -> list[Array]:
