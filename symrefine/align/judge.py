@@ -236,13 +236,13 @@ class Judge:
             met = further
         return met, slid
 
-    def aside(self, met: Met, free: Array | None = None) -> tuple[Similarity, float]:
+    def aside(self, met: Met, across: Array | None = None) -> tuple[Similarity, float]:
         """A map slid or turned in the way that is known worst, to the better side, and its score, at most.
 
-        The score is the bound `within_reach` where that leaves less doubt than is worth telling. Ways [k, 6] that are
-        `free` anyway are not asked; of the others what nothing tells is known worst.
+        The score is the bound `within_reach` where that leaves less doubt than is worth telling. What is left open
+        anyway is not asked, given the projection [6, 6] `across` it; of the rest what nothing tells is known worst.
         """
-        worst = np.linalg.eigh(met.covariance if free is None else _beside(met.covariance, free))[1][:, -1]
+        worst = np.linalg.eigh(met.covariance if across is None else _known(met.covariance, across))[1][:, -1]
         arms = met.motion.turn(self.source.moving.points)
         travel = np.linalg.norm(np.cross(worst[:3], arms) + worst[3:], axis=1).mean()
         step = WITHIN * self.diagonal / travel * worst
@@ -312,11 +312,10 @@ class Judge:
         return every
 
 
-def _beside(covariance: Array, free: Array) -> Array:
-    """A covariance [6, 6], zero along what nothing tells, across some ways [k, 6], and large along that."""
+def _known(covariance: Array, across: Array) -> Array:
+    """A covariance [6, 6] projected, up to a factor; largest along what nothing tells, where it was zero."""
     known, ways = np.linalg.eigh(covariance)
     told = known > np.finfo(float).eps * len(known) * known[-1]
-    across = np.eye(len(known)) - np.linalg.pinv(free) @ free
     return across @ (ways * np.where(told, known / known[-1], 1.0 / SINGLE)) @ ways.T @ across
 
 

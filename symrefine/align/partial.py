@@ -89,11 +89,20 @@ def _but_for(
         best = _first([best, *(r for r, same in zip(rivals, related, strict=True) if same)])
     if best.determinant < 0 and as_good(best.score, (image := judge.polished(turns.mirrored(best.motion))).score):
         best = image
-    slid = judge.aside(best, turns.ways(best.motion))[1]
+    slid = judge.aside(best, turns.across(best.motion))[1]
     met = _weighed(best, others, slid, reflections=reflections, open_=open_)
-    sure = met.confidence * turns.confidence
-    status = met.status if met.status != OK or sure > 0.5 else f"{OPEN}: the objects may be no bodies of revolution"
-    return replace(met, confidence=sure, status=status, turns=turns, determinant_confidence=0.5 if reflections else 1.0)
+    across = turns.across(met.best.motion)
+    sure, status = met.confidence * turns.confidence, met.status
+    if status == OK and sure <= 0.5:
+        status = f"{OPEN}: what the objects share turns in itself, they may not"
+    return replace(
+        met,
+        best=replace(met.best, covariance=across @ met.best.covariance @ across),
+        confidence=sure,
+        determinant_confidence=0.5 if reflections else 1.0,
+        status=status,
+        turns=turns,
+    )
 
 
 def _weighed(best: Met, rivals: Sequence[Met], slid: float, *, reflections: bool, open_: bool) -> Meeting:

@@ -6,7 +6,6 @@ it are one, and what the parts share may turn in itself without leaving anything
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -16,17 +15,17 @@ from symrefine.align.polish import Similarity
 from symrefine.detection.result import Detection
 from symrefine.detection.story import detect
 from symrefine.fit.placed import Placed
-from symrefine.geometry import Array, Isometry
+from symrefine.geometry import Array, Isometry, householder
 from symrefine.groups import PointGroup
 from symrefine.groups.elements import DIRECTION_ERROR_RAD
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Turns:
     """The continuous group of what two surfaces show parts of, where it stands in the target, and how sure that is.
 
     Attributes:
-        placed: about a point of the target's own units.
+        placed: about the target's centre, in its units.
         confidence: probability that the object has it.
     """
 
@@ -40,21 +39,21 @@ class Turns:
         return judge.same(self._about(nearest).after(one.motion), other.motion)
 
     def mirrored(self, motion: Similarity) -> Similarity:
-        """A map followed by a mirror of the group: every body of revolution has those through its axis."""
-        normal = self.placed.group.mirrors()[0]
-        return self._about(np.eye(3) - 2.0 * np.outer(normal, normal)).after(motion)
+        """A map followed by a mirror through an axis, as every body of revolution has them."""
+        return self._about(householder(self.placed.group.mirrors()[0])).after(motion)
 
     def _about(self, matrix: Array) -> Similarity:
         return Similarity.of(Isometry.about(self.placed.center, matrix))
 
     def ways(self, motion: Similarity) -> Array:
         """Motions [k, 6] of a map, turn and shift as `Similarity.moved` has them, that turn it about the axes."""
-        axes = self._axes
+        axes = self.placed.group.continuous_axes()
         return np.hstack([axes, np.cross(axes, motion.shift - self.placed.center)])
 
-    @cached_property
-    def _axes(self) -> Array:
-        return self.placed.group.continuous_axes()
+    def across(self, motion: Similarity) -> Array:
+        """The projection [6, 6] of motions of a map across these."""
+        ways = self.ways(motion)
+        return np.eye(ways.shape[1]) - np.linalg.pinv(ways) @ ways
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -101,12 +100,12 @@ def turns_between(every: list[Shows], evidence: Evidence, motion: Similarity, fa
         return None
     unit, placed = evidence.target.moments.scale, list[Placed]()
     for shows in every:
-        group, away = shows.found.group.for_point_set(), shows.found.center - shows.side.moments.center
         of_target = shows.side is evidence.target
-        here = Placed(group=group, center=away / unit if of_target else factor * away / unit)
+        center = (shows.found.center - shows.side.moments.center) * (1.0 if of_target else factor) / unit
+        here = Placed(group=shows.found.group.for_point_set(), center=center)
         placed.append(here if of_target else _carried(here, motion))
-    first, last = (p.group.frame[2] for p in (placed[0], placed[-1]))
-    if abs(first @ last) < math.cos(2.0 * DIRECTION_ERROR_RAD):
+    cosine = placed[0].group.frame[2] @ placed[-1].group.frame[2]
+    if abs(cosine) < math.cos(2.0 * DIRECTION_ERROR_RAD):  # either axis may be off
         return None
     # The smaller group leaves less open.
     least = min(placed, key=lambda p: (len(p.group.continuous_axes()), not p.group.is_polar))
