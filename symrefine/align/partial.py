@@ -99,7 +99,6 @@ def _but_for(
         met,
         best=replace(met.best, covariance=across @ met.best.covariance @ across),
         confidence=sure,
-        determinant_confidence=0.5 if reflections else 1.0,
         status=status,
         turns=turns,
     )
