@@ -16,6 +16,7 @@ from experiments.objects.built_symmetry import specimen
 from experiments.objects.household import camera, prism
 from experiments.objects.shapes import asymmetric, bottle, box, join, mug, revolve, sample, table
 from experiments.studies import partial_alignment
+from symrefine.align import pair as sides_of
 from symrefine.align import story
 from symrefine.align.alignment import Verdict
 from symrefine.align.contact import met_by
@@ -353,7 +354,7 @@ def test_either_hand_of_what_is_its_own_mirror_image_is_sure_and_nothing_is_dete
 ) -> None:
     rng = rng_of(26)
     source, target = (damage.outliers(mug(), share, rng).points for _ in range(2))
-    monkeypatch.setattr(story, "detect", None)
+    monkeypatch.setattr(sides_of, "detect", None)
     found = align(source, target @ random_orthogonal(rng, det=-1).T)
     assert (found.status, found.confidence > 0.95) == ("ok", True)
     monkeypatch.undo()

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from experiments.studies import revolved_alignment as study
+from symrefine.align import pair
 from symrefine.align.judge import _known
 from symrefine.align.polish import Similarity
 from symrefine.align.revolved import Turns
 from symrefine.align.story import align
+from symrefine.detection.story import detect
 from symrefine.fit.placed import Placed
 from symrefine.geometry import Isometry, random_orthogonal, rotation
 from symrefine.groups import PointGroup
@@ -139,6 +141,18 @@ def test_a_mug_that_lost_its_handle_is_not_taken_for_a_body_of_revolution(seed):
     assert found.status != "ok" or within
 
 
+def test_what_the_sides_are_is_found_once(monkeypatch):
+    """Whether they are bodies of revolution is asked where parts slide, and what else does as well of the same."""
+    asked = []
+    monkeypatch.setattr(pair, "detect", lambda shape, **options: asked.append(shape) or detect(shape, **options))
+    source, target, *_ = study.given(study.Case(name=study.MUG, condition=study.WITHOUT_HANDLE, seed=1))
+    found = align(source, target)
+    assert "slide or turn" in found.status
+    assert len(asked) == len(set(map(id, asked))) > 0
+    assert found.observable
+    assert len(asked) == len(set(map(id, asked)))
+
+
 @pytest.mark.slow
 def test_two_parts_of_a_mug_without_its_handle_may_not_be_slid():
     """Neither was seen whole: what both show is no reason to leave a turn open where one side denies it."""
@@ -148,7 +162,7 @@ def test_two_parts_of_a_mug_without_its_handle_may_not_be_slid():
 
 def test_the_study_says_what_is_relied_upon_and_wrong(capsys, monkeypatch):
     def wrong(case: study.Case) -> study.Row:
-        return study.Row(case=case, status="ok", confidence=0.99, error=0.5, turns=True)
+        return study.Row(case=case, status="ok", confidence=0.99, error=0.5)
 
     monkeypatch.setattr(study, "run", wrong)
     study.main(["--objects", "bottle", "--seeds", "1"])

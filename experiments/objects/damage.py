@@ -138,9 +138,13 @@ def _without_ball(points: Array, share: float, rng: Rng) -> Array:
 
 def cut(mesh: Shape, share: float, rng: Rng) -> Damaged:
     """A share of the points cut off by a plane."""
-    points = _whole(mesh, rng)
-    along = points @ unit(rng.normal(size=3))
-    return _left(points[along > np.quantile(along, share)])
+    return _left(cut_off(_whole(mesh, rng), unit(rng.normal(size=3)), share))
+
+
+def cut_off(points: Array, direction: Array, share: float) -> Array:
+    """Points [N, 3] but for the share of them that lies least far along a direction [3]."""
+    along = points @ direction
+    return points[along > np.quantile(along, share)]
 
 
 def mild(mesh: Shape, strength: float, rng: Rng) -> Damaged:

@@ -44,13 +44,12 @@ class Case:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """What was said of a pair, and by what fraction of the diagonal it is off; whether a turn was left open."""
+    """What was said of a pair, and by what fraction of the diagonal it is off."""
 
     case: Case
     status: str
     confidence: float
     error: float
-    turns: bool
 
 
 def given(case: Case) -> tuple[Shape, Shape, Isometry, Truth]:
@@ -66,18 +65,12 @@ def given(case: Case) -> tuple[Shape, Shape, Isometry, Truth]:
     if case.condition == WITHOUT_HANDLE:
         middle = np.median(target, axis=0)
         handle = unit(target[np.linalg.norm(target - middle, axis=1).argmax()] - middle)
-        target = _cut(target, -handle, 0.4)
+        target = damage.cut_off(target, -handle, 0.4)
     else:
         share = 0.35 if case.condition == CONDITIONS[1] else 0.3
-        target = _cut(target, unit(rng.normal(size=3)), share)
-        source = source if case.condition == CONDITIONS[1] else _cut(source, unit(rng.normal(size=3)), share)
+        target = damage.cut_off(target, unit(rng.normal(size=3)), share)
+        source = source if case.condition == CONDITIONS[1] else damage.cut_off(source, unit(rng.normal(size=3)), share)
     return Shape(points=source), Shape(points=motion.apply(target)), motion, truth
-
-
-def _cut(points: Array, along: Array, share: float) -> Array:
-    """Points [N, 3] but for a share of them that lies least far along a direction."""
-    heights = points @ along
-    return points[heights > np.quantile(heights, share)]
 
 
 def run(case: Case) -> Row:
@@ -85,13 +78,7 @@ def run(case: Case) -> Row:
     source, target, motion, truth = given(case)
     found = align(source, target)
     error = off(found, motion, truth, source.points) / tight_diagonal(source.points)
-    return Row(
-        case=case,
-        status=found.status,
-        confidence=found.confidence,
-        error=error,
-        turns=len(found.free_axis) > 0,
-    )
+    return Row(case=case, status=found.status, confidence=found.confidence, error=error)
 
 
 def off(found: Alignment, motion: Isometry, truth: Truth, points: Array) -> float:

@@ -315,8 +315,9 @@ class Judge:
 def _known(covariance: Array, across: Array) -> Array:
     """A covariance [6, 6] projected, up to a factor; largest along what nothing tells, where it was zero."""
     known, ways = np.linalg.eigh(covariance)
-    told = known > np.finfo(float).eps * len(known) * known[-1]
-    return across @ (ways * np.where(told, known / known[-1], 1.0 / SINGLE)) @ ways.T @ across
+    known /= max(known[-1], np.finfo(float).tiny)
+    known[: len(known) - np.linalg.matrix_rank(covariance)] = 1.0 / SINGLE
+    return across @ (ways * known) @ ways.T @ across
 
 
 def _mirrors(points: Array, normals: Array) -> list[Similarity]:

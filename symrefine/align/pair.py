@@ -12,6 +12,8 @@ from symrefine.align.polish import Polished, Similarity
 from symrefine.align.procrustes import Procrustes, procrustes
 from symrefine.detection.masses import density_of
 from symrefine.detection.measure import SAMPLES
+from symrefine.detection.result import Detection
+from symrefine.detection.story import detect
 from symrefine.geometry import Array, Isometry, tight_diagonal
 from symrefine.moments.moments import Moments, central_moments
 from symrefine.moments.quadrature import sample_surface
@@ -111,6 +113,17 @@ class Evidence:
     scale: bool
     tolerance: float
     seed: int
+
+    @cached_property
+    def _detections(self) -> dict[Side, Detection]:
+        """What was found of the sides so far."""
+        return {}
+
+    def detected(self, side: Side) -> Detection:
+        """What `detect` finds of one of the sides, however often it is asked."""
+        if side not in self._detections:
+            self._detections[side] = detect(side.shape, tolerance=self.tolerance, seed=self.seed)
+        return self._detections[side]
 
     @cached_property
     def closed(self) -> Procrustes:

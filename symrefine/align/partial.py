@@ -83,10 +83,10 @@ def _but_for(
     turns: Turns, judge: Judge, best: Met, rivals: Sequence[Met], *, reflections: bool, open_: bool
 ) -> Meeting:
     """How sure the best map is where those that differ from it by turns of the objects themselves are one with it."""
-    related = [turns.relate(judge, best, r) for r in rivals]
-    others = [r for r, same in zip(rivals, related, strict=True) if not same]
+    related = [r for r in rivals if turns.relate(judge, best, r)]
+    others = [r for r in rivals if r not in related]
     if best.determinant < 0:
-        best = _first([best, *(r for r, same in zip(rivals, related, strict=True) if same)])
+        best = _first([best, *related])
     if best.determinant < 0 and as_good(best.score, (image := judge.polished(turns.mirrored(best.motion))).score):
         best = image
     slid = judge.aside(best, turns.across(best.motion))[1]

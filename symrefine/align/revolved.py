@@ -13,10 +13,8 @@ from symrefine.align.judge import Judge, Met
 from symrefine.align.pair import Evidence, Side
 from symrefine.align.polish import Similarity
 from symrefine.detection.result import Detection
-from symrefine.detection.story import detect
 from symrefine.fit.placed import Placed
 from symrefine.geometry import Array, Isometry, householder
-from symrefine.groups import PointGroup
 from symrefine.groups.elements import DIRECTION_ERROR_RAD
 
 
@@ -77,7 +75,7 @@ def shown_by(evidence: Evidence, met: Met) -> list[Shows]:
     every = list[Shows]()
     sides = zip(met.overlap, (evidence.source, evidence.target), strict=True)
     for _, side in sorted(sides, key=lambda part: part[0]):
-        shows = Shows(side=side, found=detect(side.shape, tolerance=evidence.tolerance, seed=evidence.seed))
+        shows = Shows(side=side, found=evidence.detected(side))
         if shows.whole:
             return [shows]
         every.append(shows)
@@ -113,7 +111,5 @@ def turns_between(every: list[Shows], evidence: Evidence, motion: Similarity, fa
 
 
 def _carried(placed: Placed, motion: Similarity) -> Placed:
-    """A group where a map carries it: R G R' = (-R) G (-R)', so that a rotation turns the frame."""
-    turn, group = motion.matrix * np.sign(np.linalg.det(motion.matrix)), placed.group
-    frame = group.frame @ turn.T
-    return Placed(group=PointGroup(name=group.name, frame=frame), center=motion.apply(placed.center[None])[0])
+    """A group where a map carries it."""
+    return Placed(group=placed.group.carried(motion.matrix), center=motion.apply(placed.center[None])[0])

@@ -29,7 +29,6 @@ from symrefine.align.sides import ORDERS, differ_in_size, rank_of, same_size, si
 from symrefine.clock import Clock
 from symrefine.decide.maps import SURE
 from symrefine.decide.posterior import Link, certain, meant
-from symrefine.detection.story import detect
 from symrefine.errors import DegenerateShapeError, InputError
 from symrefine.geometry import Array, check_tolerance, cross_matrix
 from symrefine.groups import PointGroup
@@ -290,14 +289,13 @@ def _symmetry(evidence: Evidence, motion: Similarity) -> tuple[PointGroup, Array
     """
     alike = not evidence.has_points or evidence.excess(motion, both=True) <= certain(1.0)
     sides = sorted((evidence.target, evidence.source), key=lambda s: (not s.is_mesh, -len(s.shape.points)))
-    every = [(s, detect(s.shape, tolerance=evidence.tolerance, seed=evidence.seed)) for s in sides[: 1 if alike else 2]]
+    every = [(s, evidence.detected(s)) for s in sides[: 1 if alike else 2]]
     side, found = max(every, key=lambda known: known[1].group.order)
     if side is evidence.target:
         return found.group, found.center
-    # R G R' = (-R) G (-R)', so a rotation turns the frame; the centre moves with the object, at the target's size.
+    # The centre moves with the object, at the target's size.
     matrix, translation, factor = _in_input_units(evidence, motion, evidence.scale)
-    frame = found.group.frame @ matrix.T * np.sign(np.linalg.det(matrix))
-    return PointGroup(name=found.group.name, frame=frame), factor * (matrix @ found.center) + translation
+    return found.group.carried(matrix), factor * (matrix @ found.center) + translation
 
 
 def _in_input_units(evidence: Evidence, motion: Similarity, scale: bool) -> tuple[Array, Array, float]:

@@ -141,6 +141,4 @@ def _images(known: Placed, group: PointGroup, wanted: Placed) -> Iterator[Placed
     axis, goal = known.group.frame[2], wanted.group.frame[2]
     for operation in group.bringing(axis, goal):
         if abs(goal @ operation @ axis) > np.cos(START_ERROR):
-            # A frame is right-handed; the inversion, which the operation may lack, changes no group's place.
-            frame = known.group.frame @ operation.T * np.sign(np.linalg.det(operation))
-            yield Placed(group=PointGroup(name=known.group.name, frame=frame), center=known.center)
+            yield replace(known, group=known.group.carried(operation))

@@ -152,6 +152,13 @@ class PointGroup:
         name = Symbol(family=self.symbol.family[0].replace("S", "C"), fold=self.symbol.fold).name
         return PointGroup(name=name, frame=self.frame)
 
+    def carried(self, matrix: Array) -> "PointGroup":
+        """The group of what an orthogonal map [3, 3] carries its object to.
+
+        R G R' is (-R) G (-R)', so that one of R and -R, the rotation, turns the frame.
+        """
+        return PointGroup(name=self.name, frame=self.frame @ matrix.T * np.sign(np.linalg.det(matrix)))
+
     def for_point_set(self) -> "PointGroup":
         """The group that a set of points (or a mesh, or a density) has if it has this one.
 
